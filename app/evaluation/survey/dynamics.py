@@ -15,7 +15,7 @@ from app.arrays import BoolArray, FloatArray
 from app.estimation import SingleBeam
 from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, LEAST_SD_M
 from app.evaluation.survey.world import SPEED_MPS, Log, MapSoFar, SurveyScenario
-from app.exploration.core.problem import Belief, Situation
+from app.exploration.core.problem import Belief, Planner, Situation
 from app.exploration.core.track import along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
@@ -32,6 +32,8 @@ HARDLY_BEGUN = 0.6
 """Part of a leg that may be left when its vehicle gets a leg together with another that needs one."""
 LEAST_WAY_M = 1.0
 """Who has less way left gets no leg."""
+LEAD_M = 4.0
+"""A vehicle keeps the leg after the one that it flies where it begins it within so many metres."""
 PASSED_WITHIN_M = 8.0
 TURN_S = 4.0
 """Planners pay for turns in circles whose radius is flown in so many seconds."""
@@ -142,7 +144,9 @@ def fly_planner_at_sea(
     while now_s < until_s:
         due = _due(crafts, scenario.max_step_m, (until_s - now_s) * SPEED_MPS)
         if not decided and due.any():
-            so_far.renew(log, now_s / until_s)
+            if so_far.renew(log, now_s / until_s):
+                _take_back(crafts, names, chooser)
+                due = _due(crafts, scenario.max_step_m, (until_s - now_s) * SPEED_MPS)
             sounded_m, doubtful_m = so_far.sounded(log)
             left_m = np.array([max((until_s - now_s) * SPEED_MPS - craft.way_ahead_m, 0.0) for craft in crafts])
             step += 1
@@ -218,6 +222,18 @@ def _due(crafts: list[_Craft], leg_m: float, way_left_m: float) -> BoolArray:
     soon = [len(craft.ends) <= AHEAD + 1 and craft.left_of_leg_m <= HARDLY_BEGUN * leg_m for craft in crafts]
     due: BoolArray = needs | (able & np.array(soon, dtype=np.bool_))
     return due
+
+
+def _take_back(crafts: list[_Craft], names: tuple[str, ...], chooser: Planner) -> None:
+    """Take back the legs that are not begun, where there is time to decide them anew by the newer map."""
+    open_legs = {
+        name: len(craft.ends) - (1 if craft.left_of_leg_m >= LEAD_M else 2)
+        for name, craft in zip(names, crafts, strict=True)
+    }
+    open_legs = {name: count for name, count in open_legs.items() if count > 0}
+    if open_legs and chooser.take_back(open_legs):
+        for name, craft in zip(names, crafts, strict=True):
+            del craft.ends[len(craft.ends) - open_legs.get(name, 0) :]
 
 
 def _crafts(scenario: SurveyScenario, stream: int) -> list[_Craft]:

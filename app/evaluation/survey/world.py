@@ -246,13 +246,15 @@ class MapSoFar:
         self._verdict: OutlierReport | None = None
         self._maps = self._learned = 0
 
-    def renew(self, log: Log, part: float) -> None:
-        """Make a map when it is time, after this ``part`` of the mission."""
+    def renew(self, log: Log, part: float) -> bool:
+        """Make a map when it is time, after this ``part`` of the mission; whether one was made."""
         learns = part >= LEARN_AT[min(self._learned, len(LEARN_AT) - 1)] and self._learned < len(LEARN_AT)
         if not self._fixed and len(log.soundings) and (learns or int(part * MAPS) > self._maps):
             estimate = self._gp.fit(log.soundings, learn=learns).predict(self._grid)
             self.belief, self._verdict = belief_of(estimate), self._gp.outliers_
             self._maps, self._learned = int(part * MAPS), self._learned + learns
+            return True
+        return False
 
     def sounded(self, log: Log) -> tuple[FloatArray, FloatArray]:
         """Return where the map has soundings (n, 2), and where it left them out (k, 2)."""

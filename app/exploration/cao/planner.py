@@ -6,6 +6,7 @@ paper leaves the regressors ``phi`` open. ``map`` uses predictions from the curr
 each prediction deserves trust; ``polynomial`` uses powers of the raw positions, the literal reading.
 """
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -126,6 +127,10 @@ class CaoPlanner(PlannerBase):
         each = np.arange(len(chosen))
         left_behind[each, each] = team.positions
         return phi - self._model.regressors(left_behind)
+
+    def take_back(self, legs: Mapping[str, int]) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.take_back`; in surveys only."""
+        return isinstance(self._model, SurveyRegressors) and self._model.take_back(legs)
 
     def _remember(self) -> dict[str, Any]:
         return {

@@ -4,6 +4,7 @@ All positions are metres in one local Cartesian frame: columns ``east_m, north_m
 Arrays are never modified by the receiver.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -149,6 +150,13 @@ class Planner(Protocol):
 
     def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
         """Return a configuration that obeys ``situation.constraints``."""
+        ...
+
+    def take_back(self, legs: Mapping[str, int]) -> bool:
+        """Take back so many of the last legs of some vehicles: they are not flown, and will be decided anew.
+
+        Returns False, and nothing is changed, where it does not know any more what it planned before them.
+        """
         ...
 
     def snapshot(self) -> bytes:

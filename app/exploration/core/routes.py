@@ -19,6 +19,8 @@ CORNER_TOLERANCE = 0.15
 """A corner may be cut when the leg passes it within this fraction of a step."""
 SAME_CORNER = 0.03
 """Vertices that are no farther apart than this fraction of a step are one corner."""
+SWING = 3.94
+"""Radii per radian by which two turns to the same side, taken as one, exceed a right angle: right for a reversal."""
 SHARP_RAD = 0.5
 """A turn by less than this is no corner: the legs before and after it are as long as they may be."""
 
@@ -111,36 +113,61 @@ class Turns(NamedTuple):
 def turn_m(turn: float, before: float, leg_m: float, turns: Turns) -> float:
     """Return by how many metres a turn at the end of a leg of ``leg_m`` lengthens the way.
 
-    ``turn`` and ``before``, the turn at the leg's start, are signed angles. An arc is longer than nothing by r a. What
-    turns farther than a right angle has to swing out, as of a Dubins path: so does a short leg between two turns to the
-    same side.
+    ``turn`` and ``before``, the turn at the leg's start, are signed angles. On an arc a vehicle comes forward along the
+    next leg, so that r (a - sin a) is lost. A short leg between two turns to the same side has it swing out, as of a
+    Dubins path.
     """
-    joined = abs(turn)
-    radius_m = turns.radius_m
+    angle, radius_m = abs(turn), turns.radius_m
+    extra = radius_m * (angle - np.sin(angle))
     if turn * before > 0.0 and leg_m < 2.0 * radius_m:
-        joined += abs(before) * (1.0 - leg_m / (2.0 * radius_m))
-    extra = radius_m * (abs(turn) + 8.0 / np.pi * max(0.0, min(joined, np.pi) - 0.5 * np.pi))
-    return extra + turns.corner_m if abs(turn) > SHARP_RAD else extra
+        joined = min(angle + abs(before) * (1.0 - leg_m / (2.0 * radius_m)), np.pi)
+        extra += SWING * radius_m * max(0.0, joined - max(angle, 0.5 * np.pi))
+    return float(extra + turns.corner_m if angle > SHARP_RAD else extra)
+
+
+class Underway(NamedTuple):
+    """A vehicle on its route: where it is, its course (mathematical, NaN unknown), and how far it has flown.
+
+    ``turn`` is the turn at the start of its last leg, ``leg_m`` the length of that.
+    """
+
+    x: float
+    y: float
+    course: float
+    turn: float
+    leg_m: float
+    flown_m: float
+
+
+@njit(cache=True, nogil=True)
+def set_out(x: float, y: float, heading: float) -> Underway:
+    """Return a vehicle that begins its route at (x, y); NaN heading: unknown."""
+    return Underway(x, y, 0.5 * np.pi - heading, 0.0, np.inf, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def after_leg(at: Underway, to_x: float, to_y: float, most_m: float, turns: Turns) -> tuple[Underway, float]:
+    """Return a vehicle after its next leg, and which part of that it flies before it has flown ``most_m`` in all."""
+    dx = to_x - at.x
+    dy = to_y - at.y
+    d = np.hypot(dx, dy)
+    if d < 1e-6:
+        return at, 0.0
+    course, turn, flown = np.arctan2(dy, dx), at.turn, at.flown_m
+    if not np.isnan(at.course):
+        turn = (course - at.course + np.pi) % (2.0 * np.pi) - np.pi
+        flown += turn_m(turn, at.turn, at.leg_m, turns)
+    part = max(0.0, min(1.0, (most_m - flown) / d))
+    return Underway(to_x, to_y, course, turn, d, min(flown + d, most_m)), part
 
 
 @njit(cache=True, nogil=True)
 def flown_m(x: float, y: float, heading: float, route: FloatArray, turns: Turns) -> float:
     """Return how far a vehicle flies from (x, y) along a route (k, 2), turns included; NaN heading: unknown."""
-    total, course, before, leg = 0.0, 0.5 * np.pi - heading, 0.0, np.inf
+    at = set_out(x, y, heading)
     for k in range(len(route)):
-        dx = route[k, 0] - x
-        dy = route[k, 1] - y
-        d = np.hypot(dx, dy)
-        if d < 1e-6:
-            continue
-        towards = np.arctan2(dy, dx)
-        if not np.isnan(course):
-            turn = (towards - course + np.pi) % (2.0 * np.pi) - np.pi
-            total += turn_m(turn, before, leg, turns)
-            before = turn
-        total += d
-        x, y, course, leg = route[k, 0], route[k, 1], towards, d
-    return total
+        at, _ = after_leg(at, route[k, 0], route[k, 1], np.inf, turns)
+    return at.flown_m
 
 
 def metres_left(team: Situation) -> FloatArray:

@@ -80,7 +80,7 @@ def orders_across(u: FloatArray) -> list[tuple[int, ...]]:
 
 def way_m(vehicles: Vehicles, turns: Turns, i: int, route: FloatArray) -> float:
     """Return how far vehicle ``i`` flies along a route (k, 2), turns included."""
-    return float(flown_m(vehicles.en_m[i, 0], vehicles.en_m[i, 1], vehicles.headings_rad[i], route, turns))
+    return flown_m(vehicles.en_m[i, 0], vehicles.en_m[i, 1], float(vehicles.headings_rad[i]), route, turns)
 
 
 def _path(sweep: Sweep, lines_u: FloatArray, inset_m: float, parts: int, *, upwards: bool) -> _Path:

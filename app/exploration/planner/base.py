@@ -2,6 +2,7 @@
 
 import zlib
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -115,6 +116,13 @@ class PlannerBase(ABC):
     @abstractmethod
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         """Decide for vehicles in the order of their names."""
+
+    def take_back(self, legs: Mapping[str, int]) -> bool:
+        """Take back so many of the last legs of some vehicles: they are not flown, and will be decided anew.
+
+        Returns False, and nothing is changed, where the planner does not know any more what it planned before them.
+        """
+        return not any(legs.values())
 
     def snapshot(self) -> bytes:
         """Return the planner's memory."""

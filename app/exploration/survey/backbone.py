@@ -25,6 +25,8 @@ IN_ORDER = (Pattern(), Pattern(TO_BORDER, 0.0), Pattern(TO_BORDER, TO_END, PARTS
 ADAPTS, MANY_LINES = 0.85, 11
 """How much better every other line first counts than all in order where every vehicle flies many lines: what it has met
 may be followed up. After fewer the map tells too little of where it is rough."""
+NARROW = 4.0
+"""Lines closer than so many turning radii count as many: on every other one, vehicles do not have to swing out."""
 TRANSIT_PENALTY = 0.5
 """How much worse a share counts whose first line would only be reached with the whole budget."""
 LEAST_STRIP = 0.05
@@ -76,7 +78,9 @@ def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objecti
     spacings_m = [np.inf if survey is None else survey.spacing_m for survey in whole]
     sweep = sweeps[int(np.argmin(spacings_m))]
     value, shares = there_and_back(sweep, vehicles, nodes, objective)
-    if MANY_LINES * len(vehicles.en_m) * min(spacings_m) <= float(np.ptp(sweep.to_uv(constraints.area)[:, 0])):
+    spacing_m, width_m = min(spacings_m), float(np.ptp(sweep.to_uv(constraints.area)[:, 0]))
+    many = MANY_LINES * len(vehicles.en_m) * spacing_m <= width_m or spacing_m <= NARROW * objective.turns.radius_m
+    if many:
         value *= ADAPTS
     unknown = np.full(len(nodes.x), np.inf)
     for pattern in IN_ORDER:

@@ -33,10 +33,13 @@ HEDGE = 0.25
 TRUSTED_TO = 1.25
 """Farther from all soundings, in spacings of the survey lines, less and less is known of the roughness."""
 
+LEAST_RANGE, MOST_NOISE = 0.05, 10.0
+"""Over a smaller range of distances nothing is learned of the noise; a larger part of it than this is taken as this."""
+
 SECOND_LOOK = 30.0
 """Weight of a place whose only sounding is doubted: is there a rock, or was it a fish?"""
-LOOK_WITHIN = 0.6
-"""How far around, in spacings of the survey lines."""
+LOOK_WITHIN, LOOK_WITHIN_M = 0.6, 6.0
+"""How far around, in spacings of the survey lines, and at most: a rock is no larger where lines are far apart."""
 MOST_DOUBTS = 0.01
 """Where a larger part of the soundings is doubted the sounder is to blame, and second looks would cost the survey."""
 
@@ -106,13 +109,41 @@ def expected_roughness(belief: Belief, distance_m: FloatArray, spacing_m: float)
     return np.asarray(trust * roughness / roughness.mean() + 1.0 - trust)
 
 
+def noise_part(belief: Belief, distance_m: FloatArray, scale_m: float) -> float:
+    """Return the squared error that is left where soundings are, over the most that distance adds to it.
+
+    The map's variance grows with the distance D to the nearest sounding as x / (1 + x) with x = (D / l)^2 (see
+    :mod:`.value`); what it is at none is the sounder's noise, which better places for lines do not lower.
+
+    Parameters
+    ----------
+    distance_m : (n,)
+        From each landmark to the nearest sounding.
+    scale_m : float
+        The length l.
+    """
+    known = np.isfinite(belief.depth_m) & np.isfinite(belief.sd_m)
+    x = (distance_m[known] / scale_m) ** 2
+    grows = x / (1.0 + x)
+    if known.sum() < 9 or float(np.ptp(grows)) < LEAST_RANGE:
+        return 0.0
+    slope, at_none = np.polyfit(grows, belief.sd_m[known] ** 2, 1)
+    if slope <= 0.0:
+        return MOST_NOISE
+    return float(np.clip(at_none / slope, 0.0, MOST_NOISE))
+
+
 def with_second_looks(roughness: FloatArray, team: Situation, spacing_m: float) -> FloatArray:
     """Return the landmarks' roughness (n,) raised around soundings that are doubted."""
     doubtful = team.doubtful_en_m
     if not 0 < len(doubtful) <= max(1.0, MOST_DOUBTS * (len(doubtful) + len(team.soundings_en_m))):
         return roughness
+    within_m = min(LOOK_WITHIN * spacing_m, LOOK_WITHIN_M)
     away = np.asarray(cKDTree(doubtful).query(team.belief.xy_m)[0])
-    return np.where(away <= LOOK_WITHIN * spacing_m, np.maximum(roughness, SECOND_LOOK), roughness)
+    # Landmarks farther apart than a rock is wide stand for more ground than is looked at again.
+    apart_m = float(np.sqrt(np.prod(np.ptp(team.belief.xy_m, axis=0)) / max(len(away) - 1, 1)))
+    reach_m = max(within_m, apart_m / np.sqrt(2.0))
+    return np.where(away <= reach_m, np.maximum(roughness, SECOND_LOOK * (within_m / reach_m) ** 2), roughness)
 
 
 def _averaged(squared: FloatArray, smoothing: float) -> FloatArray:

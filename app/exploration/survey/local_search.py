@@ -8,8 +8,8 @@ from numba import njit
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Constraints, Region
 from app.exploration.core.geometry import enters, leaves, signed_distance
-from app.exploration.core.routes import Turns, Vehicles
-from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_route, make_nodes
+from app.exploration.core.routes import Turns, Underway, Vehicles, set_out
+from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_leg, make_nodes
 
 DRAWS = 6
 """Random numbers that one change uses."""
@@ -209,6 +209,68 @@ def _left(d2: FloatArray, after: FloatArray, weight: FloatArray, scale_m: float,
     return running
 
 
+class Flights(NamedTuple):
+    """How every vehicle flies its route, leg by leg: a change is only flown from where it begins.
+
+    Attributes
+    ----------
+    d2 : (n_vehicles, k + 1, m)
+        Squared distances of the nodes to the first 0, 1, ... legs.
+    at : (n_vehicles, k + 1, 6)
+        The vehicle after them, as :class:`~app.exploration.core.routes.Underway`.
+    """
+
+    d2: FloatArray
+    at: FloatArray
+
+
+@njit(cache=True, nogil=True)
+def _under_way(at: FloatArray) -> Underway:
+    return Underway(at[0], at[1], at[2], at[3], at[4], at[5])
+
+
+@njit(cache=True, nogil=True)
+def _fly(
+    flights: Flights, v: int, first: int, nodes: Nodes, objective: SurveyObjective, left_m: float, plan: ViaPoints
+) -> None:
+    """Fly a vehicle's route anew from its leg ``first`` on."""
+    for k in range(first, plan.counts[v]):
+        flights.d2[v, k + 1] = flights.d2[v, k]
+        at = _under_way(flights.at[v, k])
+        after = lower_to_leg(flights.d2[v, k + 1], nodes, objective, at, plan.vias[v, k, 0], plan.vias[v, k, 1], left_m)
+        for i, value in enumerate(after):
+            flights.at[v, k + 1, i] = value
+
+
+@njit(cache=True, nogil=True)
+def _try(
+    d2: FloatArray,
+    flights: Flights,
+    v: int,
+    first: int,
+    nodes: Nodes,
+    objective: SurveyObjective,
+    left_m: float,
+    plan: ViaPoints,
+) -> None:
+    """Set ``d2`` (m,) to what it is after a vehicle's route, which is as it was up to its leg ``first``."""
+    d2[:] = flights.d2[v, first]
+    at = _under_way(flights.at[v, first])
+    for k in range(first, plan.counts[v]):
+        if at.flown_m >= left_m:
+            break
+        at = lower_to_leg(d2, nodes, objective, at, plan.vias[v, k, 0], plan.vias[v, k, 1], left_m)
+
+
+@njit(cache=True, nogil=True)
+def _first_changed(vias: FloatArray, count: int, before: FloatArray, count_before: int) -> int:
+    """Return the first via point in which two routes differ."""
+    for k in range(min(count, count_before)):
+        if vias[k, 0] != before[k, 0] or vias[k, 1] != before[k, 1]:
+            return k
+    return min(count, count_before)
+
+
 @njit(cache=True, nogil=True)
 def improve(
     d2: FloatArray,
@@ -242,13 +304,19 @@ def improve(
     current, current_counts = begin.vias.copy(), begin.counts.copy()
     plan = ViaPoints(begin.vias.copy(), begin.counts.copy(), begin.locked)
     after = np.full((n, m), np.inf)
+    rows = plan.vias.shape[1] + 1
+    flights = Flights(np.full((n, rows, m), np.inf), np.zeros((n, rows, 6)))
     for v in range(n):
-        lower_to_route(after[v], nodes, objective, starts[v], headings[v], left_m[v], plan.vias[v], plan.counts[v])
+        for i, number in enumerate(set_out(starts[v, 0], starts[v, 1], headings[v])):
+            flights.at[v, 0, i] = number
+        _fly(flights, v, 0, nodes, objective, left_m[v], plan)
+        after[v] = flights.d2[v, plan.counts[v]]
     running = _left(d2, after, weight, scale, power)
     value = running[-1]
     best, best_counts, best_value = current.copy(), current_counts.copy(), value
     trial = after.copy()
     changed = np.zeros(n, np.bool_)
+    first = np.zeros(n, np.int64)
     for it in range(len(draws)):
         changed[:] = False
         _change(plan, starts, nodes, running, search.spread_m, draws[it], changed)
@@ -259,10 +327,8 @@ def improve(
         if keep:
             for v in range(n):
                 if changed[v]:
-                    trial[v, :] = np.inf
-                    lower_to_route(
-                        trial[v], nodes, objective, starts[v], headings[v], left_m[v], plan.vias[v], plan.counts[v]
-                    )
+                    first[v] = _first_changed(plan.vias[v], plan.counts[v], current[v], current_counts[v])
+                    _try(trial[v], flights, v, first[v], nodes, objective, left_m[v], plan)
             left = _left(d2, trial, weight, scale, power)
             new = left[-1]
             keep = new < value * (1.0 + search.heat * (1.0 - (it + 1.0) / len(draws)) ** 2) - 1e-12
@@ -278,6 +344,7 @@ def improve(
                 current[v] = plan.vias[v]
                 current_counts[v] = plan.counts[v]
                 after[v] = trial[v]
+                _fly(flights, v, first[v], nodes, objective, left_m[v], plan)
             elif changed[v]:
                 plan.vias[v] = current[v]
                 plan.counts[v] = current_counts[v]

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.core.routes import Turns, Vehicles, turn_m
+from app.exploration.core.routes import Turns, Underway, Vehicles, after_leg, set_out
 
 BUCKETS_PER_SIDE = 12
 
@@ -133,6 +133,21 @@ def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: flo
 
 
 @njit(cache=True, nogil=True)
+def lower_to_leg(
+    d2: FloatArray, nodes: Nodes, objective: SurveyObjective, at: Underway, to_x: float, to_y: float, most_m: float
+) -> Underway:
+    """Lower ``d2`` to what it is after a vehicle's next leg, in place; return the vehicle after it.
+
+    It ends where the vehicle has flown ``most_m`` in all.
+    """
+    after, part = after_leg(at, to_x, to_y, most_m, objective.turns)
+    if part > 0.0:
+        x, y = at.x + part * (to_x - at.x), at.y + part * (to_y - at.y)
+        lower_to_segment(d2, nodes, at.x, at.y, x, y, objective.reach_m)
+    return after
+
+
+@njit(cache=True, nogil=True)
 def lower_to_route(
     d2: FloatArray,
     nodes: Nodes,
@@ -144,27 +159,12 @@ def lower_to_route(
     count: int,
 ) -> float:
     """Lower ``d2`` to what it is after flying a route from ``start`` (2,), in place; return the metres left."""
-    x, y, course, before, leg = start[0], start[1], 0.5 * np.pi - heading, 0.0, np.inf
+    at = set_out(start[0], start[1], heading)
     for k in range(count):
-        dx = route[k, 0] - x
-        dy = route[k, 1] - y
-        d = np.hypot(dx, dy)
-        if d < 1e-6:
-            continue
-        towards = np.arctan2(dy, dx)
-        if not np.isnan(course):
-            turn = (towards - course + np.pi) % (2.0 * np.pi) - np.pi
-            left_m -= turn_m(turn, before, leg, objective.turns)
-            before = turn
-        if left_m <= 0.0:
-            return 0.0
-        f = min(1.0, left_m / d)
-        lower_to_segment(d2, nodes, x, y, x + f * dx, y + f * dy, objective.reach_m)
-        left_m -= d
-        if left_m <= 0.0:
-            return 0.0
-        x, y, course, leg = route[k, 0], route[k, 1], towards, d
-    return left_m
+        if at.flown_m >= left_m:
+            break
+        at = lower_to_leg(d2, nodes, objective, at, route[k, 0], route[k, 1], left_m)
+    return max(0.0, left_m - at.flown_m)
 
 
 @njit(cache=True, nogil=True, inline="always")

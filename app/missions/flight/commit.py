@@ -1,5 +1,6 @@
 """Makes decisions durable, and turns legs that are stored into the vehicles' orders."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -101,8 +102,7 @@ class LegCommit:
                 now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
             if member is None or member is not now_of_name or member.left_at is not None:
                 continue
-            length_m = float(np.hypot(*(leg.target_m[:2] - starts_m[row.vehicle])))
-            member.committed_m += length_m if length_m > STILL_M else live.spec.limits.max_step_m
+            member.committed_m += way_m([starts_m[row.vehicle], leg.target_m[:2]], live.spec)
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
             elif member.withdrawal is None:  # it may have been called home meanwhile
@@ -114,6 +114,29 @@ class LegCommit:
         await self._tell_of_pursuits(decision, number)
         for note in decision.notes:
             await live.journal.log(Level.WARNING, "safety", note, step=number)
+
+    def leg_ahead(self, leg: Leg, number: int) -> CommittedLeg:
+        """Return a decided leg as its vehicle has it ahead."""
+        return committed_leg(self._row(number, leg), surfacing=leg.surfacing)
+
+    async def rewrite(self, decision: Decision, legs: Mapping[str, list[tuple[CommittedLeg, Leg]]]) -> None:
+        """Write legs in place of those with their numbers, which are not begun, and the planner's memory with them.
+
+        ``legs`` are by vehicle; ``decision`` is the last one of those that they come from.
+        """
+        live = self._live
+        rows = [self._row(ahead.number, leg) for of_one in legs.values() for ahead, leg in of_one]
+
+        async def store() -> None:
+            async with live.database.writing() as session:
+                for row in rows:
+                    await session.merge(row)
+                await mission_queries.remember(
+                    session, live.id, live.header.step, decision.memory, live.ranges.memory()
+                )
+
+        await live.journal.storage.done(lambda: to_the_end(store()))
+        self.bottom = decision.bottom
 
     def lead_home(self, member: Member, corners: list[tuple[FloatArray, float]]) -> None:
         """Give a vehicle legs that survey nothing: along corners (2,) at depths, metres.
@@ -297,6 +320,12 @@ def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
     lon, lat = recovery.point
     east, north = spec.frame().to_local(np.array(lat), np.array(lon))
     return np.array([float(east), float(north)])
+
+
+def way_m(ends_m: Sequence[FloatArray], spec: MissionSpec) -> float:
+    """Return how much of a vehicle's way legs take from one of these places (2,) to the next."""
+    lengths_m = np.hypot(*np.diff(np.array(ends_m), axis=0).T)
+    return float(np.where(lengths_m > STILL_M, lengths_m, spec.limits.max_step_m).sum())
 
 
 def committed_leg(row: WaypointRow, *, surfacing: bool = False) -> CommittedLeg:

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 
@@ -19,7 +20,7 @@ from app.missions.clock import now
 from app.missions.flight.decision import Decision, Place, decide, swath_task
 from app.missions.flight.step_maps import StepMaps
 from app.missions.live.mission import LiveMission
-from app.missions.team import Member
+from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 
 PACE_MEMORY = 0.9
@@ -59,11 +60,16 @@ class Decider:
         self.attempt = 0
 
     async def decide(
-        self, number: int, places: list[Place], task: SearchTask | None = None, legs: int = 1
+        self,
+        number: int,
+        places: list[Place],
+        task: SearchTask | None = None,
+        legs: int = 1,
+        most: Mapping[str, int] | None = None,
     ) -> list[Decision]:
         """Bring the map up to date, then decide legs from this number on, so many for each vehicle that gets any.
 
-        ``task`` is what a search is about.
+        ``task`` is what a search is about; ``most`` says of vehicles that they get so many only.
         """
         live = self._live
         started_s = asyncio.get_running_loop().time()
@@ -99,7 +105,7 @@ class Decider:
                 swath = swath_task(live.spec, sounders, live.builder.coverage())
             belief, sounded = live.builder.belief(), live.builder.sounded_at_m()
             decisions = [decided(number, places, belief, sounded)]
-            here = moved_on(places, decisions[0])
+            here = _who_gets_more(moved_on(places, decisions[0]), most, 1)
             while len(decisions) < legs and any(place.moving for place in here):
                 try:
                     decisions.append(decided(number + len(decisions), here, belief, sounded))
@@ -107,7 +113,7 @@ class Decider:
                     # It comes out when this leg is the first to be decided.
                     self.planner.restore(decisions[-1].memory)
                     break
-                here = moved_on(here, decisions[-1])
+                here = _who_gets_more(moved_on(here, decisions[-1]), most, len(decisions))
             return decisions
 
         with metrics.PLANNING_SECONDS.time():
@@ -163,6 +169,13 @@ def place_of(member: Member, live: LiveMission) -> Place:
     )
 
 
+def _who_gets_more(places: list[Place], most: Mapping[str, int] | None, decided: int) -> list[Place]:
+    """Return places that move on only where their vehicles may get more legs than are decided."""
+    if most is None:
+        return places
+    return [replace(place, moving=place.moving and most.get(place.vehicle, 0) > decided) for place in places]
+
+
 def moved_on(places: list[Place], decision: Decision) -> list[Place]:
     """Return where the vehicles' legs after a decision's begin; who got none in it gets none after it."""
     ends = {leg.vehicle: leg for leg in decision.legs if not leg.refusal}
@@ -186,16 +199,19 @@ def moved_on(places: list[Place], decision: Decision) -> list[Place]:
     return later
 
 
-def place_ahead(member: Member, live: LiveMission) -> Place:
-    """Return where a vehicle's next leg begins: at the end of its last one, or where it is when it has none."""
-    here = place_of(member, live)
+def place_ahead(member: Member, live: LiveMission, kept: Sequence[CommittedLeg] | None = None) -> Place:
+    """Return where a vehicle's next leg begins: at the end of its last one, or where it is when it has none.
+
+    ``kept`` are its legs ahead, where they are not all that it has.
+    """
+    here, kept = place_of(member, live), member.ahead if kept is None else kept
     flying = [member.target_m] if member.busy and member.target_m is not None else []
-    ends = [here.en_m, *flying, *(leg.target_m for leg in member.ahead)]
+    ends = [here.en_m, *flying, *(leg.target_m for leg in kept)]
     if len(ends) == 1:
         return here
     east, north = ends[-1] - ends[-2]
-    up = member.ahead[-1].surfacing if member.ahead else member.surfacing
-    last_depth_m = member.ahead[-1].position.depth_m if member.ahead else here.surfacing_depth_m
+    up = kept[-1].surfacing if kept else member.surfacing
+    last_depth_m = kept[-1].position.depth_m if kept else here.surfacing_depth_m
     return replace(
         here,
         en_m=np.asarray(ends[-1], dtype=np.float64),

@@ -17,6 +17,7 @@ from app.missions.flight.commit import LegCommit
 from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
 from app.missions.flight.decision import Decision, Leg, Place, planned_way_m
 from app.missions.flight.dispatch import Dispatch
+from app.missions.flight.exchange import LegExchange
 from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.separation import too_close, ways_aside
 from app.missions.flight.step_maps import StepMaps
@@ -83,6 +84,7 @@ class OwnLegs:
         self._dispatch = dispatch
         self._maps = maps
         self._waiting = waiting
+        self._exchange = LegExchange(live, decider, committing, range_left, time_scale)
         self._time_scale = time_scale
         self._watched = bool(live.spec.targets) or live.spec.surface_policy is not None
         self._measured = live.spec.planner.name in COVERERS
@@ -141,6 +143,9 @@ class OwnLegs:
     async def _decide(self, getting: list[Member]) -> None:
         """Decide the next leg of some vehicles, and commit it."""
         live = self._live
+        unhurried_s = 2.0 * DECISIONS_AHEAD * self._decider.takes_s
+        if not self._watched and all(self._lasts_s(member) > unhurried_s for member in getting):
+            await self._exchange.look()
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         places = [self._place(member, moving=member.name in names) for member in live.team.present]

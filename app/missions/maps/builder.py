@@ -27,7 +27,7 @@ from app.missions.maps.swath_grid import SwathGrid
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
 
-CLAIM_MARGIN, UNSEEN_MARGIN = 1.25, 1.0
+CLAIM_MARGIN, UNSEEN_MARGIN = 1.25, 2.0
 """By the first factor a cell's deviation must be below the asked accuracy to become known; up to the accuracy it stays
 so. What is learned of the sea floor changes a little with every map: cells at the limit do not come and go with it.
 Ground that no sounding supports may be rougher than the rest, and a model that learns of it will be less sure of all:

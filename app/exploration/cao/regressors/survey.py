@@ -11,8 +11,8 @@ phi = (improvement of the predicted final map over the plan kept so far, uncerta
 objective measured after a step is the improvement of the predicted final map that really came about.
 """
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,7 +27,7 @@ from app.exploration.lines.handover import hand_over
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, backbone, packed
-from app.exploration.survey.error import expected_roughness, with_second_looks
+from app.exploration.survey.error import expected_roughness, noise_part, with_second_looks
 from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value, values_after_first_leg
 
@@ -53,9 +53,25 @@ takes the luckiest."""
 SILENT_WITHIN, SILENT = 0.5, 0.05
 """Within so many spacings of a place that gave no echo ground counts only this part: there is nothing to be heard."""
 JITTER = 0.7
+MOST_GIVEN = 24
+"""How many of a vehicle's last legs can be taken back."""
 CORNER_LOSS = 0.4
 """Part of a step that a corner costs where steps are counted: the leg to it ends early."""
 TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])
+
+
+class GivenLeg(NamedTuple):
+    """A leg that a vehicle was given: its ends (2,), and what it took from the head of either plan, (k, 2).
+
+    ``coarse`` is how many via points were left of the first pass before it; ``free`` tells which plan was followed.
+    """
+
+    start_m: FloatArray
+    end_m: FloatArray
+    plan: FloatArray
+    backbone: FloatArray
+    coarse: int
+    free: bool
 
 
 class SurveyRegressors:
@@ -78,6 +94,7 @@ class SurveyRegressors:
         self._adapts = True
         self._free = False
         self._row = [0.0, 0.0]
+        self._given: dict[str, list[GivenLeg]] = {}
 
     def begin(self, team: Situation, bottom: Bottom, seed: int) -> float:
         """See :class:`app.exploration.cao.planner.Regressors`.
@@ -130,6 +147,7 @@ class SurveyRegressors:
         self._nodes = thin_nodes(team, roughness)
         self._scale = max(team.belief.correlation_length_m, self._spacing)
         turns = Turns(self._options.turn_radius_m, CORNER_LOSS * constraints.max_step_m if team.left_m is None else 0.0)
+        self._noise = noise_part(team.belief, distance, self._scale) * len(self._nodes.x)
         self._objective = SurveyObjective(self._scale, POWER, turns, REACH * self._spacing)
         self._vehicles = Vehicles(self._en, np.ascontiguousarray(team.headings_rad, dtype=np.float64), self._left_m)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
@@ -188,15 +206,41 @@ class SurveyRegressors:
             x, y = self._en[i]
             self._flown_m += float(np.hypot(positions[i, 0] - x, positions[i, 1] - y))
             self._silent = np.vstack([self._silent, 0.5 * (self._en[i] + positions[i, :2]), positions[i, :2]])
-            for routes in (self._plan, self._backbone):
+            coarse, taken = self._coarse[name], [np.zeros((0, 2)), np.zeros((0, 2))]
+            for which, routes in enumerate((self._plan, self._backbone)):
                 route = routes[name]
                 for cut in (CORNER_TOLERANCE, 0.0):
                     tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._steps_m[i], cut)
                     if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
-                        routes[name] = route[first:]
+                        routes[name], taken[which] = route[first:], route[:first]
                         if routes is self._plan:
                             self._coarse[name] = max(0, self._coarse[name] - first)
                         break
+            leg = GivenLeg(self._en[i].copy(), positions[i, :2].copy(), taken[0], taken[1], coarse, self._free)
+            self._given[name] = [*self._given.get(name, []), leg][-MOST_GIVEN:]
+
+    def take_back(self, legs: Mapping[str, int]) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.take_back`."""
+        if any(count > len(self._given.get(name, [])) for name, count in legs.items()):
+            return False
+        for name, count in legs.items():
+            for _ in range(count):
+                leg = self._given[name].pop()
+                for routes, taken, followed in (
+                    (self._plan, leg.plan, leg.free),
+                    (self._backbone, leg.backbone, not leg.free),
+                ):
+                    if followed and not len(taken) and len(routes[name]):
+                        taken = _unless_straight(leg.start_m, leg.end_m, routes[name][0])
+                    routes[name] = np.vstack([taken, routes[name]])
+                    if routes is self._plan:
+                        self._coarse[name] = leg.coarse + len(taken) - len(leg.plan) if leg.coarse else 0
+                self._flown_m -= float(np.hypot(*(leg.end_m - leg.start_m)))
+                unflown = np.array([leg.end_m, 0.5 * (leg.start_m + leg.end_m)])
+                same = np.abs(self._silent[:, None] - unflown).sum(axis=2).min(axis=1, initial=np.inf) < 1e-6
+                self._silent = self._silent[~same]
+        self._planned_m = min(self._planned_m, self._flown_m)
+        return True
 
     def remember(self) -> dict[str, Any]:
         """Return the memory."""
@@ -211,6 +255,7 @@ class SurveyRegressors:
             "adapts": self._adapts,
             "free": self._free,
             "row": self._row,
+            "given": {name: [list(leg) for leg in legs] for name, legs in self._given.items()},
         }
 
     def recall(self, state: dict[str, Any]) -> None:
@@ -225,6 +270,20 @@ class SurveyRegressors:
         self._silent = np.array(state.get("silent", []), dtype=np.float64).reshape(-1, 2)
         self._adapts, self._free = bool(state.get("adapts", True)), bool(state["free"])
         self._row = [float(x) for x in state["row"]]
+        self._given = {
+            str(name): [
+                GivenLeg(
+                    np.array(start, dtype=np.float64),
+                    np.array(end, dtype=np.float64),
+                    np.array(plan, dtype=np.float64).reshape(-1, 2),
+                    np.array(backbone, dtype=np.float64).reshape(-1, 2),
+                    int(coarse),
+                    bool(free),
+                )
+                for start, end, plan, backbone, coarse, free in legs
+            ]
+            for name, legs in state.get("given", {}).items()
+        }
 
     def _adopt_backbone(self) -> None:
         """Give every vehicle of the team its share of the backbone."""
@@ -233,6 +292,7 @@ class SurveyRegressors:
         self._backbone = {name: share.stops for name, share in zip(team.vehicles, shares, strict=True)}
         self._coarse = {name: share.coarse for name, share in zip(team.vehicles, shares, strict=True)}
         self._plan = dict(self._backbone)
+        self._given = {}
         known = np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)
         self._adapts = any(share.coarse > 0 for share in shares) or float(known.mean()) > KNOWN
         self._free, self._planned_m = False, self._flown_m
@@ -243,6 +303,7 @@ class SurveyRegressors:
         self._backbone = hand_over(self._backbone, team.vehicles, self._en)
         self._plan = hand_over(self._plan, team.vehicles, self._en)
         self._coarse = dict.fromkeys(team.vehicles, 0)
+        self._given = {}
 
     def _improve_plan(
         self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray], values: tuple[float, float]
@@ -260,7 +321,7 @@ class SurveyRegressors:
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
         knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
         leave = 1.0 if self._free else LEAVE_BACKBONE if self._adapts else LEAVE_LINES
-        self._free = knows and value < leave * values[1]
+        self._free = knows and value + self._noise < leave * (values[1] + self._noise)
         self._planned_m = self._flown_m
         return (vias, counts), (value, values[1])
 
@@ -342,6 +403,14 @@ class SurveyRegressors:
                 counts[which, i] = len(rest)
         targets = np.ascontiguousarray(candidates[..., :2])
         return values_after_first_leg(self._d2, self._nodes, self._objective, self._vehicles, targets, vias, counts)
+
+
+def _unless_straight(start_m: FloatArray, via_m: FloatArray, next_m: FloatArray) -> FloatArray:
+    """Return a via point as a route (1, 2), or none where it lies straight between the others (2,)."""
+    before, after = via_m - start_m, next_m - via_m
+    cross = abs(float(before[0] * after[1] - before[1] * after[0]))
+    straight = cross <= 1e-6 * (1.0 + float(np.hypot(*before) * np.hypot(*after))) and float(before @ after) >= 0.0
+    return np.zeros((0, 2)) if straight else via_m[None]
 
 
 def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
