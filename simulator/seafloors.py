@@ -50,6 +50,16 @@ def generate(
     """
     if family not in FAMILIES:
         raise TerrainError(f"family is {family!r}; it must be one of {', '.join(sorted(FAMILIES))}")
+    rows, cols = check_extent(width_m, height_m, cell_m)
+    east, north = np.meshgrid((np.arange(cols) + 0.5) * cell_m, (np.arange(rows) + 0.5) * cell_m)
+    rng = np.random.default_rng(seed)
+    z = FAMILIES[family](east, north, float(min(width_m, height_m)), rng)
+    lat, lon = origin if origin is not None else (None, None)
+    return Terrain(np.maximum(z, LEAST_DEPTH_M), cell_m, lat, lon, name=f"{family} (seed {seed})")
+
+
+def check_extent(width_m: float, height_m: float, cell_m: float) -> tuple[int, int]:
+    """Return rows and columns of an extent. Raises TerrainError for cells without a size, or fewer than two a side."""
     if not (math.isfinite(cell_m) and cell_m > 0.0):
         raise TerrainError(f"cell_m is {cell_m}; it must be a positive number of metres")
     rows, cols = round(height_m / cell_m), round(width_m / cell_m)
@@ -57,11 +67,7 @@ def generate(
         raise TerrainError(
             f"width_m is {width_m} and height_m is {height_m}; each must be at least two cells of {cell_m} m"
         )
-    east, north = np.meshgrid((np.arange(cols) + 0.5) * cell_m, (np.arange(rows) + 0.5) * cell_m)
-    rng = np.random.default_rng(seed)
-    z = FAMILIES[family](east, north, float(min(width_m, height_m)), rng)
-    lat, lon = origin if origin is not None else (None, None)
-    return Terrain(np.maximum(z, LEAST_DEPTH_M), cell_m, lat, lon, name=f"{family} (seed {seed})")
+    return rows, cols
 
 
 def flat(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
