@@ -97,7 +97,7 @@ class PcaoPlanner(PlannerBase):
             self._visit(team, unit, way)
         together = self._together(team)
         if together and self._visits.target[0] >= 0:
-            positions = self._escort(team, bottom, way, int(self._visits.visitor[0]))
+            positions = self._escort(team, bottom, way, int(self._visits.visitor[0]), left, unit)
         else:
             lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
             positions = self._within_limits(team, bottom, way, lead)
@@ -179,11 +179,7 @@ class PcaoPlanner(PlannerBase):
             goal = belief.xy_m[target]
             if team.constraints.keep_out or not team.constraints.region.area_is_convex:
                 goal = self._corner(team, name, at[:2], goal, step)
-            x, y = goal - at[:2]
-            part = min(1.0, step / max(float(np.hypot(x, y)), 1e-12))
-            deep = visiting_depth(at, goal, float(belief.depth_m[target]), int(visits.looks[group]), step, unit)
-            move = np.array([part * x, part * y, np.clip(deep - at[2], -step, step)])
-            way[row] = move * min(1.0, step / max(float(np.linalg.norm(move)), 1e-12))
+            way[row] = towards(at, goal, float(belief.depth_m[target]), int(visits.looks[group]), step, unit)
 
     def _corner(self, team: Situation, name: str, at: FloatArray, goal: FloatArray, step: float) -> FloatArray:
         """Return where the next leg (2,) of a vehicle to ``goal`` (2,) ends, round zones."""
@@ -197,30 +193,55 @@ class PcaoPlanner(PlannerBase):
         self._detours[name] = rest.tolist() if len(rest) else [end.tolist()]
         return np.array([x, y])
 
-    def _escort(self, team: Situation, bottom: Bottom, way: FloatArray, visitor: int) -> FloatArray:
-        """Return where a linked team goes (n, 3) while one of it visits a landmark: the others come close to it."""
+    def _escort(
+        self, team: Situation, bottom: Bottom, way: FloatArray, visitor: int, left: FloatArray, unit: float
+    ) -> FloatArray:
+        """Return where a linked team goes (n, 3) while one of it visits a landmark.
+
+        The others go to what is left within their links to it where all may; else they come close to the visitor.
+        """
         limits, here = team.constraints, team.positions
         step = limits.max_step_m * (1.0 - 1e-9)
-        near = max(ESCORT_SHARE * limits.com_range_m, APART * limits.min_separation_m)
         wishes = []
         for part in (1.0, *SLOWER):
-            wish = self._clear(team, bottom, here + part * way)
-            lead = wish[visitor]
-            for i in range(len(here)):
-                if i == visitor:
-                    continue
-                offset = here[i] - here[visitor]
-                flat = max(float(np.hypot(*offset[:2])), 1e-12)
-                place = lead + np.append(offset[:2] * min(1.0, near / flat), 0.0)
-                go = place - here[i]
-                wish[i] = here[i] + go * min(1.0, step / max(float(np.linalg.norm(go)), 1e-12))
-            wish = self._clear(team, bottom, wish)
-            wish[visitor] = lead
-            wishes.append(wish)
+            go = part * way
+            for mine in [True, False] if part == 1.0 else [False]:
+                wishes.append(self._escorted(team, bottom, go, visitor, left if mine else None, unit))
         up = [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
         barred = BARRED_LOOKS <= self._visits.looks[0] < 2 * BARRED_LOOKS
         positions, _ = settle(team, bottom, np.stack([*up, *wishes] if barred else [*wishes, *up]))
         return positions
+
+    def _escorted(self, team, bottom, way, visitor, left, unit):
+        limits, here, belief = team.constraints, team.positions, team.belief
+        step = limits.max_step_m * (1.0 - 1e-9)
+        near = max(ESCORT_SHARE * limits.com_range_m, APART * limits.min_separation_m)
+        wish = self._clear(team, bottom, here + way)
+        lead = wish[visitor].copy()
+        open_ = np.zeros(0, dtype=np.int64)
+        if left is not None:
+            open_ = np.flatnonzero(
+                (left > 0.0) & (np.hypot(*(belief.xy_m - lead[:2]).T) < LINK_SHARE * limits.com_range_m)
+            )
+            open_ = open_[open_ != self._visits.target[0]]
+        for i in range(len(here)):
+            if i == visitor:
+                continue
+            if len(open_):
+                k = int(np.argmin(np.hypot(*(belief.xy_m[open_] - here[i, :2]).T)))
+                target = int(open_[k])
+                open_ = np.delete(open_, k)
+                wish[i] = here[i] + towards(here[i], belief.xy_m[target], float(belief.depth_m[target]), 0, step, unit)
+                continue
+            offset = here[i] - here[visitor]
+            flat = max(float(np.hypot(*offset[:2])), 1e-12)
+            place = lead + np.append(offset[:2] * min(1.0, near / flat), 0.0)
+            go = place - here[i]
+            wish[i] = here[i] + go * min(1.0, step / max(float(np.linalg.norm(go)), 1e-12))
+        wish = linked(here, wish, limits.com_range_m, step, visitor)
+        wish = self._clear(team, bottom, wish)
+        wish[visitor] = lead
+        return wish
 
     def _within_limits(self, team: Situation, bottom: Bottom, way: FloatArray, lead: int) -> FloatArray:
         """Return where the team goes (n, 3): by the controller's moves ``way`` (n, 3) as far as the limits allow."""
@@ -335,6 +356,15 @@ class PcaoPlanner(PlannerBase):
         # Missions that an earlier release began have made no visits.
         self._visitors = tuple(str(name) for name in state.get("visitors", ()))
         self._visits = _visits(state["visits"]) if "visits" in state else no_visits(0, 0)
+
+
+def towards(at: FloatArray, goal: FloatArray, depth: float, looks: int, step: float, unit: float) -> FloatArray:
+    """Return the move (3,), at most a step, of a vehicle ``at`` (3,) that visits a landmark of a depth by ``goal`` (2,)."""
+    x, y = goal - at[:2]
+    part = min(1.0, step / max(float(np.hypot(x, y)), 1e-12))
+    deep = visiting_depth(at, goal, depth, looks, step, unit)
+    move = np.array([part * x, part * y, np.clip(deep - at[2], -step, step)])
+    return move * min(1.0, step / max(float(np.linalg.norm(move)), 1e-12))
 
 
 def _visits(of: dict[str, Any]) -> Visits:

@@ -17,7 +17,7 @@ from numba import njit
 
 from app.arrays import BoolArray, FloatArray, IntArray
 
-PATIENCE = 8
+PATIENCE = 4
 """Steps without progress after which a group begins to visit; halved by every visit, down to one."""
 
 ENOUGH = 8
