@@ -17,7 +17,7 @@ from numba import njit
 
 from app.arrays import BoolArray, FloatArray, IntArray
 
-PATIENCE = 4
+PATIENCE = 2
 """Steps without progress after which a group begins to visit; halved by every visit, down to one."""
 
 ENOUGH = 8
@@ -152,8 +152,7 @@ def _go_on(
         visits.vain[target] += 1
         visits.idle[g] = visits.patience[g]  # another one at once
     visits.target[g] = -1
-    visits.gained[g] = 0
-    visits.patience[g] = max(1, visits.patience[g] // 2)
+    visits.patience[g] = PATIENCE if visits.gained[g] >= ENOUGH else visits.patience[g] // 2
 
 
 @njit(cache=True, nogil=True)
@@ -177,6 +176,7 @@ def _begin(
             if away < least:
                 least = away
                 visits.target[g], visits.visitor[g] = i, v
+    visits.gained[g] = 0
     visits.looks[g] = 0
     visits.closest[g] = np.inf
 
