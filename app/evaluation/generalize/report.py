@@ -7,10 +7,11 @@ from app.evaluation.generalize.summary import Run, summary_of
 from app.evaluation.generalize.tasks import TASKS
 
 INTRODUCTION = """\
-Sea floors of families that no planner is developed on (`simulator/unseen_floors.py`), each drawn by its seed: development looks at even
-seeds, odd ones are reported. Means ± half their 95 % interval (Student) over floors; less is better. *Figure* is the ratio to the yardstick
-where that was flown on the same floor, else what was left. *Difference* is ours less the yardstick's, floor by floor, in the unit
-of what is compared. *Within* counts the floors that are within what is asked. How to run it and how to read it: [On unseen floors](../generalization.md)."""
+Sea floors of families that no planner is developed on (`simulator/unseen_floors.py`), each drawn by its seed:
+development looks at even seeds, odd ones are reported. Means ± half their 95 % interval (Student) over floors; less is
+better. *Figure* is the ratio to the yardstick where that was flown on the same floor, else what was left.
+*Difference* is ours less the yardstick's, floor by floor, in the unit of what is compared. *Within* counts the floors
+that are within what is asked. How to run it and how to read it: [On unseen floors](../generalization.md)."""
 
 
 def markdown(

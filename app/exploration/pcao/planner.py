@@ -95,9 +95,8 @@ class PcaoPlanner(PlannerBase):
         else:
             self._watch(team, left, unit)
             self._visit(team, unit, way)
-        together = self._together(team)
-        if together and self._visits.target[0] >= 0:
-            positions = self._escort(team, bottom, way, int(self._visits.visitor[0]), left, unit)
+        if not self._surveys and self._together(team) and self._visits.target[0] >= 0:
+            positions = self._escort(team, bottom, way, left, unit)
         else:
             lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
             positions = self._within_limits(team, bottom, way, lead)
@@ -193,55 +192,61 @@ class PcaoPlanner(PlannerBase):
         self._detours[name] = rest.tolist() if len(rest) else [end.tolist()]
         return np.array([x, y])
 
-    def _escort(
-        self, team: Situation, bottom: Bottom, way: FloatArray, visitor: int, left: FloatArray, unit: float
-    ) -> FloatArray:
-        """Return where a linked team goes (n, 3) while one of it visits a landmark.
+    def _escort(self, team: Situation, bottom: Bottom, way: FloatArray, left: FloatArray, unit: float) -> FloatArray:
+        """Return where a linked team goes (n, 3) while one of it visits a landmark by its move of ``way`` (n, 3).
 
-        The others go to what is left within their links to it where all may; else they come close to the visitor.
+        The others visit what is left within their links to it where all may; else they come close to it. A team that
+        comes no nearer is barred by what rises before it: then all climb first.
         """
-        limits, here = team.constraints, team.positions
-        step = limits.max_step_m * (1.0 - 1e-9)
-        wishes = []
-        for part in (1.0, *SLOWER):
-            go = part * way
-            for mine in [True, False] if part == 1.0 else [False]:
-                wishes.append(self._escorted(team, bottom, go, visitor, left if mine else None, unit))
+        here, step = team.positions, team.constraints.max_step_m * (1.0 - 1e-9)
+        wishes = [self._escorted(team, bottom, way, self._nearby_moves(team, way, left, unit))]
+        wishes += [self._escorted(team, bottom, part * way, None) for part in (1.0, *SLOWER)]
         up = [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
         barred = BARRED_LOOKS <= self._visits.looks[0] < 2 * BARRED_LOOKS
         positions, _ = settle(team, bottom, np.stack([*up, *wishes] if barred else [*wishes, *up]))
         return positions
 
-    def _escorted(self, team, bottom, way, visitor, left, unit):
-        limits, here, belief = team.constraints, team.positions, team.belief
+    def _escorted(
+        self, team: Situation, bottom: Bottom, way: FloatArray, moves: dict[int, FloatArray] | None
+    ) -> FloatArray:
+        """Return the wishes (n, 3) of a team whose visitor goes its ``way`` and whose others go theirs, or come close.
+
+        ``moves`` are those of the others that have somewhere to go, by row.
+        """
+        limits, here, visitor = team.constraints, team.positions, int(self._visits.visitor[0])
         step = limits.max_step_m * (1.0 - 1e-9)
         near = max(ESCORT_SHARE * limits.com_range_m, APART * limits.min_separation_m)
         wish = self._clear(team, bottom, here + way)
         lead = wish[visitor].copy()
-        open_ = np.zeros(0, dtype=np.int64)
-        if left is not None:
-            open_ = np.flatnonzero(
-                (left > 0.0) & (np.hypot(*(belief.xy_m - lead[:2]).T) < LINK_SHARE * limits.com_range_m)
-            )
-            open_ = open_[open_ != self._visits.target[0]]
         for i in range(len(here)):
             if i == visitor:
                 continue
-            if len(open_):
-                k = int(np.argmin(np.hypot(*(belief.xy_m[open_] - here[i, :2]).T)))
-                target = int(open_[k])
-                open_ = np.delete(open_, k)
-                wish[i] = here[i] + towards(here[i], belief.xy_m[target], float(belief.depth_m[target]), 0, step, unit)
+            if moves is not None and i in moves:
+                wish[i] = here[i] + moves[i]
                 continue
-            offset = here[i] - here[visitor]
-            flat = max(float(np.hypot(*offset[:2])), 1e-12)
-            place = lead + np.append(offset[:2] * min(1.0, near / flat), 0.0)
-            go = place - here[i]
-            wish[i] = here[i] + go * min(1.0, step / max(float(np.linalg.norm(go)), 1e-12))
-        wish = linked(here, wish, limits.com_range_m, step, visitor)
-        wish = self._clear(team, bottom, wish)
+            offset = here[i, :2] - here[visitor, :2]
+            place = lead + np.append(offset * min(1.0, near / max(float(np.hypot(*offset)), 1e-12)), 0.0)
+            wish[i] = here[i] + within(place - here[i], step)
+        wish = self._clear(team, bottom, linked(here, wish, limits.com_range_m, step, visitor))
         wish[visitor] = lead
         return wish
+
+    def _nearby_moves(self, team: Situation, way: FloatArray, left: FloatArray, unit: float) -> dict[int, FloatArray]:
+        """Return the moves (3,), by row, of the vehicles beside the visitor to landmarks within their links to it."""
+        belief, limits, visitor = team.belief, team.constraints, int(self._visits.visitor[0])
+        step = limits.max_step_m * (1.0 - 1e-9)
+        lead = team.positions[visitor, :2] + way[visitor, :2]
+        linked_to = np.hypot(*(belief.xy_m - lead).T) < LINK_SHARE * limits.com_range_m
+        open_ = np.flatnonzero((left > 0.0) & linked_to)
+        open_ = open_[open_ != self._visits.target[0]]
+        moves = {}
+        for i, at in enumerate(team.positions):
+            if i == visitor or not len(open_):
+                continue
+            nearest = int(np.argmin(np.hypot(*(belief.xy_m[open_] - at[:2]).T)))
+            target, open_ = int(open_[nearest]), np.delete(open_, nearest)
+            moves[i] = towards(at, belief.xy_m[target], float(belief.depth_m[target]), 0, step, unit)
+        return moves
 
     def _within_limits(self, team: Situation, bottom: Bottom, way: FloatArray, lead: int) -> FloatArray:
         """Return where the team goes (n, 3): by the controller's moves ``way`` (n, 3) as far as the limits allow."""
@@ -359,12 +364,16 @@ class PcaoPlanner(PlannerBase):
 
 
 def towards(at: FloatArray, goal: FloatArray, depth: float, looks: int, step: float, unit: float) -> FloatArray:
-    """Return the move (3,), at most a step, of a vehicle ``at`` (3,) that visits a landmark of a depth by ``goal`` (2,)."""
-    x, y = goal - at[:2]
-    part = min(1.0, step / max(float(np.hypot(x, y)), 1e-12))
-    deep = visiting_depth(at, goal, depth, looks, step, unit)
-    move = np.array([part * x, part * y, np.clip(deep - at[2], -step, step)])
-    return move * min(1.0, step / max(float(np.linalg.norm(move)), 1e-12))
+    """Return the move (3,) of a vehicle ``at`` (3,) to a landmark of a depth, by way of ``goal`` (2,)."""
+    flat = goal - at[:2]
+    flat = flat * min(1.0, step / max(float(np.hypot(*flat)), 1e-12))
+    down = visiting_depth(at, goal, depth, looks, step, unit) - at[2]
+    return within(np.append(flat, np.clip(down, -step, step)), step)
+
+
+def within(move: FloatArray, step: float) -> FloatArray:
+    """Return a move (3,), shortened to a step."""
+    return np.asarray(move * min(1.0, step / max(float(np.linalg.norm(move)), 1e-12)))
 
 
 def _visits(of: dict[str, Any]) -> Visits:

@@ -37,6 +37,10 @@ AGAIN = 6.0
 """How much farther, in units, a landmark seems with every visit in vain."""
 
 
+BLIND = 2.0
+"""How far below a vehicle, in units, a landmark is presumed that was never seen."""
+
+
 class Visits(NamedTuple):
     """The memory of all groups (g) and landmarks (m), written in place.
 
@@ -126,7 +130,7 @@ def watch(
         elif visits.gained[g] >= ENOUGH:
             visits.patience[g] = PATIENCE
         if visits.target[g] < 0 and visits.idle[g] >= visits.patience[g]:
-            _begin(positions, groups, xy, left, unit, visits, g)
+            _begin(positions, groups, xy, depth, left, unit, visits, g)
 
 
 @njit(cache=True, nogil=True)
@@ -157,9 +161,19 @@ def _go_on(
 
 @njit(cache=True, nogil=True)
 def _begin(
-    positions: FloatArray, groups: IntArray, xy: FloatArray, left: FloatArray, unit: float, visits: Visits, g: int
+    positions: FloatArray,
+    groups: IntArray,
+    xy: FloatArray,
+    depth: FloatArray,
+    left: FloatArray,
+    unit: float,
+    visits: Visits,
+    g: int,
 ) -> None:
-    """Choose the landmark that is nearest to a vehicle of group ``g`` and that nobody else visits."""
+    """Choose the landmark that is nearest to a vehicle of group ``g`` and that nobody else visits.
+
+    To go down to it is a way as well; a landmark that was never seen is presumed ``BLIND`` units below.
+    """
     least = np.inf
     for i in range(len(xy)):
         if left[i] <= 0.0:
@@ -172,7 +186,9 @@ def _begin(
         for v in range(len(positions)):
             if groups[v] != g:
                 continue
-            away = np.hypot(xy[i, 0] - positions[v, 0], xy[i, 1] - positions[v, 1]) + AGAIN * unit * visits.vain[i]
+            flat = np.hypot(xy[i, 0] - positions[v, 0], xy[i, 1] - positions[v, 1])
+            down = BLIND * unit if np.isnan(depth[i]) else depth[i] - HEIGHT * unit - positions[v, 2]
+            away = np.hypot(flat, down) + AGAIN * unit * visits.vain[i]
             if away < least:
                 least = away
                 visits.target[g], visits.visitor[g] = i, v
