@@ -211,7 +211,7 @@ def fly(
         vectors, figures, schedule = reduced_state(positions, moves, heights, xy, known.depth, left, density, p.unit)
         u = control(vectors, figures, schedule, horizontal, vertical)
         way = within_step(u, p.step, True)
-        watch(positions, alone, xy, known.depth, left, p.unit, visits)
+        watch(positions, alone, xy, known.depth, left, p.unit, steps - t, visits)
         for v in range(n):
             i = visits.target[v]
             if i >= 0:

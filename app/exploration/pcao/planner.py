@@ -163,6 +163,7 @@ class PcaoPlanner(PlannerBase):
             np.ascontiguousarray(belief.depth_m),
             left,
             unit,
+            team.steps_total - team.step + 1,
             self._visits,
         )
 

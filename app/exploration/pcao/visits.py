@@ -99,6 +99,7 @@ def watch(
     depth: FloatArray,
     left: FloatArray,
     unit: float,
+    steps_left: int,
     visits: Visits,
 ) -> None:
     """Take in what one step brought: count it for the groups, end and begin visits.
@@ -122,9 +123,10 @@ def watch(
             if d2 < least:
                 least, nearest = d2, v
         fresh[groups[nearest]] += 1
+    pace = np.count_nonzero(left > 0.0) / max(1, steps_left) / max(1, len(visits.idle))
     for g in range(len(visits.idle)):
         visits.gained[g] += fresh[g]
-        visits.idle[g] = 0 if fresh[g] > 0 else visits.idle[g] + 1
+        visits.idle[g] = 0 if fresh[g] > 0 and fresh[g] >= pace else visits.idle[g] + 1
         if visits.target[g] >= 0:
             _go_on(positions, xy, depth, left, unit, visits, g)
         elif visits.gained[g] >= ENOUGH:
