@@ -60,7 +60,7 @@ def pcao(floor: Terrain, seed: int, size: Size) -> Trial:
     """Landmarks that the shipped controller leaves, in %: the more of the paper's scenario and of a linked team's."""
     scenario = _landmarks(floor, seed, size)
     sea_floor = SeaFloor(floor)
-    task = TrainingTask((sea_floor,), (seed,), landmarks=scenario.landmarks or 0, steps=scenario.steps)
+    task = TrainingTask((sea_floor,), (seed,), landmarks=scenario.landmarks or 0, steps=scenario.steps, visiting=True)
     remaining, _ = task.run(sea_floor, seed, default_model().parameters)
     paper = 100.0 * float(remaining[-1]) / task.landmarks
     seen, half = Recorder(), sea_floor.cube.half

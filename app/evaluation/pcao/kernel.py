@@ -182,9 +182,10 @@ def fly(
     horizontal: FloatArray,
     vertical: FloatArray,
     steps: int,
+    visiting: bool,
     rng: np.random.Generator,
 ) -> tuple[IntArray, FloatArray]:
-    """Fly a mission with the controller of B'P = (``horizontal``, ``vertical``), and its visits where it gets nowhere.
+    """Fly a mission with the controller of B'P = (``horizontal``, ``vertical``); ``visiting`` where it gets nowhere.
 
     Returns
     -------
@@ -214,7 +215,7 @@ def fly(
         watch(positions, alone, xy, known.depth, left, p.unit, steps - t, visits)
         for v in range(n):
             i = visits.target[v]
-            if i >= 0:
+            if visiting and i >= 0:
                 visiting_move(positions[v], xy[i], known.depth[i], visits.looks[v], p.step, p.unit, way[v])
         move(raster, p, positions, headings, moves, way)
         sense(p, truth, positions, headings, known, visible, rng)
