@@ -196,20 +196,20 @@ class PcaoPlanner(PlannerBase):
     def _escort(self, team: Situation, bottom: Bottom, way: FloatArray, left: FloatArray, unit: float) -> FloatArray:
         """Return where a linked team goes (n, 3) while one of it visits a landmark by its move of ``way`` (n, 3).
 
-        The others visit what is left within their links to it where all may; else they come close to it. A team that
-        comes no nearer is barred by what rises before it: then all climb first.
+        The others visit what is left within their links to it where all may; else they come close to it, or follow it,
+        which no border bars. A team that comes no nearer is barred by what rises before it: then all climb first.
         """
         here, step = team.positions, team.constraints.max_step_m * (1.0 - 1e-9)
         wishes = [self._escorted(team, bottom, way, self._nearby_moves(team, way, left, unit))]
-        wishes += [self._escorted(team, bottom, part * way, None) for part in (1.0, *SLOWER)]
+        for part in (1.0, *SLOWER):
+            wishes.append(self._escorted(team, bottom, part * way, {}))
+            wishes.append(self._escorted(team, bottom, part * way, self._following_moves(team, part * way)))
         up = [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
         barred = BARRED_LOOKS <= self._visits.looks[0] < 2 * BARRED_LOOKS
         positions, _ = settle(team, bottom, np.stack([*up, *wishes] if barred else [*wishes, *up]))
         return positions
 
-    def _escorted(
-        self, team: Situation, bottom: Bottom, way: FloatArray, moves: dict[int, FloatArray] | None
-    ) -> FloatArray:
+    def _escorted(self, team: Situation, bottom: Bottom, way: FloatArray, moves: dict[int, FloatArray]) -> FloatArray:
         """Return the wishes (n, 3) of a team whose visitor goes its ``way`` and whose others go theirs, or come close.
 
         ``moves`` are those of the others that have somewhere to go, by row.
@@ -222,7 +222,7 @@ class PcaoPlanner(PlannerBase):
         for i in range(len(here)):
             if i == visitor:
                 continue
-            if moves is not None and i in moves:
+            if i in moves:
                 wish[i] = here[i] + moves[i]
                 continue
             offset = here[i, :2] - here[visitor, :2]
@@ -231,6 +231,19 @@ class PcaoPlanner(PlannerBase):
         wish = self._clear(team, bottom, linked(here, wish, limits.com_range_m, step, visitor))
         wish[visitor] = lead
         return wish
+
+    def _following_moves(self, team: Situation, way: FloatArray) -> dict[int, FloatArray]:
+        """Return the moves (3,), by row, of the vehicles beside the visitor to where it is now, at its next depth."""
+        here, limits, visitor = team.positions, team.constraints, int(self._visits.visitor[0])
+        step, moves = limits.max_step_m * (1.0 - 1e-9), {}
+        for i, at in enumerate(here):
+            if i == visitor:
+                continue
+            flat = here[visitor, :2] - at[:2]
+            keep = 1.0 - APART * limits.min_separation_m / max(float(np.hypot(*flat)), 1e-12)
+            down = here[visitor, 2] + way[visitor, 2] - at[2]
+            moves[i] = within(np.append(max(0.0, keep) * flat, down), step)
+        return moves
 
     def _nearby_moves(self, team: Situation, way: FloatArray, left: FloatArray, unit: float) -> dict[int, FloatArray]:
         """Return the moves (3,), by row, of the vehicles beside the visitor to landmarks within their links to it."""

@@ -96,6 +96,18 @@ def test_a_team_over_sand_waves_leaves_next_to_nothing() -> None:
     assert run.remaining_pct <= 1.0
 
 
+def test_a_team_beside_a_border_is_not_held_by_it() -> None:
+    beside = np.array([[10.0, 0.1, 2.0], [10.0, 8.0, 2.0]])
+    belief = replace(make_belief(), accurate=np.ones(625, dtype=np.bool_))
+    belief.accurate[12] = False  # at (50, 2), where the one above has to go down to the border as well
+    planner = create_planner("pcao", PlannerOptions(), RangeSensor(10.0))
+    situation = make_situation(positions=beside, belief=belief, constraints=LINKED)
+    for _ in range(40):
+        proposal = planner.propose(situation, np.random.default_rng(0))
+        situation = replace(situation, step=min(60, situation.step + 1), positions=proposal.positions)
+    assert np.hypot(*(situation.positions[:, :2] - belief.xy_m[12]).T).min() < 5.0
+
+
 def test_a_planner_goes_on_with_the_visit_that_its_memory_holds() -> None:
     situation = make_situation(belief=make_belief(known=False), constraints=LINKED)
     one = create_planner("pcao", PlannerOptions(), RangeSensor(10.0))
