@@ -97,9 +97,9 @@ def test_a_team_over_sand_waves_leaves_next_to_nothing() -> None:
 
 
 def test_a_team_beside_a_border_is_not_held_by_it() -> None:
-    beside = np.array([[10.0, 0.1, 2.0], [10.0, 8.0, 2.0]])
+    beside = np.array([[10.0, 0.1, 2.0], [14.0, 8.0, 2.0]])
     belief = replace(make_belief(), accurate=np.ones(625, dtype=np.bool_))
-    belief.accurate[12] = False  # at (50, 2), where the one above has to go down to the border as well
+    belief.accurate[12] = False  # at (50, 2): the upper one has to go down there, the place below it is outside
     planner = create_planner("pcao", PlannerOptions(), RangeSensor(10.0))
     situation = make_situation(positions=beside, belief=belief, constraints=LINKED)
     for _ in range(40):
