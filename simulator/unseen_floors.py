@@ -54,7 +54,8 @@ def terraces(east: FloatArray, north: FloatArray, extent: float, rng: np.random.
     levels = (height - height.min()) / np.ptp(height) * count
     floor = np.floor(levels)
     rise = 1.0 / (1.0 + np.exp(-np.clip((levels - floor - 0.5) / rng.uniform(0.02, 0.12), -50.0, 50.0)))
-    return rng.uniform(5.0, 9.0) + rng.uniform(1.0, 3.0) * (floor + rise) + 0.1 * fractal(east.shape, 1.4, rng)
+    levelled = rng.uniform(5.0, 9.0) + rng.uniform(1.0, 3.0) * (floor + rise)
+    return np.asarray(levelled + 0.1 * fractal(east.shape, 1.4, rng), dtype=float)
 
 
 def dunes(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:

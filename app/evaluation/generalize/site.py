@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter, label
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from simulator.obstacles import ObstacleWorld
 from simulator.terrain import Terrain
 
@@ -43,6 +43,6 @@ def site_of(floor: Terrain) -> ObstacleWorld:
     return ObstacleWorld(floor.name, solid, chart, floor.cell_m, entry, goal, entry)
 
 
-def _room(solid: FloatArray) -> FloatArray:
+def _room(solid: BoolArray) -> FloatArray:
     """Return the distance of every cell (rows, cols) from obstacles and from the border, in cells."""
-    return np.asarray(distance_transform_edt(np.pad(~solid.astype(np.bool_), 1)))[1:-1, 1:-1]
+    return np.asarray(distance_transform_edt(np.pad(~solid, 1)))[1:-1, 1:-1]
