@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from simulator.arrays import FloatArray
+from simulator.relief import distance_along, fractal, smooth_field
 from simulator.terrain import Terrain, TerrainError
 
 Family = Callable[[FloatArray, FloatArray, float, np.random.Generator], FloatArray]
@@ -49,6 +50,16 @@ def generate(
     """
     if family not in FAMILIES:
         raise TerrainError(f"family is {family!r}; it must be one of {', '.join(sorted(FAMILIES))}")
+    rows, cols = check_extent(width_m, height_m, cell_m)
+    east, north = np.meshgrid((np.arange(cols) + 0.5) * cell_m, (np.arange(rows) + 0.5) * cell_m)
+    rng = np.random.default_rng(seed)
+    z = FAMILIES[family](east, north, float(min(width_m, height_m)), rng)
+    lat, lon = origin if origin is not None else (None, None)
+    return Terrain(np.maximum(z, LEAST_DEPTH_M), cell_m, lat, lon, name=f"{family} (seed {seed})")
+
+
+def check_extent(width_m: float, height_m: float, cell_m: float) -> tuple[int, int]:
+    """Return rows and columns of an extent. Raises TerrainError for cells without a size, or fewer than two a side."""
     if not (math.isfinite(cell_m) and cell_m > 0.0):
         raise TerrainError(f"cell_m is {cell_m}; it must be a positive number of metres")
     rows, cols = round(height_m / cell_m), round(width_m / cell_m)
@@ -56,11 +67,7 @@ def generate(
         raise TerrainError(
             f"width_m is {width_m} and height_m is {height_m}; each must be at least two cells of {cell_m} m"
         )
-    east, north = np.meshgrid((np.arange(cols) + 0.5) * cell_m, (np.arange(rows) + 0.5) * cell_m)
-    rng = np.random.default_rng(seed)
-    z = FAMILIES[family](east, north, float(min(width_m, height_m)), rng)
-    lat, lon = origin if origin is not None else (None, None)
-    return Terrain(np.maximum(z, LEAST_DEPTH_M), cell_m, lat, lon, name=f"{family} (seed {seed})")
+    return rows, cols
 
 
 def flat(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
@@ -70,8 +77,8 @@ def flat(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Gene
 
 def slope(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """A plane falling 4 to 8 m over the extent in a random direction, gently undulating."""
-    along = _along(east, north, rng.uniform(0.0, 2.0 * math.pi)) / extent
-    return 8.0 + rng.uniform(4.0, 8.0) * along + 0.25 * _smooth_field(east, north, 0.25 * extent, rng)
+    along = distance_along(east, north, rng.uniform(0.0, 2.0 * math.pi)) / extent
+    return 8.0 + rng.uniform(4.0, 8.0) * along + 0.25 * smooth_field(east, north, 0.25 * extent, rng)
 
 
 def smooth(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
@@ -87,37 +94,37 @@ def smooth(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Ge
 
 def rugged(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """Fractal relief: spectral amplitude falls as frequency to the power -1.9; 2.5 m standard deviation."""
-    return 12.0 + 2.5 * _fractal(east.shape, 1.9, rng)
+    return 12.0 + 2.5 * fractal(east.shape, 1.9, rng)
 
 
 def ridge(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """A ridge 4 to 6 m high with a wavering crest across a nearly flat bottom."""
     angle = rng.uniform(0.0, 2.0 * math.pi)
-    along = _along(east, north, angle) / extent
-    across = _along(east, north, angle + 0.5 * math.pi) / extent
+    along = distance_along(east, north, angle) / extent
+    across = distance_along(east, north, angle + 0.5 * math.pi) / extent
     crest = 0.12 * np.sin(2.0 * math.pi * along * rng.uniform(0.6, 1.2) + rng.uniform(0.0, 2.0 * math.pi))
     height = rng.uniform(4.0, 6.0) * (1.0 + 0.3 * np.sin(5.0 * along + rng.uniform(0.0, 2.0 * math.pi)))
     profile = 1.0 / (1.0 + ((across - crest) / rng.uniform(0.06, 0.1)) ** 2)
-    return 13.0 - height * profile + 0.3 * _smooth_field(east, north, 0.2 * extent, rng)
+    return 13.0 - height * profile + 0.3 * smooth_field(east, north, 0.2 * extent, rng)
 
 
 def reef(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """Steep, rough patches of rock 1.5 to 4 m high standing on smooth sand."""
-    sand = 11.0 + 0.4 * _smooth_field(east, north, 0.4 * extent, rng)
-    outline = _smooth_field(east, north, 0.07 * extent, rng)
+    sand = 11.0 + 0.4 * smooth_field(east, north, 0.4 * extent, rng)
+    outline = smooth_field(east, north, 0.07 * extent, rng)
     rock = np.zeros(east.shape)
     for _ in range(int(rng.integers(6, 11))):
         e, n = rng.uniform(0.0, 1.0, 2) * (east.max(), north.max())
         radius = rng.uniform(0.05, 0.13) * extent
         edge = (radius * (1.0 + 0.25 * outline) - np.hypot(east - e, north - n)) / (0.015 * extent)
         rock = np.maximum(rock, rng.uniform(1.5, 4.0) / (1.0 + np.exp(-np.clip(edge, -50.0, 50.0))))
-    roughness = 0.35 * _fractal(east.shape, 1.2, rng)
+    roughness = 0.35 * fractal(east.shape, 1.2, rng)
     return np.asarray(sand - rock * (1.0 + 0.3 * roughness), dtype=float)
 
 
 def reef_field(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """Many small rocks 1 to 3 m high, gathered on one part of smooth sand."""
-    sand = 11.0 + 0.4 * _smooth_field(east, north, 0.4 * extent, rng)
+    sand = 11.0 + 0.4 * smooth_field(east, north, 0.4 * extent, rng)
     rock = np.zeros(east.shape)
     middle = rng.uniform(0.25, 0.75, 2)
     for _ in range(40):
@@ -125,15 +132,15 @@ def reef_field(east: FloatArray, north: FloatArray, extent: float, rng: np.rando
         radius = rng.uniform(0.015, 0.04) * extent
         edge = (radius - np.hypot(east - e, north - n)) / (0.01 * extent)
         rock = np.maximum(rock, rng.uniform(1.0, 3.0) / (1.0 + np.exp(-np.clip(edge, -50.0, 50.0))))
-    roughness = _fractal(east.shape, 1.2, rng)
+    roughness = fractal(east.shape, 1.2, rng)
     return np.asarray(sand - rock * (1.0 + 0.1 * roughness), dtype=float)
 
 
 def canyon(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Generator) -> FloatArray:
     """A meandering valley 7 to 10 m deep with steep walls and one tributary, cut into a tilted shelf."""
     angle = rng.uniform(0.0, 2.0 * math.pi)
-    along = _along(east, north, angle) / extent
-    across = _along(east, north, angle + 0.5 * math.pi) / extent
+    along = distance_along(east, north, angle) / extent
+    across = distance_along(east, north, angle + 0.5 * math.pi) / extent
     phase, waves = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.8, 1.4)
     axis = 0.13 * np.sin(2.0 * math.pi * waves * along + phase)
     depth = rng.uniform(7.0, 10.0)
@@ -142,7 +149,7 @@ def canyon(east: FloatArray, north: FloatArray, extent: float, rng: np.random.Ge
     root = 0.13 * math.sin(2.0 * math.pi * waves * mouth + phase)
     side = 0.5 * depth / (1.0 + (np.abs(along - mouth - 0.6 * (across - root)) / 0.06) ** 4)
     tributary = np.where(across > root, side, 0.0) * np.clip((across - root) / 0.05, 0.0, 1.0)
-    shelf = 6.0 + 1.5 * along + 0.3 * _smooth_field(east, north, 0.2 * extent, rng)
+    shelf = 6.0 + 1.5 * along + 0.3 * smooth_field(east, north, 0.2 * extent, rng)
     return np.asarray(shelf + np.maximum(valley, tributary), dtype=float)
 
 
@@ -153,9 +160,9 @@ def harbour(east: FloatArray, north: FloatArray, extent: float, rng: np.random.G
     dredged basin, the edge falling over some metres; features are a wreck, a field of rubble, scour pits and a trench.
     """
     angle = rng.uniform(0.0, 2.0 * math.pi)
-    along = _along(east, north, angle) / extent
-    across = _along(east, north, angle + 0.5 * math.pi) / extent
-    z = 4.8 + rng.uniform(1.0, 2.0) * (along + 0.5) + 0.12 * _smooth_field(east, north, 0.12 * extent, rng)
+    along = distance_along(east, north, angle) / extent
+    across = distance_along(east, north, angle + 0.5 * math.pi) / extent
+    z = 4.8 + rng.uniform(1.0, 2.0) * (along + 0.5) + 0.12 * smooth_field(east, north, 0.12 * extent, rng)
 
     line = rng.uniform(0.0, 0.15) + 0.03 * np.sin(2.0 * math.pi * across * rng.uniform(0.7, 1.5))
     step = rng.uniform(4.0, 5.5)
@@ -167,8 +174,8 @@ def harbour(east: FloatArray, north: FloatArray, extent: float, rng: np.random.G
 
     e, n = somewhere()
     heading = rng.uniform(0.0, math.pi)
-    u = _along(east - e, north - n, heading, centred=False)
-    v = _along(east - e, north - n, heading + 0.5 * math.pi, centred=False)
+    u = distance_along(east - e, north - n, heading, centred=False)
+    v = distance_along(east - e, north - n, heading + 0.5 * math.pi, centred=False)
     hull = np.clip(1.0 - (u / (0.09 * extent)) ** 2 - (v / (0.03 * extent)) ** 2, 0.0, None)
     z = z - rng.uniform(1.6, 2.2) * np.sqrt(hull)
 
@@ -187,8 +194,8 @@ def harbour(east: FloatArray, north: FloatArray, extent: float, rng: np.random.G
 
     e, n = somewhere()
     heading = rng.uniform(0.0, math.pi)
-    u = _along(east - e, north - n, heading, centred=False)
-    v = _along(east - e, north - n, heading + 0.5 * math.pi, centred=False)
+    u = distance_along(east - e, north - n, heading, centred=False)
+    v = distance_along(east - e, north - n, heading + 0.5 * math.pi, centred=False)
     trench = np.exp(-((v / (0.02 * extent)) ** 2)) / (1.0 + (np.abs(u) / (0.25 * extent)) ** 8)
     return np.maximum(z + rng.uniform(0.8, 1.3) * trench, HARBOUR_CLEARANCE_M)
 
@@ -205,36 +212,3 @@ FAMILIES: dict[str, Family] = {
     "smooth": smooth,
 }
 """The families by name."""
-
-
-def _along(east: FloatArray, north: FloatArray, angle_rad: float, *, centred: bool = True) -> FloatArray:
-    """Coordinate in a direction (radians from north), zero at the centre of the grid."""
-    e = east - 0.5 * (east.min() + east.max()) if centred else east
-    n = north - 0.5 * (north.min() + north.max()) if centred else north
-    return np.asarray(e * math.sin(angle_rad) + n * math.cos(angle_rad), dtype=float)
-
-
-def _smooth_field(east: FloatArray, north: FloatArray, wavelength_m: float, rng: np.random.Generator) -> FloatArray:
-    """Sum of 24 plane waves of random direction and phase, unit variance, independent of the cell size."""
-    z = np.zeros(east.shape)
-    for _ in range(24):
-        direction, phase = rng.uniform(0.0, 2.0 * math.pi, 2)
-        k = 2.0 * math.pi / (wavelength_m * rng.uniform(0.7, 1.8))
-        z += np.cos(k * (east * math.sin(direction) + north * math.cos(direction)) + phase)
-    return z * math.sqrt(2.0 / 24.0)
-
-
-def _fractal(shape: tuple[int, int], exponent: float, rng: np.random.Generator) -> FloatArray:
-    """Isotropic random field with power-law spectrum, zero mean, unit standard deviation."""
-    rows, cols = shape
-    # Twice the size: an FFT field repeats itself, so opposite borders would otherwise join.
-    ky = np.fft.fftfreq(2 * rows)[:, None]
-    kx = np.fft.rfftfreq(2 * cols)[None, :]
-    k = np.hypot(kx, ky)
-    k[0, 0] = 1.0
-    amplitude = k**-exponent
-    amplitude[0, 0] = 0.0
-    spectrum = amplitude * np.exp(2j * math.pi * rng.uniform(0.0, 1.0, k.shape))
-    z = np.fft.irfft2(spectrum, s=(2 * rows, 2 * cols))[:rows, :cols]
-    z = z - z.mean()
-    return np.asarray(z / z.std(), dtype=float)

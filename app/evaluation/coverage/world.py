@@ -144,6 +144,8 @@ class Craft:
     """When it is looked at again, after there was no line for it."""
     unseen: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     """Poses (n, 3) of the pings that come in after its next leg was decided."""
+    ends_m: list[FloatArray] = field(default_factory=list)
+    """Where its legs ended, each (2,)."""
 
 
 @dataclass
@@ -192,6 +194,7 @@ class Fleet:
         self._ping(poses[:-ahead])
         craft.unseen = poses[-ahead:]
         craft.pose = poses[-1]
+        craft.ends_m.append(poses[-1, :2])
         craft.flown_m += length_m
         craft.time_s += length_m / self.scenario.speed_mps
 

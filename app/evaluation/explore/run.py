@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.arrays import BoolArray, FloatArray
 from app.evaluation.explore.osarses import Osarses
 from app.evaluation.explore.teams import LimitedTeam, UnlimitedTeam
 from app.evaluation.explore.tries import GradientTrier, Trier
 from app.evaluation.explore.world import DEEPEST, SHALLOWEST, ExploreScenario, World, names_of
+from app.evaluation.runs.summary import first_step
 from app.exploration.core.problem import Situation
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
@@ -56,8 +58,11 @@ def run_explore(
     planner: str,
     options: PlannerOptions,
     progress: Callable[[int], None] = lambda step: None,
+    observe: Callable[[FloatArray, BoolArray, FloatArray], None] = lambda positions, accurate, landmarks: None,
 ) -> ExploreRun:
     """Run the closed loop with one of ``EXPLORERS``; ``osarses`` makes ``options.tries`` real tries per step.
+
+    ``observe`` is told after every step where vehicles are, which landmarks are accurate, and where these truly are.
 
     Those that really try try on everything that is known: they cannot be run with a limited capacity (ValueError).
     """
@@ -97,8 +102,8 @@ def run_explore(
         team.sense(noise)
         history.append(100.0 * float(1.0 - team.landmarks.accurate.mean()))
         error += float(np.linalg.norm(np.nan_to_num(team.landmarks.depth_m, nan=UNSEEN_DEPTH) - world.truth[:, 2]))
+        observe(world.positions, team.landmarks.accurate, world.truth)
         progress(step)
-    below = np.flatnonzero(np.array(history) <= 1.0)
     return ExploreRun(
         planner=planner,
         terrain=scenario.terrain.name,
@@ -107,7 +112,7 @@ def run_explore(
         landmarks=len(world.truth),
         steps=scenario.steps,
         remaining_pct=history[-1],
-        t99=int(below[0]) + 1 if len(below) else None,
+        t99=first_step(history),
         sum_of_error=error,
         history=history,
         distance=distance,

@@ -53,6 +53,8 @@ YARDSTICKS = {
     "SE(0)": (SE, 0), "SE(5)": (SE, 5), "SE(50)": (SE, 50), "SE(500)": (SE, 500), "SPSA": (SPSA, 0), "FDSA": (FDSA, 0),
 }  # fmt: skip
 TEAMS = (2, 5, 10)
+PCAO = "pcao"
+"""The controller as missions fly it."""
 
 
 class ExperimentJob(Job, Protocol):
@@ -86,12 +88,19 @@ class FlightJob:
     def key(self) -> str:
         """What makes the run what it is, as text."""
         facts = [self.terrain.name, self.algorithm, self.robots, self.landmarks, self.steps, self.seed]
-        return orjson.dumps(["flight", *facts, digest(self.parameters)]).decode()
+        how = ["visiting"] if self.visiting else []
+        return orjson.dumps(["flight", *facts, digest(self.parameters), *how]).decode()
+
+    @property
+    def visiting(self) -> bool:
+        """Whether the controller visits landmarks where it gets nowhere; those of table II and yardsticks do not."""
+        return self.algorithm == PCAO
 
     def run(self, progress: Progress) -> dict[str, Any]:
         """Run it."""
         floor = SeaFloor(self.terrain)
-        task = TrainingTask((floor,), (self.seed,), self.robots, self.landmarks, self.steps)
+        how = (self.robots, self.landmarks, self.steps)
+        task = TrainingTask((floor,), (self.seed,), *how, visiting=self.visiting)
         began = time.process_time()
         tries = 0
         if self.parameters is not None:
@@ -143,7 +152,8 @@ class TeamJob:
         """What makes the run what it is, as text."""
         model = self.options.model
         facts = [self.terrain.name, self.algorithm, self.robots, self.landmarks, self.steps, self.seed]
-        return orjson.dumps(["team", *facts, digest(None if model is None else model.parameters)]).decode()
+        how = ["visiting"] if self.algorithm == PCAO else []
+        return orjson.dumps(["team", *facts, digest(None if model is None else model.parameters), *how]).decode()
 
     def run(self, progress: Progress) -> dict[str, Any]:
         """Run it."""
@@ -224,7 +234,7 @@ def flights(
     for seed in seeds:
         for terrain in terrains:
             for name in algorithms:
-                parameters = model.parameters if name == "pcao" else None
+                parameters = model.parameters if name == PCAO else None
                 yield FlightJob(terrain, name, seed, parameters, landmarks=landmarks, steps=steps)
 
 
@@ -234,7 +244,7 @@ def teams(
     """Yield the missions of other teams, seed by seed."""
     literal = PlannerOptions(regressors="polynomial", contribution="team")
     kinds = (
-        ("pcao", PlannerOptions(model=model), "pcao"),
+        (PCAO, PlannerOptions(model=model), "pcao"),
         ("literal CAO", literal, "cao"),
         ("SE(0)", PlannerOptions(tries=0), OSARSES),
     )

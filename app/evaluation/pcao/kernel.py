@@ -12,6 +12,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.landmarks import fit_depth
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.state import reduced_state
+from app.exploration.pcao.visits import no_visits, visiting_move, watch
 
 
 class Physics(NamedTuple):
@@ -181,9 +182,10 @@ def fly(
     horizontal: FloatArray,
     vertical: FloatArray,
     steps: int,
+    visiting: bool,
     rng: np.random.Generator,
 ) -> tuple[IntArray, FloatArray]:
-    """Fly a mission with the controller of B'P = (``horizontal``, ``vertical``).
+    """Fly a mission with the controller of B'P = (``horizontal``, ``vertical``); ``visiting`` where it gets nowhere.
 
     Returns
     -------
@@ -200,6 +202,7 @@ def fly(
     xy = np.ascontiguousarray(truth[:, :2])
     density = m / (4.0 * p.half_x * p.half_y)
     heights, left = np.empty(n), np.empty(m)
+    alone, visits = np.arange(n), no_visits(n, m)
     remaining, error = np.zeros(steps, dtype=np.int64), np.zeros(steps)
     sense(p, truth, positions, headings, known, visible, rng)
     for t in range(steps):
@@ -208,7 +211,13 @@ def fly(
         what_is_left(known.accurate, known.variance, p.accuracy_sd, left)
         vectors, figures, schedule = reduced_state(positions, moves, heights, xy, known.depth, left, density, p.unit)
         u = control(vectors, figures, schedule, horizontal, vertical)
-        move(raster, p, positions, headings, moves, within_step(u, p.step, True))
+        way = within_step(u, p.step, True)
+        watch(positions, alone, xy, known.depth, left, p.unit, steps - t, visits)
+        for v in range(n):
+            i = visits.target[v]
+            if visiting and i >= 0:
+                visiting_move(positions[v], xy[i], known.depth[i], visits.looks[v], p.step, p.unit, way[v])
+        move(raster, p, positions, headings, moves, way)
         sense(p, truth, positions, headings, known, visible, rng)
         remaining[t] = m - known.accurate.sum()
         error[t] = error_squared(p, known)

@@ -39,7 +39,8 @@ def markdown(found: Findings, model: PcaoModel, facts: Mapping[str, str], speed:
         "", "PCAO18's experiment: 3 vehicles with multibeam sonars, 1100 landmarks, 500 steps; remaining landmarks in "
         "%, means ± half their 95 % interval (Student), and how many runs. Starts, landmarks and noise of these runs "
         "were in no training. The paper's sea floors were never published, and its table I lost its numbers: what "
-        "stands for them, and how the sonar was chosen, says [PCAO](../pcao.md). `pcao` is the model above. Mapping "
+        "stands for them, and how the sonar was chosen, says [PCAO](../pcao.md). `pcao` is the model above, "
+        "with visits where it gets nowhere; the controllers of table II fly without. Mapping "
         "time is what the team really swims, tries included.", "",
     ]  # fmt: skip
     lines += ["| the paper's | here | in the model's training |", "| --- | --- | --- |"]

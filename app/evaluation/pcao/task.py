@@ -17,7 +17,11 @@ DT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class TrainingTask:
-    """Sea floors (N_s), seeds of the Monte-Carlo runs on each (N_e), and the missions that are flown."""
+    """Sea floors (N_s), seeds of the Monte-Carlo runs on each (N_e), and the missions that are flown.
+
+    With ``visiting`` a controller that gets nowhere visits landmarks, as in missions
+    (:mod:`app.exploration.pcao.visits`). A controller is trained without, so that it learns to do without.
+    """
 
     floors: tuple[SeaFloor, ...]
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
@@ -25,6 +29,7 @@ class TrainingTask:
     landmarks: int = LANDMARKS
     steps: int = STEPS
     kappa: float = KAPPA
+    visiting: bool = False
 
     @property
     def cases(self) -> tuple[tuple[int, int], ...]:
@@ -36,7 +41,8 @@ class TrainingTask:
         landmarks, start, headings = floor.draw(seed, self.robots, self.landmarks)
         rng = np.random.default_rng([seed, 1])
         horizontal, vertical = gains(parameters)
-        return fly(floor.raster, floor.physics, landmarks, start, headings, horizontal, vertical, self.steps, rng)
+        how = (horizontal, vertical, self.steps, self.visiting, rng)
+        return fly(floor.raster, floor.physics, landmarks, start, headings, *how)
 
     def cost(self, remaining: IntArray, error: FloatArray) -> float:
         """Return J of eq. (6) of one run, over N."""

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
+ROUNDING_PCT = 1e-9
+"""Shares in percent are told apart by no less: 11 of 1100 are 1 %, whatever floating-point numbers make of it."""
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -25,6 +28,12 @@ def spread(values: Sequence[float]) -> Spread:
     if len(x) > 1:
         half = float(student.ppf(0.975, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x)))
     return Spread(float(x.mean()), half, float(x.min()), float(x.max()))
+
+
+def first_step(history_pct: Sequence[float], most_pct: float = 1.0) -> int | None:
+    """Return the step, counted from 1, after which no more than ``most_pct`` is left; None where that never happens."""
+    reached = np.flatnonzero(np.asarray(history_pct, dtype=np.float64) <= most_pct + ROUNDING_PCT)
+    return int(reached[0]) + 1 if len(reached) else None
 
 
 def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:

@@ -7,6 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
+from app.arrays import BoolArray, FloatArray
+from app.evaluation.runs.summary import first_step
 from app.evaluation.track.trace_greedy import TRACE_GREEDY, TraceGreedy
 from app.evaluation.track.world import TrackScenario, TrackWorld
 from app.exploration.core.problem import Proposal, Situation
@@ -75,8 +77,9 @@ def run_track(
     options: PlannerOptions,
     setup: str = "own",
     progress: Callable[[int], None] = lambda step: None,
+    observe: Callable[[FloatArray, BoolArray, FloatArray], None] = lambda positions, accurate, landmarks: None,
 ) -> TrackRun:
-    """Run the closed loop with one of ``TRACKERS``."""
+    """Run the closed loop with one of ``TRACKERS``; ``observe`` as in ``run_explore`` of the exploration room."""
     began = time.perf_counter()
     options = options.model_copy(update={"accuracy_sd_m": scenario.accuracy})
     world = TrackWorld(scenario)
@@ -112,8 +115,8 @@ def run_track(
         if step > SETTLED_AFTER and world.tracks:
             tracked.append(float(np.mean([world.target_estimator.accurate(track) for track in world.tracks])))
             target_error.append(float(world.target_errors().mean()))
+        observe(world.positions, world.known.accurate, world.truth)
         progress(step)
-    below = np.flatnonzero(np.array(history) <= 1.0)
     fading = scenario.fading is not None
     return TrackRun(
         planner=planner,
@@ -125,7 +128,7 @@ def run_track(
         steps=scenario.steps,
         remaining_pct=history[-1],
         remaining=int((~world.known.accurate).sum()),
-        t99=int(below[0]) + 1 if len(below) else None,
+        t99=first_step(history),
         sum_of_error=error,
         sum_of_cost=cost,
         final_cost=world.cost(),

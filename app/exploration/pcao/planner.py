@@ -16,6 +16,7 @@ from app.exploration.core.routes import FreeSpace, next_waypoint
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.model import default_model
 from app.exploration.pcao.state import reduced_state
+from app.exploration.pcao.visits import Visits, no_visits, visiting_depth, watch
 from app.exploration.planner.base import PlannerBase, at_depth, settle
 from app.exploration.planner.options import PlannerOptions
 
@@ -47,6 +48,13 @@ SLOWER = (0.6, 0.3, 0.0)
 GATHERING = (0.15, 0.05, 0.02)
 """Parts of their distance to the middle of the team by which vehicles that lost each other approach in a step."""
 
+ESCORT_SHARE = 0.4
+"""Part of the communication range within which linked vehicles come along with one that visits a landmark."""
+APART = 1.2
+"""Least distances by which they stay away from it and from each other."""
+BARRED_LOOKS = 3
+"""Steps in which a visitor came no closer after which its team climbs first."""
+
 
 class PcaoPlanner(PlannerBase):
     """A controller that was trained in simulation: one product of matrices per step, for any number of vehicles."""
@@ -60,6 +68,8 @@ class PcaoPlanner(PlannerBase):
         self._trail: dict[str, list[list[float]]] = {}
         self._detours: dict[str, list[list[float]]] = {}
         self._lead = ""
+        self._visits = no_visits(0, 0)
+        self._visitors: tuple[str, ...] = ()
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         belief, limits, here = team.belief, team.constraints, team.positions
@@ -69,7 +79,7 @@ class PcaoPlanner(PlannerBase):
         vectors, figures, schedule = reduced_state(
             np.ascontiguousarray(here),
             self._moves(team),
-            bottom.at(here[:, :2]) - here[:, 2],
+            self._floor_below(team, bottom) - here[:, 2],
             np.ascontiguousarray(belief.xy_m),
             np.ascontiguousarray(belief.depth_m),
             left,
@@ -80,9 +90,16 @@ class PcaoPlanner(PlannerBase):
         if self._surveys:
             u[:, 2] = 0.0
         way = within_step(u, limits.max_step_m * (1.0 - 1e-9), False)
-        self._go_round(team, left, schedule[:, 0], way)
-        lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
-        positions = self._within_limits(team, bottom, way, lead)
+        if self._surveys:
+            self._go_round(team, left, schedule[:, 0], way)
+        else:
+            self._watch(team, left, unit)
+            self._visit(team, unit, way)
+        if not self._surveys and self._together(team) and self._visits.target[0] >= 0:
+            positions = self._escort(team, bottom, way, left, unit)
+        else:
+            lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
+            positions = self._within_limits(team, bottom, way, lead)
         for name, place in zip(team.vehicles, here, strict=True):
             self._trail[name] = [*self._trail.get(name, [])[1 - TRAIL :], [float(place[0]), float(place[1])]]
         return Proposal(positions, -float(left.sum()), {"left": float(left.mean()) if len(left) else 0.0})
@@ -108,6 +125,142 @@ class PcaoPlanner(PlannerBase):
                 self._detours[name] = route[passed:].tolist()
             if not len(self._detours.get(name, [])):
                 self._detours.pop(name, None)
+
+    def _floor_below(self, team: Situation, bottom: Bottom) -> FloatArray:
+        """Return the depth (n,) of the bottom below the vehicles; where it is unknown, that of the nearest known place.
+
+        A vehicle that sees nothing would not know otherwise that it is too high. NaN where nothing is known at all.
+        """
+        at, belief = team.positions[:, :2], team.belief
+        below = bottom.at(at)
+        lacking = np.isnan(below)
+        known = np.isfinite(belief.depth_m)
+        if lacking.any() and known.any() and belief.on_floor:
+            _, nearest = cKDTree(belief.xy_m[known]).query(at[lacking])
+            below[lacking] = belief.depth_m[known][nearest]
+        return below
+
+    def _together(self, team: Situation) -> bool:
+        """Whether links hold the team together."""
+        return len(team.vehicles) > 1 and bool(np.isfinite(team.constraints.com_range_m))
+
+    def _watch(self, team: Situation, left: FloatArray, unit: float) -> None:
+        """See whether the team gets on; begin and end visits."""
+        groups = np.zeros(len(team.vehicles), dtype=np.int64)
+        if not self._together(team):
+            groups = np.arange(len(team.vehicles))
+        if self._visitors != team.vehicles or len(self._visits.open) != len(left):
+            before = self._visits
+            self._visits = no_visits(int(groups.max()) + 1, len(left))
+            if len(before.open) == len(left):
+                self._visits = self._visits._replace(vain=before.vain, open=before.open)
+            self._visitors = team.vehicles
+        belief = team.belief
+        watch(
+            np.ascontiguousarray(team.positions),
+            groups,
+            np.ascontiguousarray(belief.xy_m),
+            np.ascontiguousarray(belief.depth_m),
+            left,
+            unit,
+            team.steps_total - team.step + 1,
+            self._visits,
+        )
+
+    def _visit(self, team: Situation, unit: float, way: FloatArray) -> None:
+        """Write the moves of vehicles that visit a landmark into ``way`` (n, 3)."""
+        visits, belief, step = self._visits, team.belief, team.constraints.max_step_m * (1.0 - 1e-9)
+        for group, target in enumerate(visits.target):
+            row = int(visits.visitor[group])
+            name, at = team.vehicles[row], team.positions[row]
+            if target < 0:
+                self._detours.pop(name, None)
+                continue
+            goal = belief.xy_m[target]
+            if team.constraints.keep_out or not team.constraints.region.area_is_convex:
+                goal = self._corner(team, name, at[:2], goal, step)
+            way[row] = towards(at, goal, float(belief.depth_m[target]), int(visits.looks[group]), step, unit)
+
+    def _corner(self, team: Situation, name: str, at: FloatArray, goal: FloatArray, step: float) -> FloatArray:
+        """Return where the next leg (2,) of a vehicle to ``goal`` (2,) ends, round zones."""
+        route = np.array(self._detours.get(name, [])).reshape(-1, 2)
+        free = FreeSpace(team.constraints, 0.0)
+        end = free.nearest(goal)
+        if not len(route) or np.hypot(*(route[-1] - end)) > 1e-9:
+            route = np.asarray(free.way(at, end)).reshape(-1, 2)
+        x, y, passed = next_waypoint(at[0], at[1], route, 0, len(route), step, 0.0)
+        rest = route[passed:]
+        self._detours[name] = rest.tolist() if len(rest) else [end.tolist()]
+        return np.array([x, y])
+
+    def _escort(self, team: Situation, bottom: Bottom, way: FloatArray, left: FloatArray, unit: float) -> FloatArray:
+        """Return where a linked team goes (n, 3) while one of it visits a landmark by its move of ``way`` (n, 3).
+
+        The others visit what is left within their links to it where all may; else they come close to it, or follow it,
+        which no border bars. A team that comes no nearer is barred by what rises before it: then all climb first.
+        """
+        here, step = team.positions, team.constraints.max_step_m * (1.0 - 1e-9)
+        wishes = [self._escorted(team, bottom, way, self._nearby_moves(team, way, left, unit))]
+        for part in (1.0, *SLOWER):
+            wishes.append(self._escorted(team, bottom, part * way, {}))
+            wishes.append(self._escorted(team, bottom, part * way, self._following_moves(team, part * way)))
+        up = [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
+        barred = BARRED_LOOKS <= self._visits.looks[0] < 2 * BARRED_LOOKS
+        positions, _ = settle(team, bottom, np.stack([*up, *wishes] if barred else [*wishes, *up]))
+        return positions
+
+    def _escorted(self, team: Situation, bottom: Bottom, way: FloatArray, moves: dict[int, FloatArray]) -> FloatArray:
+        """Return the wishes (n, 3) of a team whose visitor goes its ``way`` and whose others go theirs, or come close.
+
+        ``moves`` are those of the others that have somewhere to go, by row.
+        """
+        limits, here, visitor = team.constraints, team.positions, int(self._visits.visitor[0])
+        step = limits.max_step_m * (1.0 - 1e-9)
+        near = max(ESCORT_SHARE * limits.com_range_m, APART * limits.min_separation_m)
+        wish = self._clear(team, bottom, here + way)
+        lead = wish[visitor].copy()
+        for i in range(len(here)):
+            if i == visitor:
+                continue
+            if i in moves:
+                wish[i] = here[i] + moves[i]
+                continue
+            offset = here[i, :2] - here[visitor, :2]
+            place = lead + np.append(offset * min(1.0, near / max(float(np.hypot(*offset)), 1e-12)), 0.0)
+            wish[i] = here[i] + within(place - here[i], step)
+        wish = self._clear(team, bottom, linked(here, wish, limits.com_range_m, step, visitor))
+        wish[visitor] = lead
+        return wish
+
+    def _following_moves(self, team: Situation, way: FloatArray) -> dict[int, FloatArray]:
+        """Return the moves (3,), by row, of the vehicles beside the visitor to where it is now, at its next depth."""
+        here, limits, visitor = team.positions, team.constraints, int(self._visits.visitor[0])
+        step, moves = limits.max_step_m * (1.0 - 1e-9), {}
+        for i, at in enumerate(here):
+            if i == visitor:
+                continue
+            flat = here[visitor, :2] - at[:2]
+            keep = 1.0 - APART * limits.min_separation_m / max(float(np.hypot(*flat)), 1e-12)
+            down = here[visitor, 2] + way[visitor, 2] - at[2]
+            moves[i] = within(np.append(max(0.0, keep) * flat, down), step)
+        return moves
+
+    def _nearby_moves(self, team: Situation, way: FloatArray, left: FloatArray, unit: float) -> dict[int, FloatArray]:
+        """Return the moves (3,), by row, of the vehicles beside the visitor to landmarks within their links to it."""
+        belief, limits, visitor = team.belief, team.constraints, int(self._visits.visitor[0])
+        step = limits.max_step_m * (1.0 - 1e-9)
+        lead = team.positions[visitor, :2] + way[visitor, :2]
+        linked_to = np.hypot(*(belief.xy_m - lead).T) < LINK_SHARE * limits.com_range_m
+        open_ = np.flatnonzero((left > 0.0) & linked_to)
+        open_ = open_[open_ != self._visits.target[0]]
+        moves = {}
+        for i, at in enumerate(team.positions):
+            if i == visitor or not len(open_):
+                continue
+            nearest = int(np.argmin(np.hypot(*(belief.xy_m[open_] - at[:2]).T)))
+            target, open_ = int(open_[nearest]), np.delete(open_, nearest)
+            moves[i] = towards(at, belief.xy_m[target], float(belief.depth_m[target]), 0, step, unit)
+        return moves
 
     def _within_limits(self, team: Situation, bottom: Bottom, way: FloatArray, lead: int) -> FloatArray:
         """Return where the team goes (n, 3): by the controller's moves ``way`` (n, 3) as far as the limits allow."""
@@ -207,12 +360,44 @@ class PcaoPlanner(PlannerBase):
         return result
 
     def _remember(self) -> dict[str, Any]:
-        return {"trail": self._trail, "detours": self._detours, "lead": self._lead}
+        return {
+            "trail": self._trail,
+            "detours": self._detours,
+            "lead": self._lead,
+            "visitors": list(self._visitors),
+            "visits": self._visits._asdict(),
+        }
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._trail = _places(state["trail"])
         self._detours = _places(state["detours"])
         self._lead = str(state["lead"])
+        # Missions that an earlier release began have made no visits.
+        self._visitors = tuple(str(name) for name in state.get("visitors", ()))
+        self._visits = _visits(state["visits"]) if "visits" in state else no_visits(0, 0)
+
+
+def towards(at: FloatArray, goal: FloatArray, depth: float, looks: int, step: float, unit: float) -> FloatArray:
+    """Return the move (3,) of a vehicle ``at`` (3,) to a landmark of a depth, by way of ``goal`` (2,)."""
+    flat = goal - at[:2]
+    flat = flat * min(1.0, step / max(float(np.hypot(*flat)), 1e-12))
+    down = visiting_depth(at, goal, depth, looks, step, unit) - at[2]
+    return within(np.append(flat, np.clip(down, -step, step)), step)
+
+
+def within(move: FloatArray, step: float) -> FloatArray:
+    """Return a move (3,), shortened to a step."""
+    return np.asarray(move * min(1.0, step / max(float(np.linalg.norm(move)), 1e-12)))
+
+
+def _visits(of: dict[str, Any]) -> Visits:
+    blank = no_visits(0, 0)._asdict()
+    return Visits(
+        **{
+            name: np.array([np.inf if x is None else x for x in of[name]], dtype=like.dtype)
+            for name, like in blank.items()
+        }
+    )
 
 
 def _places(of: dict[str, Any]) -> dict[str, list[list[float]]]:

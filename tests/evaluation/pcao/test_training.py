@@ -106,7 +106,7 @@ def test_more_tries_and_the_trained_controller_do_better(floor: SeaFloor) -> Non
     ]
     horizontal, vertical = gains(default_model().parameters)
     rng = np.random.default_rng(0)
-    remaining, _ = fly(floor.raster, floor.physics, landmarks, start, headings, horizontal, vertical, 150, rng)
+    remaining, _ = fly(floor.raster, floor.physics, landmarks, start, headings, horizontal, vertical, 150, False, rng)
     assert remaining[-1] < left[1] < left[0]
     assert remaining[-1] < 0.25 * len(landmarks)
     assert not unknown(3).accurate.any()
