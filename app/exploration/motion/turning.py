@@ -7,6 +7,9 @@ from app.arrays import FloatArray
 ARC_SAMPLES = 24
 """Places on a whole turning circle."""
 
+NEAR, ON_RADII = 1.2, 4.0
+"""Who has its target within so many radii of a turning circle's middle flies on for up to so many, and turns then."""
+
 EITHER_WAY_RAD = np.radians(120.0)
 """Who has to turn farther than this may turn either way."""
 
@@ -15,7 +18,7 @@ def turned_over(start_m: FloatArray, heading_rad: float, target_m: FloatArray, r
     """Return places (n, 2) that a vehicle passes over while it turns towards its target; none where it need not.
 
     It turns towards the side where the target lies; where that is behind it, or inside of a turning circle, it may turn
-    either way, and fly on for a diameter before.
+    either way, or fly on before it turns.
 
     Parameters
     ----------
@@ -36,22 +39,12 @@ def turned_over(start_m: FloatArray, heading_rad: float, target_m: FloatArray, r
     starboard = np.array([ahead[1], -ahead[0]])
     side_m, along_m = float(leg_m @ starboard), float(leg_m @ ahead)
     off_rad = abs(float(np.arctan2(side_m, along_m)))
-    centres = [start_m + side * radius_m * starboard for side in (1.0, -1.0)]
-    inside = min(float(np.hypot(*(target_m - centre))) for centre in centres) < radius_m
-    if inside or off_rad > EITHER_WAY_RAD:
-        on_m = 2.0 * radius_m * float(inside)
-        swept = [
-            _arc(start_m + step * ahead, ahead, side * starboard, radius_m, 2.0 * np.pi)
-            for side in (1.0, -1.0)
-            for step in {0.0, 0.5 * on_m, on_m}
-        ]
-        return np.vstack(swept)
-    side = 1.0 if side_m >= 0.0 else -1.0
-    # From the end of the arc it heads straight for the target: farther round than the target lies now.
-    needed_rad = min(2.0 * off_rad, np.pi)
-    arc = _arc(start_m, ahead, side * starboard, radius_m, needed_rad)
-    towards = np.linspace(0.0, 1.0, ARC_SAMPLES)[:, None]
-    return np.vstack([arc, arc[-1] + towards * (target_m - arc[-1])])
+    towards = (1.0 if side_m >= 0.0 else -1.0) * starboard
+    if min(float(np.hypot(*(target_m - start_m - side * radius_m * starboard))) for side in (1, -1)) < NEAR * radius_m:
+        begins = [start_m + on * radius_m * ahead for on in np.linspace(0.0, ON_RADII, 5)]
+        return np.vstack([_circle(here, ahead, side * towards, radius_m) for here in begins for side in (1, -1)])
+    sides = [towards, -towards] if off_rad > EITHER_WAY_RAD else [towards]
+    return np.vstack([_arc_and_on(start_m, ahead, side, target_m, radius_m) for side in sides])
 
 
 def ahead_of_end(end_m: FloatArray, course_rad: float, radius_m: float) -> tuple[FloatArray, FloatArray]:
@@ -73,6 +66,21 @@ def disc(centre_m: FloatArray, radius_m: float) -> FloatArray:
     return np.asarray(centre_m + away_m[:, None] * np.column_stack([np.sin(around), np.cos(around)]))
 
 
-def _arc(start_m: FloatArray, ahead: FloatArray, inwards: FloatArray, radius_m: float, turn_rad: float) -> FloatArray:
-    turned = np.linspace(0.0, turn_rad, max(int(np.ceil(ARC_SAMPLES * turn_rad / (2.0 * np.pi))), 1) + 1)[:, None]
+def _circle(start_m: FloatArray, ahead: FloatArray, inwards: FloatArray, radius_m: float) -> FloatArray:
+    turned = np.linspace(0.0, 2.0 * np.pi, ARC_SAMPLES + 1)[:, None]
     return np.asarray(start_m + radius_m * (np.sin(turned) * ahead + (1.0 - np.cos(turned)) * inwards))
+
+
+def _arc_and_on(
+    start_m: FloatArray, ahead: FloatArray, inwards: FloatArray, target_m: FloatArray, radius_m: float
+) -> FloatArray:
+    """Return the turning circle up to where it leads straight to the target, and the way from there."""
+    circle = _circle(start_m, ahead, inwards, radius_m)
+    # Where a tangent from the target meets it: the radius there and the one towards the target differ by so much.
+    to_m = target_m - start_m - radius_m * inwards
+    away_m = float(np.hypot(*to_m))
+    lies_rad = float(np.arctan2(to_m @ ahead, -(to_m @ inwards)))
+    leaves_rad = (lies_rad - float(np.arccos(min(radius_m / max(away_m, 1e-9), 1.0)))) % (2.0 * np.pi)
+    last = min(int(np.ceil(leaves_rad / (2.0 * np.pi) * ARC_SAMPLES)), ARC_SAMPLES)
+    on = np.linspace(0.0, 1.0, ARC_SAMPLES)[:, None]
+    return np.vstack([circle[: last + 1], circle[last] + on * (target_m - circle[last])])
