@@ -15,8 +15,12 @@ from shapely.ops import nearest_points, unary_union
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.motion.turning import ahead_of_end
 
 LEG_SAMPLES = 9
+MOST_LEG_SAMPLES = 200
+CLIMB = 0.1
+"""Metres a metre that a vehicle is trusted to rise while it turns into its next leg: half of what a LAUV is seen to."""
 WAY_SPACING_M = 5.0
 LEAST_LEG_M = 0.5
 ENTRY_POINTS = 400
@@ -65,11 +69,7 @@ def travel_depth_m(
         Pessimistic sea floor: estimate minus its uncertainty. NaN where nothing is known.
     """
     along = np.linspace(0.0, 1.0, LEG_SAMPLES)[:, None]
-    depths = bottom.at(origin + along * (target - origin))
-    known = depths[np.isfinite(depths)]
-    if len(known) == 0:
-        return wanted_m
-    return float(min(wanted_m, max(known.min() - min_altitude_m, 0.0)))
+    return _least(wanted_m, bottom.at(origin + along * (target - origin)) - min_altitude_m)
 
 
 def depth_above_bottom_m(
@@ -79,10 +79,12 @@ def depth_above_bottom_m(
     otherwise_m: float,
     bottom: Bottom,
     constraints: Constraints,
+    turn_radius_m: float = 0.0,
 ) -> float:
     """Return the depth for a leg of a vehicle that keeps a height above the bottom; 0 is the surface.
 
     Where part of the leg is over ground that nobody knows, it travels as deep as if it kept a depth, if that is less.
+    Beyond its end it turns, no one knows yet whereto: it is so high that it can rise in time wherever the bottom does.
 
     Parameters
     ----------
@@ -94,11 +96,39 @@ def depth_above_bottom_m(
         Depth of travel over unknown ground.
     bottom : Bottom
         Pessimistic sea floor: estimate minus its uncertainty. NaN where nothing is known.
+    turn_radius_m
+        Of its turning circle.
     """
-    along = np.linspace(0.0, 1.0, LEG_SAMPLES)[:, None]
-    known = bool(np.isfinite(bottom.at(origin + along * (target - origin))).all())
-    wanted_m = constraints.max_depth_m if known else otherwise_m
-    return travel_depth_m(origin, target, wanted_m, bottom, max(altitude_m, constraints.min_altitude_m))
+    height_m = max(altitude_m, constraints.min_altitude_m)
+    leg_m = target - origin
+    length_m = float(np.hypot(*leg_m))
+    pieces = max(LEG_SAMPLES, min(math.ceil(length_m / bottom.cell_m), MOST_LEG_SAMPLES))
+    depths = bottom.at(origin + np.linspace(0.0, 1.0, pieces)[:, None] * leg_m)
+    known = np.isfinite(depths)
+    deepest_m = constraints.max_depth_m if known.all() else otherwise_m
+    if length_m > 0.0 and turn_radius_m > 0.0:
+        beyond_m, away_m = ahead_of_end(target, float(np.arctan2(*leg_m)), turn_radius_m)
+        deepest_m = _least(deepest_m, bottom.at(beyond_m) - height_m + CLIMB * away_m)
+    return _least(deepest_m, depths - height_m)
+
+
+def depth_over_m(depth_m: float, ways: Sequence[FloatArray], bottom: Bottom, min_altitude_m: float) -> float:
+    """Return the depth over places that a vehicle passes: as wanted, or shallower where the bottom leaves less room.
+
+    Parameters
+    ----------
+    ways : sequence of (n, 2)
+        The places.
+    """
+    for places in ways:
+        depth_m = _least(depth_m, bottom.at(places) - min_altitude_m)
+    return depth_m
+
+
+def _least(depth_m: float, room_m: FloatArray) -> float:
+    """Return a depth, or the least room (n,) that is known where that is less; 0 is the surface."""
+    known = room_m[np.isfinite(room_m)]
+    return depth_m if len(known) == 0 else float(min(depth_m, max(known.min(), 0.0)))
 
 
 def too_deep(layer_m: float, safe_m: float) -> str:

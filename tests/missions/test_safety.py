@@ -144,12 +144,37 @@ def test_a_height_above_the_bottom_is_kept_or_more(
 ) -> None:
     limits = replace(LIMITS, min_altitude_m=clearance_m, max_depth_m=7.0)
     depth = safety.depth_above_bottom_m(np.array(start), np.array(end), altitude_m, 2.0, BOTTOM, limits)
-    along = np.linspace(0, 1, safety.LEG_SAMPLES)[:, None] * (np.array(end) - start) + start
-    below = BOTTOM.at(along)
-    deepest = 7.0 if np.isfinite(below).all() else 2.0
-    known = below[np.isfinite(below)]
-    room = max(float(known.min()) - max(altitude_m, clearance_m), 0.0) if len(known) else math.inf
-    assert depth == pytest.approx(min(deepest, room))
+
+    def deepest_m(samples: int) -> float:
+        below = BOTTOM.at(np.linspace(0, 1, samples)[:, None] * (np.array(end) - start) + start)
+        wanted_m = 7.0 if np.isfinite(below).all() else 2.0
+        known = below[np.isfinite(below)]
+        return min(wanted_m, max(float(known.min()) - max(altitude_m, clearance_m), 0.0) if len(known) else math.inf)
+
+    assert depth <= deepest_m(safety.LEG_SAMPLES) + 1e-9
+    assert depth >= deepest_m(3001) - 1e-9
+
+
+@given(st.tuples(st.floats(20, 40), st.floats(20, 40)), st.floats(0, 2 * math.pi), st.floats(1, 8), st.floats(0.5, 4))
+def test_a_vehicle_that_keeps_a_height_can_turn_anywhere_after_its_leg(
+    end: tuple[float, float], course_rad: float, radius_m: float, altitude_m: float
+) -> None:
+    start = np.array(end) - 10.0 * np.array([math.sin(course_rad), math.cos(course_rad)])
+    limits = replace(LIMITS, max_depth_m=7.0)
+    depth = safety.depth_above_bottom_m(start, np.array(end), altitude_m, 2.0, BOTTOM, limits, radius_m)
+    for side in (1.0, -1.0):
+        turned = np.linspace(0.0, math.pi, 30)
+        ahead, aside = radius_m * np.sin(turned), side * radius_m * (1.0 - np.cos(turned))
+        arc = np.column_stack(
+            [
+                end[0] + ahead * math.sin(course_rad) + aside * math.cos(course_rad),
+                end[1] + ahead * math.cos(course_rad) - aside * math.sin(course_rad),
+            ]
+        )
+        room = BOTTOM.at(arc) - max(altitude_m, limits.min_altitude_m)
+        # It rises while it turns; bottom cells are 2 m wide, and 0.2 m apart in depth.
+        low = room + safety.CLIMB * radius_m * turned + 0.25 < depth
+        assert not low[room > 0.0].any()
 
 
 def test_over_an_unknown_bottom_the_wanted_depth_counts() -> None:

@@ -158,21 +158,21 @@ async def test_pings_are_placed_anew_when_the_tide_is_known(harbour: Harbour) ->
 
 async def test_vehicles_keep_a_height_above_a_bottom_that_falls_away(harbour_closed: Harbour) -> None:
     harbour = harbour_closed
-    await harbour.open(simulation={"family": "slope", "seed": 2}, time_scale=10.0)
+    await harbour.open(simulation={"family": "slope", "seed": 2}, time_scale=20.0)
     vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0, "altitude_m": 4.0}
     live = await started(harbour, vehicles=[vehicle])
     await until_state(harbour.service, live.id, MissionState.FINISHED)
     built, progress = await live.build_map(), live.progress()
     assert built is not None
     assert progress.ensonified_pct is not None
-    assert progress.ensonified_pct > 98.0
+    assert progress.ensonified_pct > 99.0
+    assert (live.header.terms or {}).get("left_pct") == 0.0
     async with harbour.database.reading() as session:
         samples = (await session.scalars(select(TelemetryRow).where(TelemetryRow.mission_id == live.id))).all()
     heights = np.array([sample.altitude_m for sample in samples if sample.altitude_m is not None])
     depths = np.array([sample.depth_m for sample in samples if sample.depth_m is not None])
-    assert heights.min() > live.spec.limits.min_altitude_m, "never lower than the mission allows"
-    assert np.mean(heights > 3.5) >= 0.9, "it keeps its height, but for moments"
-    assert depths.max() > 4.0, "it goes down with the bottom, beyond its depth"
+    assert heights.min() >= 4.0 - 0.3, "it keeps its height, in turns and circles too"
+    assert depths.max() > 2.0, "it goes down with the bottom, beyond its depth"
 
 
 async def test_it_is_said_what_the_planner_needs(harbour: Harbour) -> None:

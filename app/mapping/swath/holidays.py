@@ -8,6 +8,9 @@ from scipy.ndimage import binary_opening, find_objects, label
 from app.arrays import BoolArray
 from app.mapping.types import Grid
 
+LET_BE = 0.005
+"""Share of an area that may go unseen in pieces that are no holidays: nobody goes back for a few single cells."""
+
 
 @dataclass(frozen=True)
 class Holiday:
@@ -81,8 +84,22 @@ def pieces(cells: BoolArray, grid: Grid) -> list[Holiday]:
 
 
 def open_ground(ensonified: BoolArray, mask: BoolArray, side: int) -> BoolArray:
-    """Return which cells a survey has still to see: holidays, and strips of two cells and more along the border."""
+    """Return which cells a survey has still to see: holidays, and strips of two cells and more along the border.
+
+    Smaller pieces are let be as long as all of them are less than ``LET_BE`` of the area; else the largest count, too.
+    """
     empty = mask & ~ensonified
     outside = np.pad(empty | ~mask, side, constant_values=True)
     opened = binary_opening(outside, np.ones((side, side), dtype=bool))[side:-side, side:-side]
-    return np.asarray(opened & binary_opening(empty, np.ones((2, 2), dtype=bool)))
+    opened &= binary_opening(empty, np.ones((min(side, 2),) * 2, dtype=bool))
+    over = int((empty & ~opened).sum()) - int(LET_BE * mask.sum())
+    return np.asarray(opened if over <= 0 else opened | _largest(empty & ~opened, over))
+
+
+def _largest(cells: BoolArray, least: int) -> BoolArray:
+    """Return the largest connected pieces of cells that are so many together."""
+    number, count = label(cells, np.ones((3, 3)))
+    sizes = np.bincount(number.ravel(), minlength=count + 1)[1:]
+    order = np.argsort(-sizes, kind="stable")
+    chosen = order[: int(np.searchsorted(np.cumsum(sizes[order]), least)) + 1]
+    return np.asarray(np.isin(number, 1 + chosen))

@@ -1,5 +1,6 @@
 """Makes decisions durable, and turns legs that are stored into the vehicles' orders."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -10,10 +11,11 @@ from sqlalchemy.orm import make_transient
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, Limit
+from app.exploration.motion.turning import disc, turned_over
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
-from app.missions.flight.decision import Decision, Leg
+from app.missions.flight.decision import Decision, Leg, turn_radius_m
 from app.missions.live.mission import RISES, LiveMission
 from app.missions.recovery.way_home import berth_m, homeward_ground
 from app.missions.spec.mission import Guidance, MissionSpec
@@ -27,6 +29,9 @@ from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
+
+LEAD_SAMPLES = 9
+"""Places on that way where the bottom is looked at."""
 
 NO_LEG = 0
 """In place of a leg's number, in orders that are none."""
@@ -181,10 +186,18 @@ class LegCommit:
         bottom: tuple[Position, ...] = ()
         spec = self._live.spec
         target = leg.target_m
+        place = leg.position
+        if member.report is not None:
+            # It may have come elsewhere than where its leg was to begin, and it turns.
+            start = member.place_m(self._live.frame)
+            depth_m = self._depth_m(member, place.depth_m, self._turning(member, start, target))
+            place = replace(place, depth_m=depth_m)
         if member.report is not None and self._leads:
             start = member.place_m(self._live.frame)
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
-            lead = self._position(beyond[0], beyond[1], leg.position.depth_m)
+            on = target + np.linspace(0.0, 1.0, LEAD_SAMPLES)[:, None] * (beyond - target)
+            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, CIRCLE_M)])
+            lead = self._position(beyond[0], beyond[1], depth_m)
             known = safety.bottom_on_way(np.array([start, target, beyond]), self.bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
             circle = self._circle(member, start, target)
@@ -192,7 +205,7 @@ class LegCommit:
             mission_id=self._live.id,
             step=leg.number,
             vehicle=member.name,
-            position=leg.position,
+            position=place,
             speed_mps=spec.speed_of(member.spec),
             arrival_radius_m=spec.arrival_radius_m,
             min_altitude_m=spec.limits.min_altitude_m,
@@ -211,10 +224,11 @@ class LegCommit:
         centre_m = self._room(member, inside, inside)
         if centre_m is None:
             return None
-        depth_m = member.order.position.depth_m
+        ways = [*self._turning(member, inside, centre_m), disc(centre_m, CIRCLE_M)]
+        wanted_m = member.order.position.depth_m
         if member.withdrawal is not None and member.withdrawal.below:
-            depth_m = self._depth_below_m(member, depth_m)
-        place = self._position(centre_m[0], centre_m[1], depth_m)
+            wanted_m = self._depth_below_m(member, wanted_m)
+        place = self._position(centre_m[0], centre_m[1], self._depth_m(member, wanted_m, ways))
         return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None)
 
     def waiting_below(self, member: Member) -> WaypointOrder | None:
@@ -229,6 +243,20 @@ class LegCommit:
         """Return a depth that is not shallower than where a vehicle is now."""
         here_m = depth_m if member.report is None else member.report.position.depth_m
         return max(depth_m, min(here_m, self._live.spec.limits.max_depth_m))
+
+    def _turning(self, member: Member, start: FloatArray, target: FloatArray) -> list[FloatArray]:
+        """Return what a vehicle passes over that is at ``start`` and goes to ``target``: its turn, and its way."""
+        report = member.report
+        heading_rad = math.nan if report is None or report.heading_rad is None else report.heading_rad
+        radius_m = turn_radius_m(self._live.spec, member.spec)
+        straight = start + np.linspace(0.0, 1.0, safety.LEG_SAMPLES)[:, None] * (target - start)
+        return [straight, turned_over(start, heading_rad, target, radius_m)]
+
+    def _depth_m(self, member: Member, depth_m: float, ways: list[FloatArray]) -> float:
+        """Return a depth, or what a vehicle's height above the bottom leaves of it over what it passes."""
+        least_m = self._live.spec.limits.min_altitude_m
+        height_m = least_m if member.withdrawal is not None else float(np.fmax(least_m, member.altitude_m))
+        return safety.depth_over_m(depth_m, ways, self.bottom, height_m)
 
     def _circle(self, member: Member, start: FloatArray, target: FloatArray) -> Position | None:
         """Return where a vehicle that is led by legs may circle down, apart from the others' ways and circles."""

@@ -17,7 +17,7 @@ from app.exploration.site_search import SearchTask
 from app.missions import metrics
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
-from app.missions.flight.decision import Decision, Place, decide, swath_task
+from app.missions.flight.decision import Decision, Place, decide, swath_task, turn_radius_m
 from app.missions.flight.step_maps import StepMaps
 from app.missions.live.mission import LiveMission
 from app.missions.team import CommittedLeg, Member
@@ -166,6 +166,7 @@ def place_of(member: Member, live: LiveMission) -> Place:
         member.capabilities.keeps_depth,
         submerged_s=member.submerged_s,
         altitude_m=member.altitude_m,
+        turn_radius_m=turn_radius_m(live.spec, member.spec),
     )
 
 

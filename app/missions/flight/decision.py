@@ -67,6 +67,8 @@ class Place:
     """How long it has been under water since its last fix at the surface, by its clock."""
     altitude_m: float = math.nan
     """Height above the bottom that it is to keep; NaN: it keeps its depth."""
+    turn_radius_m: float = 0.0
+    """Of its turning circle."""
 
     @property
     def surfacing(self) -> bool:
@@ -81,7 +83,7 @@ class Place:
             least_m = constraints.min_altitude_m
             return safety.travel_depth_m(origin_m, target_m, self.cruise_depth_m, bottom, least_m)
         return safety.depth_above_bottom_m(
-            origin_m, target_m, self.altitude_m, self.cruise_depth_m, bottom, constraints
+            origin_m, target_m, self.altitude_m, self.cruise_depth_m, bottom, constraints, self.turn_radius_m
         )
 
 

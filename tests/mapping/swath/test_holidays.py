@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from app.mapping.swath.holidays import holidays, missed, open_ground, side_of
+from app.mapping.swath.holidays import LET_BE, holidays, missed, open_ground, side_of
 from app.mapping.types import Grid
 
 CELLS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
@@ -56,7 +56,19 @@ def test_strips_along_the_border_are_still_open() -> None:
     assert not missed(ensonified, area, 3).any()
     left = open_ground(ensonified, area, 3)
     assert left[:, :2].all(), "two cells wide"
-    assert not left[:, 2:].any(), "one cell is not worth a line"
+    assert left[:, 19].all(), "one cell wide, and a twentieth of the area"
+    ensonified, area = (np.pad(cells, ((0, 0), (0, 400)), constant_values=True) for cells in (ensonified, area))
+    area[:, 20:] = True
+    assert not open_ground(ensonified, area, 3)[:, 2:].any(), "one cell is not worth a line in a large area"
+
+
+@given(arrays(np.bool_, (12, 40)), st.integers(1, 4))
+def test_what_is_let_be_is_a_small_part_of_the_area_and_made_of_small_pieces(ensonified: np.ndarray, side: int) -> None:
+    area = np.ones_like(ensonified)
+    left = open_ground(ensonified, area, side)
+    let_be = ~ensonified & ~left
+    assert let_be.sum() <= LET_BE * area.sum()
+    assert not missed(ensonified | left, area, side).any()
 
 
 def test_the_side_follows_the_coarsest_resolution() -> None:

@@ -1,8 +1,9 @@
-"""The bottom that comes with an order is counted from the water's surface, whatever tells the level."""
+"""The bottom that comes with an order is counted from the surface, and the order allows for what is turned over."""
 
 import numpy as np
 import pytest
 
+from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Belief
 from app.exploration.planners import create_planner
 from app.mapping.tides import TideTable
@@ -62,3 +63,34 @@ async def test_the_guard_gets_the_bottom_below_the_surface(
     assert member.order is not None
     assert member.order.bottom
     assert {round(place.depth_m, 6) for place in member.order.bottom} == {expected_m}
+
+
+async def test_an_order_is_no_deeper_than_the_turn_into_its_leg_and_the_circle_after_it_allow(
+    service: MissionService,
+) -> None:
+    keeps = {"name": "a", "kind": "sim", "altitude_m": 4.0, "turn_radius_m": 5.0}
+    live = await service.get((await service.create(sim_spec(vehicles=[keeps]))).id)
+    committing = LegCommit(live, make_constraints(live.spec), leads=True)
+    east, north = np.meshgrid(np.arange(0.5, 30.0), np.arange(0.5, 30.0))
+    rising_west = 8.0 + 0.2 * east
+    committing.bottom = Bottom.from_landmarks(np.column_stack([east.ravel(), north.ravel()]), rising_west.ravel())
+    member = live.team.join(live.spec.vehicles[0], 0)
+
+    def ordered_m(heading_rad: float) -> float:
+        lat, lon = live.frame.to_geographic(np.array(15.0), np.array(6.0))
+        member.report = VehicleReport("a", 0.0, Position(float(lat), float(lon), 0.0), heading_rad=heading_rad)
+        # The ground under the leg itself, 11 m deep, leaves 7 m.
+        committing.lead_home(member, [(np.array([15.0, 24.0]), 6.9)])
+        committing.begin_next(member)
+        assert member.order is not None
+        return member.order.position.depth_m
+
+    assert ordered_m(0.0) == pytest.approx(6.9, abs=0.15), "it goes straight on"
+    assert ordered_m(np.pi / 2) == pytest.approx(6.9, abs=0.15), "it turns where it is deeper"
+    # A turn from west to north leads 5 m to the west, where it is 1 m shoaler.
+    assert ordered_m(-np.pi / 2) == pytest.approx(5.9, abs=0.25)
+    held, led = committing.holding(member), member.order
+    assert held is not None
+    assert held.position.depth_m <= 6.9 - 0.2 * 9.0, "the circle is 10 m wide to either side"
+    assert led is not None
+    assert led.lead is None or led.lead.depth_m <= led.position.depth_m

@@ -448,7 +448,7 @@ class SimFleetLink(FleetLink):
             swimmer.reached = True
             if order.lead is not None:
                 # Until it is sent on it flies straight ahead, as far as there is room.
-                swimmer.head_for(order, order.lead, order.position.depth_m)
+                swimmer.head_for(order, order.lead, order.lead.depth_m)
             # The loop plans from the last report: it must be the place of arrival.
             events.append(swimmer.make_report())
             events.append(WaypointReport(order.vehicle, order.mission_id, order.step, WaypointStatus.REACHED))
