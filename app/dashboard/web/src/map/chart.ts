@@ -35,6 +35,16 @@ export interface GridFrame extends Graticule {
   yOf: (latitude: number) => number;
 }
 
+/** A layer as the worker painted it, and where it lies; contours' levels are divided by `scale`. */
+export interface PaintedFloor {
+  corners: readonly LngLat[];
+  rows: number;
+  cols: number;
+  picture: PictureResult;
+  scale: number;
+  interval: number;
+}
+
 export interface ChartHooks {
   onCursor: (place: LngLat | null) => void;
   onClick: (place: LngLat) => void;
@@ -62,6 +72,7 @@ export class Chart {
   #look: Look;
   #still: StillContent = {
     floor: null,
+    hatched: true,
     area: null,
     keepOut: [],
     tracks: [],
@@ -74,6 +85,7 @@ export class Chart {
   #draftBounds: Bounds | null = null;
   #fitting: (() => Padding) | null = null;
   #tiles = "";
+  #smooth = true;
   #styled = false;
 
   /** Makes the map inside an element. It is drawn on at once; what MapLibre itself shows follows when it is ready. */
@@ -203,25 +215,34 @@ export class Chart {
   }
 
   /** A painted layer with its contours, whose levels are divided by `scale`; null: nothing is known. */
-  setSeaFloor(
-    corners: readonly LngLat[],
-    rows: number,
-    cols: number,
-    picture: PictureResult | null,
-    scale: number,
-    interval: number,
-  ): void {
-    if (!picture && !this.#still.floor) return;
-    const floor = picture && {
-      corners,
-      rows,
-      cols,
-      image: imageOf(picture, this.#still.floor?.image),
-      contours: picture.contours,
-      scale,
-      interval,
+  setSeaFloor(painted: PaintedFloor | null): void {
+    const before = this.#still.floor;
+    if (!painted) {
+      if (before) this.#lay({ floor: null });
+      return;
+    }
+    const { picture, ...how } = painted;
+    const { guessed, width, height, contours } = picture;
+    const floor = {
+      ...how,
+      smooth: this.#smooth,
+      image: imageOf(picture, before?.image),
+      guessed: guessed && imageOf({ pixels: guessed, width, height }, before?.guessed ?? undefined),
+      contours,
     };
     this.#lay({ floor });
+  }
+
+  /** Whether cells of the sea floor flow into each other, or are squares. */
+  setSmooth(smooth: boolean): void {
+    this.#smooth = smooth;
+    const { floor } = this.#still;
+    if (floor) this.#lay({ floor: { ...floor, smooth } });
+  }
+
+  /** Whether what is guessed is hatched. */
+  setHatching(hatched: boolean): void {
+    this.#lay({ hatched });
   }
 
   /** What a search knows of its site; null: there is none, or it is not shown. */

@@ -3,7 +3,8 @@
 import { effect, type Signal } from "@preact/signals";
 import { render } from "preact";
 import SPEC from "../api/mission.json";
-import type { LngLat, MissionView, Place, WaypointView } from "../api/types";
+import type { LngLat, MissionView, Place, PolygonGeometry, WaypointView } from "../api/types";
+import { ringOf } from "../map/area";
 import type { Chart, Padding, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { outliersOf, placeOf } from "../map/crossings";
@@ -13,7 +14,7 @@ import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
 import { recoveryMarks } from "../map/recovery";
-import type { SeaFloor } from "../map/seafloor";
+import { gridPlace, type SeaFloor } from "../map/seafloor";
 import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
@@ -33,16 +34,19 @@ import {
   editingReady,
   holidays,
   isDark,
+  lightFrom,
   measured,
   mission,
   replayStep,
   reviewed,
   seaFloor,
+  sharpCells,
   ships,
   showContours,
   showCrossings,
   showHatching,
   showHolidays,
+  shownCertainty,
   shownLayer,
   shownRange,
   showRanges,
@@ -221,7 +225,8 @@ function followSeaFloor(chart: Chart): () => void {
   let interval = 1;
   const painter = new Painter((picture) => {
     if (!map) return;
-    chart.setSeaFloor(map.corners, map.rows, map.cols, picture, scale, interval);
+    const { corners, rows, cols } = map;
+    chart.setSeaFloor({ corners, rows, cols, picture, scale, interval });
     markOnce("sea-floor");
   });
   const stop = effect(() => {
@@ -229,36 +234,56 @@ function followSeaFloor(chart: Chart): () => void {
     const range = shownRange.value;
     const shown = shownLayer.value;
     const values = shown && map?.layers[shown.name];
-    const { flags, depth } = map?.layers ?? {};
-    const hatched = showHatching.value;
+    const { flags, depth, uncertainty } = map?.layers ?? {};
     const palette = shown && paletteOf(shown, depthPalette.value);
     const wanted = showContours.value;
+    const certainty = shownCertainty.value;
+    const azimuth_deg = shown?.palette === "deep" ? lightFrom.value : null;
     if (!map || !range || !values || !flags || !depth) {
       painter.forget();
-      chart.setSeaFloor([], 0, 0, null, 1, 1);
+      chart.setSeaFloor(null);
       return;
     }
     scale = map.scales.depth ?? 1;
     interval = Math.round(contourInterval(map.min_depth_m ?? 0, map.max_depth_m ?? 1) * scale) || 1;
     const layerScale = map.scales[shown.name] ?? 1;
+    const sdScale = map.scales.uncertainty ?? 1;
     painter.paint({
       painting: {
         rows: map.rows,
         cols: map.cols,
         values,
         flags,
+        depths: depth,
         low: range.low * layerScale,
         high: range.high * layerScale,
         table: palette ? lookupTable(palette) : null,
-        hatched,
+        guesses:
+          certainty && uncertainty && shown.of_depths
+            ? { sds: uncertainty, full: certainty.full_m * sdScale, none: certainty.none_m * sdScale }
+            : null,
+        light: azimuth_deg === null ? null : { azimuth_deg, cell: map.cell_m * scale },
+        ring: ringIn(map, mission.peek()?.spec.area as PolygonGeometry | undefined),
       },
-      contours: wanted ? { depths: depth, interval } : null,
+      interval: wanted ? interval : null,
     });
   });
+  const stopSmooth = effect(() => chart.setSmooth(!sharpCells.value));
+  const stopHatching = effect(() => chart.setHatching(showHatching.value));
   return () => {
     stop();
+    stopSmooth();
+    stopHatching();
     painter.close();
   };
+}
+
+/** An area's outline in columns and rows of a map. */
+function ringIn(map: SeaFloor, area: PolygonGeometry | undefined): [number, number][] {
+  return (area ? ringOf(area) : []).map((corner) => {
+    const { col, row } = gridPlace(map, corner);
+    return [col, row];
+  });
 }
 
 function followTracks(chart: Chart): () => void {
