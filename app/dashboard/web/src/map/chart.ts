@@ -7,6 +7,7 @@ import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { coasts, showsCoast } from "./coast";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "./geo";
 import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
 import type { PlaceMark, Route, Spot, Track } from "./marks";
@@ -71,6 +72,7 @@ export class Chart {
   readonly #pins = new Map<string, Marker>();
   #look: Look;
   #still: StillContent = {
+    lands: [],
     floor: null,
     hatched: true,
     area: null,
@@ -86,6 +88,7 @@ export class Chart {
   #fitting: (() => Padding) | null = null;
   #tiles = "";
   #smooth = true;
+  #askedForCoasts = false;
   #styled = false;
 
   /** Makes the map inside an element. It is drawn on at once; what MapLibre itself shows follows when it is ready. */
@@ -117,6 +120,7 @@ export class Chart {
       else hooks.onClick([e.lngLat.lng, e.lngLat.lat]);
     });
     map.on("move", this.#tellFrame);
+    map.on("move", this.#wantCoasts);
     map.on("resize", this.#tellFrame);
     map.on("resize", this.#fitAgain);
     map.on("movestart", (e) => {
@@ -365,6 +369,24 @@ export class Chart {
     if (this.#fitting && bounds) {
       this.#map.fitBounds(bounds, { padding: this.#fitting(), animate: false, maxZoom: 21 });
     }
+  };
+
+  /** Coasts are fetched when so much is seen that they tell something; charts have better ones. */
+  #wantCoasts = (): void => {
+    const wanted = this.#tiles === "" && showsCoast(this.#map.getZoom());
+    if (!wanted) {
+      if (this.#tiles !== "" && this.#still.lands.length > 0) this.#lay({ lands: [] });
+      return;
+    }
+    if (this.#still.lands.length > 0 || this.#askedForCoasts) return;
+    this.#askedForCoasts = true;
+    coasts()
+      .then((lands) => this.#lay({ lands }))
+      // The service is gone, which is told elsewhere; the next move asks again.
+      .catch(() => undefined)
+      .finally(() => {
+        this.#askedForCoasts = false;
+      });
   };
 
   #tellFrame = (): void => {

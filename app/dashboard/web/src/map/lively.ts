@@ -166,7 +166,7 @@ function label(
   context.fillText(words, at.x(place[0]) + 14, at.y(place[1]));
 }
 
-/** Outlines of signs about their place, pixels: a star, a door, a mast and a house. */
+/** Outlines of signs about their place, pixels: a star, a door, a mast, a house, a pin's head, and a boat from above. */
 const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> = {
   goal: [...Array(10).keys()].map((i) => {
     const away = i % 2 === 0 ? 9 : 4;
@@ -183,6 +183,20 @@ const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> =
     [5, -10],
     [-5, -10],
   ],
+  position: [
+    [0, 0],
+    [-7, -12],
+    [-4, -19],
+    [4, -19],
+    [7, -12],
+  ],
+  own: [
+    [0, -12],
+    [6, -3],
+    [6, 9],
+    [-6, 9],
+    [-6, -3],
+  ],
   home: [
     [0, -10],
     [10, -1],
@@ -192,6 +206,12 @@ const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> =
     [-7, -1],
     [-10, -1],
   ],
+};
+
+const FILLS: Partial<Record<PlaceMark["sign"], string>> = {
+  goal: "#ffd24d",
+  position: "#e0452f",
+  own: "#3aa0ff",
 };
 
 function paintMark(
@@ -211,7 +231,7 @@ function paintMark(
     else context.lineTo(at.x(place[0]) + x, at.y(place[1]) + y);
   });
   context.closePath();
-  context.fillStyle = sign === "goal" ? "#ffd24d" : paper.casing;
+  context.fillStyle = FILLS[sign] ?? paper.casing;
   context.fill();
   stroke(context, { colour: paper.ink, width: 2 });
   if (words) label(context, at, place, words, paper);

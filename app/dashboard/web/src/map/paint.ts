@@ -33,12 +33,15 @@ export interface Picture {
   guessed: Uint8ClampedArray<ArrayBuffer> | null;
 }
 
-const DARKEST = 0.35;
+const DARKEST = 0.5;
 const LIGHTEST = 1.6;
 /** How much of what lies between a colour and white the brightest light adds, for each unit of it. */
 const GLARE = 0.55;
 /** Cells beyond the outermost known ones that smooth pictures need at the area's edge. */
 const BEYOND = 2;
+
+/** What is drawn fainter than this is neither hatched nor has contours. */
+export const FAINT = 0.15;
 
 /** How strongly each cell is drawn, 0 to 1; where the map knows nothing it is 0. */
 export function strengths({ values, flags, guesses }: Pick<Painting, "values" | "flags" | "guesses">) {
@@ -74,7 +77,7 @@ export function paint(painting: Painting, strong = strengths(painting)): Picture
       }
       pixels[into + 3] = 255 * (strong[at] as number);
       const flag = flags[at] as number;
-      if (guessed && !isMeasured(flag) && !(flag & ACCURATE) && (strong[at] as number) > 0) {
+      if (guessed && !isMeasured(flag) && !(flag & ACCURATE) && (strong[at] as number) >= FAINT) {
         guessed[into + 3] = 255;
       }
     }

@@ -152,6 +152,15 @@ describe("ranges", () => {
     expect(fittingRange(whole(), layer("difference"))).toBeNull();
   });
 
+  it("of depths hold what was measured, while anything was", () => {
+    const cells = { depth: [100, 900, 300, 700], flags: [1, 0, 2, 8] };
+    const guessed = withTiles(null, answer({ 0: cells }, { cols: 2, tile: 2 })) as SeaFloor;
+    expect(fittingRange(guessed, layer("depth"))).toEqual({ low: 1, high: 3 });
+    expect(fittingRange(guessed, layer("depth", { of_depths: false }))).toEqual({ low: 0, high: 10 });
+    const nothing = withTiles(null, answer({ 0: { ...cells, flags: [0, 0, 0, 8] } }, { cols: 2, tile: 2 }));
+    expect(fittingRange(nothing as SeaFloor, layer("depth"))).toEqual({ low: 0, high: 10 });
+  });
+
   it("tell how much of the map lies outside", () => {
     expect(shareOutside(whole(), layer("depth"), { low: 1.5, high: 5 })).toBeCloseTo(2 / 6);
   });

@@ -1,6 +1,7 @@
 /** What lies still on the map: the sea floor with its contours, the grid, area and zones, where vehicles have been. */
 
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { type Land, paintCoasts, showsCoast } from "./coast";
 import type { Contour } from "./contours";
 import { graticule, graticuleStep } from "./geo";
 import type { Track } from "./marks";
@@ -37,6 +38,8 @@ export interface FloorPicture {
 }
 
 export interface StillContent {
+  /** Coasts of the world, where they are wanted and here. */
+  lands: readonly Land[];
   floor: FloorPicture | null;
   /** Whether what is guessed is hatched. */
   hatched: boolean;
@@ -69,10 +72,11 @@ export function paintStill(
   context: CanvasRenderingContext2D,
   at: Projection,
   window: Projection,
-  { floor, hatched, area, keepOut, tracks, holidays, crossings, site }: StillContent,
+  { lands, floor, hatched, area, keepOut, tracks, holidays, crossings, site }: StillContent,
   paper: Paper,
 ): void {
   context.lineCap = context.lineJoin = "round";
+  if (showsCoast(window.camera.zoom)) paintCoasts(context, at, lands, paper);
   if (floor) {
     context.save();
     clip(context, at, area);

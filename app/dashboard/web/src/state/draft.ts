@@ -9,7 +9,6 @@ import {
   type FieldName,
   fieldFault,
   fieldsOf,
-  isWithin,
   type LengthUnit,
   type MissionKind,
   numberFault,
@@ -27,6 +26,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./fields";
+import { PLACE_SAMPLE, placeOf, typedPlace } from "./place";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -288,8 +288,6 @@ export function faultsOf(draft: Draft): Faults {
   return faults;
 }
 
-const PLACE_SAMPLE = '"41.1852, -8.7046"';
-
 /** What is wrong with what a vehicle has of its own. */
 function ownFault(name: string, draft: Draft): string {
   const own = draft.own[name] ?? {};
@@ -300,18 +298,6 @@ function ownFault(name: string, draft: Draft): string {
     .find((words) => words !== "");
   const point = own.recovery_point?.trim() ?? "";
   return fault ?? (point === "" || placeOf(point) ? "" : `Recovery point of ${name}: type ${PLACE_SAMPLE}`);
-}
-
-/** A place typed as "latitude, longitude" in decimal degrees; null when it is none. */
-export function placeOf(text: string): LngLat | null {
-  const [lat, lng, ...rest] = text.trim() === "" ? [] : text.split(/[,;\s]+/).map(Number);
-  if (lat === undefined || lng === undefined || rest.some((n) => n !== 0)) return null;
-  return isWithin(lat, LATITUDE) && isWithin(lng, LONGITUDE) ? [lng, lat] : null;
-}
-
-/** A place as it is typed. */
-export function typedPlace([lng, lat]: LngLat): string {
-  return `${lat.toFixed(6)}, ${lng.toFixed(6)}`;
 }
 
 /** The area that a draft describes; null while it describes none. */

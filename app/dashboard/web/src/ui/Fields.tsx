@@ -2,8 +2,9 @@
 
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
-import { type Draft, type Faults, typedPlace } from "../state/draft";
+import type { Draft, Faults } from "../state/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf } from "../state/fields";
+import { typedPlace } from "../state/place";
 import { picking } from "../state/store";
 import { Button, Choice, same } from "./Controls";
 

@@ -18,12 +18,12 @@ import {
   faultsOf,
   fieldOf,
   PLANNER_PRESETS,
-  placeOf,
   toMission,
   turnedInto,
   vehicleNames,
 } from "../state/draft";
 import { distance, duration } from "../state/format";
+import { placeOf } from "../state/place";
 import { createMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, mapCentre, picking } from "../state/store";
 import { AreaFields } from "./AreaFields";

@@ -9,7 +9,7 @@ import type { Chart, Padding, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { outliersOf, placeOf } from "../map/crossings";
 import { paletteOf } from "../map/layers";
-import type { Route, Track } from "../map/marks";
+import type { PlaceMark, Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
@@ -19,10 +19,13 @@ import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
+import { place } from "../state/format";
+import { ownPosition } from "../state/own";
 import { replayed } from "../state/replay";
 import {
   chosenSounding,
   colourOf,
+  coordinateFormat,
   crossovers,
   cursor,
   depthPalette,
@@ -35,6 +38,7 @@ import {
   holidays,
   isDark,
   lightFrom,
+  marked,
   measured,
   mission,
   replayStep,
@@ -142,6 +146,7 @@ export function follow(chart: Chart): () => void {
         ...(spec?.search ? searchMarks(spec.search) : []),
         ...(spec ? homesOf(spec) : []),
         ...(draftShapes.value?.marks ?? []),
+        ...pointedOut(),
       ]);
     }),
     effect(() =>
@@ -159,6 +164,24 @@ export function follow(chart: Chart): () => void {
   return () => {
     for (const stop of stops) stop();
   };
+}
+
+/** A place that was asked for, and where this device is. */
+function pointedOut(): PlaceMark[] {
+  const [asked, own] = [marked.value, ownPosition.value];
+  return [
+    ...(asked
+      ? [
+          {
+            words: place(asked, coordinateFormat.value),
+            sign: "position" as const,
+            at: asked,
+            radius_m: 0,
+          },
+        ]
+      : []),
+    ...(own ? [{ words: "here", sign: "own" as const, at: own.at, radius_m: own.accuracy_m }] : []),
+  ];
 }
 
 /** While an area is being typed every digit would be another place. */
