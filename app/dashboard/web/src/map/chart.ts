@@ -9,14 +9,26 @@ import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
 import { coasts, showsCoast } from "./coast";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "./geo";
-import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
+import { type Box, type Label, placed, type Side } from "./labels";
+import {
+  type LivelyContent,
+  NOTHING,
+  paintLively,
+  SIGN_REACH_PX,
+  type Sides,
+  type Sketch,
+  WORDS_FONT,
+  WORDS_HEIGHT_PX,
+} from "./lively";
 import type { PlaceMark, Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
+import type { Projection } from "./projection";
 import { Sheets } from "./sheets";
 import type { ShipMark } from "./ships";
 import { type Site, sitePicture } from "./site";
 import { imageOf, paintStill, type StillContent } from "./still";
+import type { Pixel } from "./strokes";
 import type { SwathLine } from "./swath";
 import type { TargetMark } from "./targets";
 
@@ -70,6 +82,10 @@ export class Chart {
   readonly #map: MapLibreMap;
   readonly #sheets: Sheets;
   readonly #pins = new Map<string, Marker>();
+  /** Sizes of pins' labels, and the sides on which all labels are. */
+  readonly #labels = new Map<string, Pick<Label, "width" | "height" | "reach">>();
+  #sides = new Map<string, Side>();
+  #covers: readonly Box[] = [];
   #look: Look;
   #still: StillContent = {
     lands: [],
@@ -109,7 +125,8 @@ export class Chart {
     this.#sheets = new Sheets(
       map,
       (context, at) => paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]),
-      (context, at) => paintLively(context, at, this.#lively, PAPER[this.#look]),
+      (context, at) =>
+        paintLively(context, at, this.#lively, this.#layLabels(context, at), PAPER[this.#look]),
     );
     map.on("mousemove", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
     map.on("mouseout", () => hooks.onCursor(null));
@@ -335,12 +352,21 @@ export class Chart {
         this.#pins.set(pin.key, marker);
       }
       marker.setLngLat(pin.at);
-      pin.draw(marker.getElement());
+      const element = marker.getElement();
+      pin.draw(element);
+      // Signs without words have no label.
+      const words = element.querySelector<HTMLElement>(".mark-label");
+      if (words) {
+        const { offsetWidth: width, offsetHeight: height } = words;
+        this.#labels.set(pin.key, { width, height, reach: element.offsetWidth / 2 });
+      }
     }
     for (const key of gone) {
       this.#pins.get(key)?.remove();
       this.#pins.delete(key);
+      this.#labels.delete(key);
     }
+    this.#sheets.refresh();
   }
 
   #lay(content: Partial<StillContent>): void {
@@ -351,6 +377,46 @@ export class Chart {
   #show(content: Partial<LivelyContent>): void {
     this.#lively = { ...this.#lively, ...content };
     this.#sheets.refresh();
+  }
+
+  /** What lies over the map, in its pixels: labels keep clear of it. */
+  setCovers(covers: readonly Box[]): void {
+    this.#covers = covers;
+    this.#sheets.refresh();
+  }
+
+  /** Finds room for all labels, those of vehicles first, and turns these to their side. */
+  #layLabels(context: CanvasRenderingContext2D, at: Projection): Sides {
+    const { marks, targets } = this.#lively;
+    context.font = WORDS_FONT;
+    const worded = (key: string, place: LngLat, words: string) => ({
+      key,
+      at: [at.x(place[0]), at.y(place[1])] as Pixel,
+      width: context.measureText(words).width,
+      height: WORDS_HEIGHT_PX,
+      reach: SIGN_REACH_PX,
+      side: this.#sides.get(key) ?? "right",
+    });
+    const pinned = [...this.#labels].flatMap(([key, { width, height, reach }]) => {
+      const place = this.#pins.get(key)?.getLngLat();
+      const side = this.#sides.get(key) ?? "right";
+      return place
+        ? [{ key, at: [at.x(place.lng), at.y(place.lat)] as Pixel, width, height, reach, side }]
+        : [];
+    });
+    const labels = [
+      ...pinned,
+      ...marks.map((mark, i) => worded(`mark ${i} ${mark.sign}`, mark.at, mark.words)),
+      ...targets.map((target) => worded(`target ${target.name}`, target.at, target.name)),
+    ];
+    const sides = placed(labels, this.#covers, at.width, at.height);
+    this.#sides = new Map(labels.map(({ key }, i) => [key, sides[i] as Side]));
+    pinned.forEach(({ key }, i) => {
+      const element = this.#pins.get(key)?.getElement();
+      if (element && element.dataset.side !== sides[i]) element.dataset.side = sides[i] as Side;
+    });
+    const own = sides.slice(pinned.length);
+    return { marks: own.slice(0, marks.length), targets: own.slice(marks.length) };
   }
 
   #spotAt(x: number, y: number): Spot | null {

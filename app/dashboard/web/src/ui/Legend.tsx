@@ -37,7 +37,7 @@ export function Legend() {
   if (!mission.value || !shown) return null;
   const palette = paletteOf(shown, depthPalette.value);
   return (
-    <section class="legend" aria-label="Map layer and legend">
+    <section class={`legend${legendOpen.value ? "" : " folded"}`} aria-label="Map layer and legend">
       <label class="layer-choice">
         <span class="visually-hidden">Layer</span>
         <Choice

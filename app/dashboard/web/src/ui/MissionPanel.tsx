@@ -6,12 +6,15 @@ import { deleteMission, selectMission } from "../state/session";
 import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
 import { capital, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { Button, sets } from "./Controls";
+import { Grip } from "./Grip";
 import { NewMissionForm } from "./NewMissionForm";
+import { panelWidth } from "./room";
 
 export function MissionPanel() {
   return (
     <aside class="panel missions" id="missions" aria-label="Missions">
-      {describing.value ? <NewMissionForm /> : <MissionList />}
+      <div class="panel-scroll">{describing.value ? <NewMissionForm /> : <MissionList />}</div>
+      <Grip what="the missions" size={panelWidth} side="right" least={240} most={640} id="grip-missions" />
     </aside>
   );
 }

@@ -5,7 +5,7 @@ import { render } from "preact";
 import SPEC from "../api/mission.json";
 import type { LngLat, MissionView, Place, PolygonGeometry, WaypointView } from "../api/types";
 import { ringOf } from "../map/area";
-import type { Chart, Padding, Pin } from "../map/chart";
+import type { Chart, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { outliersOf, placeOf } from "../map/crossings";
 import { paletteOf } from "../map/layers";
@@ -41,6 +41,7 @@ import {
   marked,
   measured,
   mission,
+  panelOpen,
   replayStep,
   reviewed,
   seaFloor,
@@ -66,6 +67,7 @@ import {
 } from "../state/store";
 import { tilesAddress } from "../state/tiles";
 import { VehicleMark, WaypointMark } from "./marks";
+import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./room";
 
 /** For measurements: when something was shown for the first time. */
 function markOnce(name: string): void {
@@ -95,8 +97,14 @@ export function follow(chart: Chart): () => void {
       });
     }),
     followDraft(chart),
+    effect(() => chart.setCovers(covers.value)),
     effect(() => {
       stripHeight.value;
+      legendReach.value;
+      panelOpen.value;
+      panelWidth.value;
+      cardsWidth.value;
+      shownFolded.value;
       requestAnimationFrame(() => chart.refit());
     }),
     followDrawing(chart),
@@ -404,11 +412,4 @@ function pastPins(): Pin[] {
       },
     ];
   });
-}
-
-/** How far panels reach over the map, as the style sheet says for this width of window. */
-export function overlaid(): Padding {
-  const styles = getComputedStyle(document.querySelector(".app") ?? document.body);
-  const pixels = (side: string) => (Number.parseFloat(styles.getPropertyValue(`--over-${side}`)) || 0) + 30;
-  return { top: pixels("top"), right: pixels("right"), bottom: pixels("bottom"), left: pixels("left") };
 }
