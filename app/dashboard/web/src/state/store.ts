@@ -239,6 +239,8 @@ export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
 /** The mission that the one being described begins as a copy of. */
 export const copied = signal<MissionView | null>(null);
+/** The mission that the one being described is to replace. */
+export const editedMission = signal<MissionView | null>(null);
 /** What is being asked before an abort: of the whole team, or of one vehicle. */
 export const abortDialogOpen = signal(false);
 export const abortOne = signal<string | null>(null);
