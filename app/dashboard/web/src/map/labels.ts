@@ -28,6 +28,9 @@ export function boxOf({ at: [x, y], width, height, reach }: Omit<Label, "side">,
   return { left, top, right: left + width, bottom: top + height };
 }
 
+/** How much worse it is to be covered than to touch another label. */
+const UNSEEN = 3;
+
 const common = (a: Box, b: Box) =>
   Math.max(0, Math.min(a.right, b.right) - Math.max(a.left, b.left)) *
   Math.max(0, Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top));
@@ -45,14 +48,16 @@ export function placed(
     right: x + reach,
     bottom: y + reach,
   }));
-  const taken: Box[] = [...covers];
+  const taken: Box[] = [];
   return labels.map((label, i) => {
     const others = signs.filter((_, k) => k !== i);
     const hidden = (side: Side) => {
       const box = boxOf(label, side);
       const seen = { left: 0, top: 0, right: width, bottom: height };
       const beyond = label.width * label.height - common(box, seen);
-      return [...taken, ...others].reduce((sum, other) => sum + common(box, other), beyond);
+      // Under a cover nobody reads it; what two signs share can be told apart.
+      const unseen = covers.reduce((sum, cover) => sum + common(box, cover), beyond);
+      return [...taken, ...others].reduce((sum, other) => sum + common(box, other), UNSEEN * unseen);
     };
     const sides = [label.side, ...SIDES.filter((side) => side !== label.side)];
     const best = sides.reduce((a, b) => (hidden(b) < hidden(a) - 1 ? b : a));
