@@ -104,7 +104,8 @@ def test_the_map_tells_what_is_known_and_where_it_is(watched: Watched, service: 
         "performance.getEntriesByType('resource').some(({ name }) => name.includes('land-50m'))",
     )
     assert [one for one in watched.addresses if not one.startswith((service.url, "data:", "blob:"))] == []
-    assert watched.complaints == []
+    # Reading the canvas back is the test's own.
+    assert [words for words in watched.complaints if "getImageData" not in words] == []
 
 
 def test_panels_keep_the_size_that_they_were_given_and_the_map_keeps_clear_of_them(

@@ -42,14 +42,15 @@ const UPPER = 0.4;
 /** Between what is to be seen and what lies over the map's edges, pixels. */
 const FREE_PX = 30;
 
-/** How far panels and the legend reach over the map. */
+/** How far panels, tools and the legend reach over the map. */
 export function overlaid(): Padding {
   const width = (panel: string) => document.querySelector(panel)?.getBoundingClientRect().width ?? 0;
   const { top, bottom } = legendReach.peek();
   const [left, right, below] = isNarrow.peek()
     ? [0, 0, bottom]
     : [width(".missions"), width(".cards-column"), mission.peek() ? stripHeight.peek() : 0];
-  return { top: top + FREE_PX, right: right + FREE_PX, bottom: below + FREE_PX, left: left + FREE_PX };
+  const tools = width(".map-tools");
+  return { top: top + FREE_PX, right: right + tools + FREE_PX, bottom: below + FREE_PX, left: left + FREE_PX };
 }
 
 /** Keeps an eye on what lies over the map; returns what ends that. */
