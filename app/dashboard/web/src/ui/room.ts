@@ -50,7 +50,12 @@ export function overlaid(): Padding {
     ? [0, 0, bottom]
     : [width(".missions"), width(".cards-column"), mission.peek() ? stripHeight.peek() : 0];
   const tools = width(".map-tools");
-  return { top: top + FREE_PX, right: right + tools + FREE_PX, bottom: below + FREE_PX, left: left + FREE_PX };
+  return {
+    top: top + FREE_PX,
+    right: right + tools + FREE_PX,
+    bottom: below + FREE_PX,
+    left: left + FREE_PX,
+  };
 }
 
 /** Keeps an eye on what lies over the map; returns what ends that. */
