@@ -62,7 +62,8 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
 
 /** What a template says of a mission elsewhere: everything but its name and its places. */
 export function withTemplate(template: NewMission, draft: Draft): Draft {
-  const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } = draft;
+  const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
+    draft;
   const { own, ...settings } = draftOf(template);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
   return {
