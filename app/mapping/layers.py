@@ -101,6 +101,8 @@ class LayerKind:
         Whether it can be asked for beside what the map's JSON always has, as a picture, and stands in every file.
     live
         Whether it changes with every sounding, not only with the map.
+    of_depths
+        Whether its values are as sure as the depths: the dashboard fades them where those are guessed.
     """
 
     name: str
@@ -118,6 +120,7 @@ class LayerKind:
     in_pictures: bool = True
     in_files: bool = True
     live: bool = False
+    of_depths: bool = False
     absence: str = ""
     remedy: str = ""
 
@@ -219,6 +222,7 @@ LAYERS = {
             scale=100,
             in_every_tile=True,
             in_json=False,
+            of_depths=True,
         ),
         LayerKind(
             "uncertainty",
@@ -284,6 +288,7 @@ LAYERS = {
             lambda source: slope_deg(source.map.depth_m, source.map.grid.cell_m),
             Palette.MATTER,
             scale=10,
+            of_depths=True,
         ),
         LayerKind(
             "tvu_fraction",
@@ -306,6 +311,7 @@ LAYERS = {
             Palette.BALANCE,
             fit=Fit.ABOUT_ZERO,
             scale=100,
+            of_depths=True,
             absence="the mission has no reference grid to differ from",
             remedy="Send one: PUT /api/v1/missions/{id}/reference",
         ),

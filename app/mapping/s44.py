@@ -5,6 +5,7 @@ soundings alone cannot show. So nothing here claims an order; it says in how man
 horizontal uncertainties (TVU, THU) stay within an order's maxima.
 """
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -51,6 +52,11 @@ HORIZONTAL = {
     Order.ORDER_2: (20.0, 0.1),
 }
 """Per order metres and the part of the depth that the largest allowed THU is the sum of."""
+
+
+def strictest_sd_m(order: Order) -> float:
+    """Return the standard deviation that meets an order's largest TVU at every depth: that of none, to a millimetre."""
+    return math.floor(1000 * COEFFICIENTS[order][0] / NORMAL_95) / 1000
 
 
 def max_thu_m(depth_m: FloatArray, order: Order) -> FloatArray:

@@ -149,8 +149,20 @@ def test_no_serious_fault_for_people_who_see_or_steer_otherwise(page: Page, serv
         pytest.skip("axe-core is missing: npm ci in app/dashboard/web")
     show(page, flown)
     expect(by_id(page, "range-low")).to_be_visible()
-    for prepare in ("", "toggle-log", "toggle-charts", "toggle-soundings", "new-mission"):
-        if prepare:
+    states = (
+        "",
+        "toggle-legend",
+        "go-to",
+        "toggle-log",
+        "toggle-charts",
+        "toggle-soundings",
+        "fold-cards",
+        "new-mission",
+    )
+    for prepare in (*states, "expert"):
+        if prepare == "expert":
+            page.get_by_text("Expert settings").click()
+        elif prepare:
             by_id(page, prepare).click()
         page.evaluate(axe.read_text())
         found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")

@@ -51,6 +51,16 @@ def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(
         by_id(page, f"toggle-{pane}").click()
         expect_on_top(page, "abort")
     by_id(page, "toggle-log").click()
+    by_id(page, "toggle-legend").click()
+    expect_on_top(page, "abort")
+    by_id(page, "open-links").click()
+    expect(by_id(page, "links-dialog")).to_be_visible()
+    expect_on_top(page, "abort")
+    page.keyboard.press("Escape")
+    # Each vehicle's own stop: in sight, or a movement of its row away.
+    for name in ("sim-1", "sim-2"):
+        by_id(page, f"abort-{name}").scroll_into_view_if_needed()
+        expect_on_top(page, f"abort-{name}")
     by_id(page, "finish").click()
     expect(by_id(page, "finish-dialog")).to_be_visible()
     expect_on_top(page, "abort")
@@ -59,6 +69,10 @@ def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(
     if not by_id(page, "new-mission").is_visible():
         by_id(page, "toggle-missions").click()
     expect_on_top(page, "abort")
+    by_id(page, "new-mission").click()
+    expect(by_id(page, "mission-form")).to_be_visible()
+    expect_on_top(page, "abort")
+    page.get_by_role("button", name="Cancel").click()
     by_id(page, "open-fleet").click()
     expect(by_id(page, "fleet-dialog")).to_be_visible()
     expect_on_top(page, "abort")

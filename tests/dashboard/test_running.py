@@ -26,7 +26,8 @@ def test_a_mission_from_the_form_to_its_abort(watched: Watched, service: Service
         "simulated": "2",
     }.items():
         by_id(page, f"field-{field}").fill(value)
-    by_id(page, "planner-random").check()
+    page.get_by_text("Expert settings").click()
+    by_id(page, "field-planner").select_option("random")
     by_id(page, "create-mission").click()
 
     expect(by_id(page, "mission-name")).to_have_text("Quay <b>north</b>")

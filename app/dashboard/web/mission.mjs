@@ -25,8 +25,9 @@ function* leaves(schema, path = []) {
   if (properties) return;
   if (items) yield* leaves(items, path);
   const kept = Object.entries(rest).filter(([key]) => KEPT.test(key));
+  const orders = rest["x-orders"] ? { orders: rest["x-orders"] } : {};
   const example = typeof examples?.[0] === "number" ? { example: examples[0] } : {};
-  yield [path.join("."), { ...Object.fromEntries(kept), ...example, ...(nullable ? { nullable } : {}) }];
+  yield [path.join("."), { ...Object.fromEntries(kept), ...example, ...orders, ...(nullable ? { nullable } : {}) }];
 }
 
 /** Values by their paths. */

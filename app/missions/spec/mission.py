@@ -18,6 +18,7 @@ from app.estimation.uncertainty import SoundingErrors
 from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
+from app.mapping.s44 import Order, strictest_sd_m
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry
 from app.missions.spec.budget import Allowance, Budget, Steps
@@ -424,6 +425,8 @@ class MissionSpec(Model):
         gt=0,
         le=100,
         description="Standard deviation below which a cell counts as accurately known",
+        # What each order of S-44 asks for where it is strictest.
+        json_schema_extra={"x-orders": {order.spoken: strictest_sd_m(order) for order in Order}},
     )
     sounding_noise: float = Field(
         default=0.01,

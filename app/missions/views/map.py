@@ -55,6 +55,7 @@ class LayerView(View):
     in_json: bool = Field(description="The map's JSON has it when asked for it by `layer`")
     in_pictures: bool = Field(description="It can be seen as `map.overlay.png`")
     in_files: bool = Field(description="Files with every layer have it")
+    of_depths: bool = Field(description="Its values are as sure as the depths: guessed where those are")
     absence: str = Field(description="Why a mission may have no such layer; empty: each has it")
     remedy: str
 

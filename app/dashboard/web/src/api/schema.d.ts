@@ -3145,6 +3145,11 @@ export interface components {
              */
             in_files: boolean;
             /**
+             * Of Depths
+             * @description Its values are as sure as the depths: guessed where those are
+             */
+            of_depths: boolean;
+            /**
              * Absence
              * @description Why a mission may have no such layer; empty: each has it
              */

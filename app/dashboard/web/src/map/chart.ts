@@ -7,15 +7,28 @@ import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { coasts, showsCoast } from "./coast";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "./geo";
-import { type LivelyContent, NOTHING, paintLively, type Sketch } from "./lively";
+import { type Box, type Label, placed, type Side } from "./labels";
+import {
+  type LivelyContent,
+  NOTHING,
+  paintLively,
+  SIGN_REACH_PX,
+  type Sides,
+  type Sketch,
+  WORDS_FONT,
+  WORDS_HEIGHT_PX,
+} from "./lively";
 import type { PlaceMark, Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
+import type { Projection } from "./projection";
 import { Sheets } from "./sheets";
 import type { ShipMark } from "./ships";
 import { type Site, sitePicture } from "./site";
 import { imageOf, paintStill, type StillContent } from "./still";
+import type { Pixel } from "./strokes";
 import type { SwathLine } from "./swath";
 import type { TargetMark } from "./targets";
 
@@ -33,6 +46,16 @@ export interface Pin {
 export interface GridFrame extends Graticule {
   xOf: (longitude: number) => number;
   yOf: (latitude: number) => number;
+}
+
+/** A layer as the worker painted it, and where it lies; contours' levels are divided by `scale`. */
+export interface PaintedFloor {
+  corners: readonly LngLat[];
+  rows: number;
+  cols: number;
+  picture: PictureResult;
+  scale: number;
+  interval: number;
 }
 
 export interface ChartHooks {
@@ -59,9 +82,15 @@ export class Chart {
   readonly #map: MapLibreMap;
   readonly #sheets: Sheets;
   readonly #pins = new Map<string, Marker>();
+  /** Sizes of pins' labels, and the sides on which all labels are. */
+  readonly #labels = new Map<string, Pick<Label, "width" | "height" | "reach">>();
+  #sides = new Map<string, Side>();
+  #covers: readonly Box[] = [];
   #look: Look;
   #still: StillContent = {
+    lands: [],
     floor: null,
+    hatched: true,
     area: null,
     keepOut: [],
     tracks: [],
@@ -74,6 +103,8 @@ export class Chart {
   #draftBounds: Bounds | null = null;
   #fitting: (() => Padding) | null = null;
   #tiles = "";
+  #smooth = true;
+  #askedForCoasts = false;
   #styled = false;
 
   /** Makes the map inside an element. It is drawn on at once; what MapLibre itself shows follows when it is ready. */
@@ -94,7 +125,8 @@ export class Chart {
     this.#sheets = new Sheets(
       map,
       (context, at) => paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]),
-      (context, at) => paintLively(context, at, this.#lively, PAPER[this.#look]),
+      (context, at) =>
+        paintLively(context, at, this.#lively, this.#layLabels(context, at), PAPER[this.#look]),
     );
     map.on("mousemove", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
     map.on("mouseout", () => hooks.onCursor(null));
@@ -105,6 +137,7 @@ export class Chart {
       else hooks.onClick([e.lngLat.lng, e.lngLat.lat]);
     });
     map.on("move", this.#tellFrame);
+    map.on("move", this.#wantCoasts);
     map.on("resize", this.#tellFrame);
     map.on("resize", this.#fitAgain);
     map.on("movestart", (e) => {
@@ -203,25 +236,34 @@ export class Chart {
   }
 
   /** A painted layer with its contours, whose levels are divided by `scale`; null: nothing is known. */
-  setSeaFloor(
-    corners: readonly LngLat[],
-    rows: number,
-    cols: number,
-    picture: PictureResult | null,
-    scale: number,
-    interval: number,
-  ): void {
-    if (!picture && !this.#still.floor) return;
-    const floor = picture && {
-      corners,
-      rows,
-      cols,
-      image: imageOf(picture, this.#still.floor?.image),
-      contours: picture.contours,
-      scale,
-      interval,
+  setSeaFloor(painted: PaintedFloor | null): void {
+    const before = this.#still.floor;
+    if (!painted) {
+      if (before) this.#lay({ floor: null });
+      return;
+    }
+    const { picture, ...how } = painted;
+    const { guessed, width, height, contours } = picture;
+    const floor = {
+      ...how,
+      smooth: this.#smooth,
+      image: imageOf(picture, before?.image),
+      guessed: guessed && imageOf({ pixels: guessed, width, height }, before?.guessed ?? undefined),
+      contours,
     };
     this.#lay({ floor });
+  }
+
+  /** Whether cells of the sea floor flow into each other, or are squares. */
+  setSmooth(smooth: boolean): void {
+    this.#smooth = smooth;
+    const { floor } = this.#still;
+    if (floor) this.#lay({ floor: { ...floor, smooth } });
+  }
+
+  /** Whether what is guessed is hatched. */
+  setHatching(hatched: boolean): void {
+    this.#lay({ hatched });
   }
 
   /** What a search knows of its site; null: there is none, or it is not shown. */
@@ -310,12 +352,21 @@ export class Chart {
         this.#pins.set(pin.key, marker);
       }
       marker.setLngLat(pin.at);
-      pin.draw(marker.getElement());
+      const element = marker.getElement();
+      pin.draw(element);
+      // Signs without words have no label.
+      const words = element.querySelector<HTMLElement>(".mark-label");
+      if (words) {
+        const { offsetWidth: width, offsetHeight: height } = words;
+        this.#labels.set(pin.key, { width, height, reach: element.offsetWidth / 2 });
+      }
     }
     for (const key of gone) {
       this.#pins.get(key)?.remove();
       this.#pins.delete(key);
+      this.#labels.delete(key);
     }
+    this.#sheets.refresh();
   }
 
   #lay(content: Partial<StillContent>): void {
@@ -326,6 +377,46 @@ export class Chart {
   #show(content: Partial<LivelyContent>): void {
     this.#lively = { ...this.#lively, ...content };
     this.#sheets.refresh();
+  }
+
+  /** What lies over the map, in its pixels: labels keep clear of it. */
+  setCovers(covers: readonly Box[]): void {
+    this.#covers = covers;
+    this.#sheets.refresh();
+  }
+
+  /** Finds room for all labels, those of vehicles first, and turns these to their side. */
+  #layLabels(context: CanvasRenderingContext2D, at: Projection): Sides {
+    const { marks, targets } = this.#lively;
+    context.font = WORDS_FONT;
+    const worded = (key: string, place: LngLat, words: string) => ({
+      key,
+      at: [at.x(place[0]), at.y(place[1])] as Pixel,
+      width: context.measureText(words).width,
+      height: WORDS_HEIGHT_PX,
+      reach: SIGN_REACH_PX,
+      side: this.#sides.get(key) ?? "right",
+    });
+    const pinned = [...this.#labels].flatMap(([key, { width, height, reach }]) => {
+      const place = this.#pins.get(key)?.getLngLat();
+      const side = this.#sides.get(key) ?? "right";
+      return place
+        ? [{ key, at: [at.x(place.lng), at.y(place.lat)] as Pixel, width, height, reach, side }]
+        : [];
+    });
+    const labels = [
+      ...pinned,
+      ...marks.map((mark, i) => worded(`mark ${i} ${mark.sign}`, mark.at, mark.words)),
+      ...targets.map((target) => worded(`target ${target.name}`, target.at, target.name)),
+    ];
+    const sides = placed(labels, this.#covers, at.width, at.height);
+    this.#sides = new Map(labels.map(({ key }, i) => [key, sides[i] as Side]));
+    pinned.forEach(({ key }, i) => {
+      const element = this.#pins.get(key)?.getElement();
+      if (element && element.dataset.side !== sides[i]) element.dataset.side = sides[i] as Side;
+    });
+    const own = sides.slice(pinned.length);
+    return { marks: own.slice(0, marks.length), targets: own.slice(marks.length) };
   }
 
   #spotAt(x: number, y: number): Spot | null {
@@ -344,6 +435,24 @@ export class Chart {
     if (this.#fitting && bounds) {
       this.#map.fitBounds(bounds, { padding: this.#fitting(), animate: false, maxZoom: 21 });
     }
+  };
+
+  /** Coasts are fetched when so much is seen that they tell something; charts have better ones. */
+  #wantCoasts = (): void => {
+    const wanted = this.#tiles === "" && showsCoast(this.#map.getZoom());
+    if (!wanted) {
+      if (this.#tiles !== "" && this.#still.lands.length > 0) this.#lay({ lands: [] });
+      return;
+    }
+    if (this.#still.lands.length > 0 || this.#askedForCoasts) return;
+    this.#askedForCoasts = true;
+    coasts()
+      .then((lands) => this.#lay({ lands }))
+      // The service is gone, which is told elsewhere; the next move asks again.
+      .catch(() => undefined)
+      .finally(() => {
+        this.#askedForCoasts = false;
+      });
   };
 
   #tellFrame = (): void => {

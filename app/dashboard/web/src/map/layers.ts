@@ -1,6 +1,7 @@
 /** What can be shown of the map, as the service declares it: each layer's colours and range. Pure. */
 
 import type { LayerView } from "../api/types";
+import { isMeasured } from "./certainty";
 import { DEPTH_PALETTES, type DepthPalette, PALETTES, type Palette, roundRange } from "./palette";
 import { type SeaFloor, UNKNOWN } from "./seafloor";
 
@@ -20,7 +21,10 @@ export function paletteOf(layer: LayerView, depth: DepthPalette): Palette | null
   return layer.palette === "deep" ? DEPTH_PALETTES[depth].palette : PALETTES[layer.palette];
 }
 
-/** A pleasant range that holds all of a layer's values; null while there are none. */
+/**
+ * A pleasant range that holds all of a layer's values, of one that is of depths those that were measured: what is guessed
+ * may be anything. Null while there are none.
+ */
 export function fittingRange(map: SeaFloor, layer: LayerView): Range | null {
   const values = map.layers[layer.name];
   if (layer.range && values?.some((value) => value !== UNKNOWN)) {
@@ -29,11 +33,13 @@ export function fittingRange(map: SeaFloor, layer: LayerView): Range | null {
   const scale = map.scales[layer.name] ?? 1;
   let low = Number.POSITIVE_INFINITY;
   let high = Number.NEGATIVE_INFINITY;
-  for (const value of values ?? []) {
-    if (value === UNKNOWN) continue;
+  const { flags } = map.layers;
+  const measured = layer.of_depths && flags?.some(isMeasuredCell) ? flags : null;
+  values?.forEach((value, at) => {
+    if (value === UNKNOWN || (measured && !isMeasuredCell(measured[at] as number))) return;
     if (value < low) low = value;
     if (value > high) high = value;
-  }
+  });
   if (low > high) return null;
   if (layer.fit === "about_zero") {
     const [, to] = roundRange(0, Math.max(Math.abs(low), Math.abs(high), 1) / scale);
@@ -42,6 +48,8 @@ export function fittingRange(map: SeaFloor, layer: LayerView): Range | null {
   const [from, to] = roundRange(layer.fit === "data" ? low / scale : 0, high / scale);
   return { low: from, high: to > from ? to : from + 1 };
 }
+
+const isMeasuredCell = (flags: number) => flags !== UNKNOWN && isMeasured(flags);
 
 /** Share of the cells with each of the values 0, 1, 2 and so on. */
 export function classShares(map: SeaFloor, { name, classes }: LayerView): number[] {

@@ -2,6 +2,7 @@
 
 import type { LngLat, PolygonGeometry } from "../api/types";
 import { circle } from "./geo";
+import { boxOf, type Side } from "./labels";
 import type { PlaceMark, Route, Spot, Track } from "./marks";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
@@ -34,6 +35,17 @@ export interface LivelyContent {
   sketch: Sketch | null;
 }
 
+/** Where the words of signs are written: those of places first, then those of targets. */
+export interface Sides {
+  marks: readonly Side[];
+  targets: readonly Side[];
+}
+
+/** From a sign's middle to its words, and the height of these, pixels. */
+export const SIGN_REACH_PX = 14;
+export const WORDS_HEIGHT_PX = 15;
+export const WORDS_FONT = "12px sans-serif";
+
 export const NOTHING: LivelyContent = {
   draft: { area: null, keepOut: [] },
   ranges: [],
@@ -55,6 +67,7 @@ export function paintLively(
   context: CanvasRenderingContext2D,
   at: Projection,
   content: LivelyContent,
+  sides: Sides,
   paper: Paper,
 ): void {
   const { draft, ranges, tails, swaths, routes, targets, ships, pointed, marks, spots, measure, sketch } =
@@ -71,7 +84,9 @@ export function paintLively(
   for (const { at: place, radius_m, colour } of ranges) {
     line(context, at, circle(place, radius_m, 72), { colour, width: 1, dash: [4, 3] });
   }
-  for (const mark of marks) paintMark(context, at, mark, paper);
+  marks.forEach((mark, i) => {
+    paintMark(context, at, mark, sides.marks[i] ?? "right", paper);
+  });
   for (const tail of tails) way(context, at, tail, paper.casing);
   for (const { ends, colour, opacity } of swaths) {
     line(context, at, ends, { colour: paper.casing, width: 7, opacity: 0.65 * opacity });
@@ -82,7 +97,9 @@ export function paintLively(
     if (to) line(context, at, circle(to, arrivalRadius_m), { colour, width: 1.5, opacity: 0.8 });
     line(context, at, points, acknowledged ? { colour, width: 2.5 } : { colour, width: 2, dash: [3, 4] });
   }
-  for (const target of targets) paintTarget(context, at, target, paper);
+  targets.forEach((target, i) => {
+    paintTarget(context, at, target, sides.targets[i] ?? "right", paper);
+  });
   for (const ship of ships) paintShip(context, at, ship, pointed, paper);
   for (const { at: place, state, chosen } of spots) {
     const edge = { colour: "#10181d", width: chosen ? 3 : 1.5 };
@@ -102,11 +119,12 @@ function paintTarget(
   context: CanvasRenderingContext2D,
   at: Projection,
   { name, accurate, at: place, ring }: TargetMark,
+  side: Side,
   paper: Paper,
 ): void {
   line(context, at, ring, { colour: paper.ink, width: accurate ? 2 : 1.5, dash: [6, 4] });
   dot(context, at, place, 6, accurate ? paper.ink : paper.casing, { colour: paper.ink, width: 2 });
-  label(context, at, place, name, paper);
+  label(context, at, place, name, side, paper);
 }
 
 const NEAR_PX = 16;
@@ -138,7 +156,7 @@ function paintShip(
     stroke(context, { colour, width: 2 });
   }
   const near = pointed !== null && Math.hypot(at.x(pointed[0]) - x, at.y(pointed[1]) - y) < NEAR_PX;
-  if (alarm || near) label(context, at, place, words, paper);
+  if (alarm || near) label(context, at, place, words, "right", paper);
 }
 
 /** A ship's outline: to starboard and ahead, pixels. */
@@ -153,20 +171,27 @@ function label(
   at: Projection,
   place: LngLat,
   words: string,
+  side: Side,
   paper: Paper,
 ): void {
-  context.font = "12px sans-serif";
+  context.font = WORDS_FONT;
+  const width = context.measureText(words).width;
+  const box = boxOf(
+    { at: [at.x(place[0]), at.y(place[1])], width, height: WORDS_HEIGHT_PX, reach: SIGN_REACH_PX },
+    side,
+  );
+  const [x, y] = [box.left, (box.top + box.bottom) / 2];
   context.textAlign = "start";
   context.textBaseline = "middle";
   context.lineWidth = 3.2;
   context.setLineDash([]);
   context.strokeStyle = paper.casing;
-  context.strokeText(words, at.x(place[0]) + 14, at.y(place[1]));
+  context.strokeText(words, x, y);
   context.fillStyle = paper.ink;
-  context.fillText(words, at.x(place[0]) + 14, at.y(place[1]));
+  context.fillText(words, x, y);
 }
 
-/** Outlines of signs about their place, pixels: a star, a door, a mast and a house. */
+/** Outlines of signs about their place, pixels: a star, a door, a mast, a house, a pin's head, and a boat from above. */
 const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> = {
   goal: [...Array(10).keys()].map((i) => {
     const away = i % 2 === 0 ? 9 : 4;
@@ -183,6 +208,20 @@ const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> =
     [5, -10],
     [-5, -10],
   ],
+  position: [
+    [0, 0],
+    [-7, -12],
+    [-4, -19],
+    [4, -19],
+    [7, -12],
+  ],
+  own: [
+    [0, -12],
+    [6, -3],
+    [6, 9],
+    [-6, 9],
+    [-6, -3],
+  ],
   home: [
     [0, -10],
     [10, -1],
@@ -194,10 +233,17 @@ const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> =
   ],
 };
 
+const FILLS: Partial<Record<PlaceMark["sign"], string>> = {
+  goal: "#ffd24d",
+  position: "#e0452f",
+  own: "#3aa0ff",
+};
+
 function paintMark(
   context: CanvasRenderingContext2D,
   at: Projection,
   { at: place, sign, words, radius_m }: PlaceMark,
+  side: Side,
   paper: Paper,
 ): void {
   if (radius_m > 0) {
@@ -211,10 +257,10 @@ function paintMark(
     else context.lineTo(at.x(place[0]) + x, at.y(place[1]) + y);
   });
   context.closePath();
-  context.fillStyle = sign === "goal" ? "#ffd24d" : paper.casing;
+  context.fillStyle = FILLS[sign] ?? paper.casing;
   context.fill();
   stroke(context, { colour: paper.ink, width: 2 });
-  if (words) label(context, at, place, words, paper);
+  if (words) label(context, at, place, words, side, paper);
 }
 
 function paintSketch(context: CanvasRenderingContext2D, at: Projection, { lines, handles }: Sketch): void {

@@ -24,7 +24,7 @@ export interface Spot {
 /** A place with a name; with a radius, what is about it. */
 export interface PlaceMark {
   words: string;
-  sign: "goal" | "entry" | "transmitter" | "home";
+  sign: "goal" | "entry" | "transmitter" | "home" | "position" | "own";
   at: LngLat;
   radius_m: number;
 }

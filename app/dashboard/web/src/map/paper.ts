@@ -5,6 +5,8 @@ export type Look = "light" | "dark" | "contrast";
 export const PAPER = {
   light: {
     sea: "#e6eef3",
+    land: "#e9e2d0",
+    shore: "#9a8f74",
     grid: "#b3c5d1",
     area: "#16394f",
     keepOut: "#9b1c1c",
@@ -15,6 +17,8 @@ export const PAPER = {
   },
   dark: {
     sea: "#0c1922",
+    land: "#2b2a22",
+    shore: "#6f6a55",
     grid: "#26404f",
     area: "#d5e6f0",
     keepOut: "#ff8f8f",
@@ -25,6 +29,8 @@ export const PAPER = {
   },
   contrast: {
     sea: "#ffffff",
+    land: "#e6e6e6",
+    shore: "#000000",
     grid: "#7a7a7a",
     area: "#000000",
     keepOut: "#b00000",

@@ -1,27 +1,29 @@
 /** Paints layers and finds contours beside the page, so that it never stands still. */
 
 import { type Contour, contours } from "./contours";
-import { type Painting, paint } from "./paint";
+import { FAINT, type Painting, type Picture, paint, strengths } from "./paint";
+import { UNKNOWN } from "./seafloor";
 
 export interface PictureTask {
   id: number;
   painting: Painting;
-  /** Depths and the distance between contours in whole numbers; null: no contours are wanted. */
-  contours: { depths: Int32Array; interval: number } | null;
+  /** The distance between contours in the depths' whole numbers; null: no contours are wanted. */
+  interval: number | null;
 }
 
-export interface PictureResult {
+export interface PictureResult extends Picture {
   id: number;
-  width: number;
-  height: number;
-  pixels: Uint8ClampedArray<ArrayBuffer>;
   contours: Contour[];
 }
 
-self.onmessage = ({ data }: MessageEvent<PictureTask>) => {
-  const { rows, cols } = data.painting;
-  const picture = paint(data.painting);
-  const lines = data.contours ? contours(data.contours.depths, rows, cols, data.contours.interval) : [];
-  const result: PictureResult = { id: data.id, ...picture, contours: lines };
-  self.postMessage(result, { transfer: [picture.pixels.buffer] });
+self.onmessage = ({ data: { id, painting, interval } }: MessageEvent<PictureTask>) => {
+  const { rows, cols, depths } = painting;
+  const strong = strengths(painting);
+  const picture = paint(painting, strong);
+  // What is too unsure has no contours.
+  const drawn = depths.map((depth, at) => ((strong[at] as number) < FAINT ? UNKNOWN : depth));
+  const lines = interval === null ? [] : contours(drawn, rows, cols, interval);
+  const result: PictureResult = { id, ...picture, contours: lines };
+  const sent = [picture.pixels.buffer, ...(picture.guessed ? [picture.guessed.buffer] : [])];
+  self.postMessage(result, { transfer: sent });
 };

@@ -20,6 +20,8 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { LngLat, Place } from "../api/types";
+import { type Certainty, isMeasured } from "./certainty";
+import type { Range } from "./layers";
 import { colourAt, type Palette } from "./palette";
 import { cellOf, type SeaFloor, valueAt } from "./seafloor";
 
@@ -31,6 +33,12 @@ export interface SceneVehicle {
   heading_deg: number | null;
   /** Where no depth is known it lies at the vehicle's. */
   way: readonly Place[];
+}
+
+function isDrawn(map: SeaFloor, row: number, col: number, { none_m }: Certainty): boolean {
+  return (
+    isMeasured(valueAt(map, "flags", row, col) ?? 0) || (valueAt(map, "uncertainty", row, col) ?? 0) < none_m
+  );
 }
 
 /** East is x, up is y, south is z; metres from the middle of the map. */
@@ -86,7 +94,8 @@ export class SeaFloorScene {
     this.#draw();
   }
 
-  setSeaFloor(map: SeaFloor, palette: Palette, low: number, high: number): void {
+  /** Where the map knows too little to be drawn from above there is nothing here either. */
+  setSeaFloor(map: SeaFloor, palette: Palette, { low, high }: Range, certainty: Certainty): void {
     this.#map = map;
     const { rows, cols, cell_m } = map;
     const places = new Float32Array(rows * cols * 3);
@@ -96,7 +105,7 @@ export class SeaFloorScene {
       for (let col = 0; col < cols; col++) {
         const at = row * cols + col;
         const depth = valueAt(map, "depth", row, col);
-        known[at] = depth === null ? 0 : 1;
+        known[at] = depth !== null && isDrawn(map, row, col, certainty) ? 1 : 0;
         places.set([(col + 0.5 - cols / 2) * cell_m, -(depth ?? 0), (rows / 2 - row - 0.5) * cell_m], at * 3);
         const shade = new Color();
         const [r, g, b] = colourAt(palette, depth ?? 0, low, high);

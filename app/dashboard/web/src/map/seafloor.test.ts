@@ -3,8 +3,7 @@ import type { LayerView, LngLat } from "../api/types";
 import { contours } from "./contours";
 import { landmarkShares } from "./landmarks";
 import { fittingRange, shareOutside } from "./layers";
-import { magnification, paint } from "./paint";
-import { colourAt, DEEP, lookupTable, roundRange } from "./palette";
+import { roundRange } from "./palette";
 import { differenceOf, placeIn, readCell, type SeaFloor, UNKNOWN, valueAt, withTiles } from "./seafloor";
 
 const CORNERS: LngLat[] = [
@@ -138,6 +137,7 @@ const layer = (name: string, changes: Partial<LayerView> = {}): LayerView => ({
   in_json: true,
   in_pictures: true,
   in_files: true,
+  of_depths: true,
   absence: "",
   remedy: "",
   ...changes,
@@ -150,6 +150,15 @@ describe("ranges", () => {
     expect(fittingRange(whole(), layer("depth", { fit: "about_zero" }))).toEqual({ low: -6, high: 6 });
     expect(fittingRange(whole(), layer("flags", { range: [0, 2] }))).toEqual({ low: 0, high: 2 });
     expect(fittingRange(whole(), layer("difference"))).toBeNull();
+  });
+
+  it("of depths hold what was measured, while anything was", () => {
+    const cells = { depth: [100, 900, 300, 700], flags: [1, 0, 2, 8] };
+    const guessed = withTiles(null, answer({ 0: cells }, { cols: 2, tile: 2 })) as SeaFloor;
+    expect(fittingRange(guessed, layer("depth"))).toEqual({ low: 1, high: 3 });
+    expect(fittingRange(guessed, layer("depth", { of_depths: false }))).toEqual({ low: 0, high: 10 });
+    const nothing = withTiles(null, answer({ 0: { ...cells, flags: [0, 0, 0, 8] } }, { cols: 2, tile: 2 }));
+    expect(fittingRange(nothing as SeaFloor, layer("depth"))).toEqual({ low: 0, high: 10 });
   });
 
   it("tell how much of the map lies outside", () => {
@@ -166,50 +175,6 @@ it("landmarks are never seen, visible or accurate", () => {
   const flags = [0, 8, 8 | 4, 1 | 8 | 4];
   const map = withTiles(null, answer({ 0: { depth: [1, 1, 1, 1], flags } }, { cols: 2, tile: 2 }));
   expect(landmarkShares(map as SeaFloor)).toEqual([0.25, 0.25, 0.5]);
-});
-
-describe("painting", () => {
-  const painted = (hatched: boolean, flags = [1, 1, 1, 0, 1, 1]) =>
-    paint({
-      rows: 2,
-      cols: 3,
-      values: Int32Array.from([0, 50, 100, 300, UNKNOWN, -9]),
-      flags: Int32Array.from(flags),
-      low: 0,
-      high: 100,
-      table: lookupTable(DEEP),
-      hatched,
-    });
-  const at = ({ pixels, width }: ReturnType<typeof painted>, x: number, y: number) => [
-    ...pixels.subarray(4 * (y * width + x), 4 * (y * width + x) + 4),
-  ];
-  const rgb = (value: number) => [...colourAt(DEEP, value, 0, 100).map(Math.round), 255];
-
-  it("puts the northern row first and leaves unknown cells out", () => {
-    const picture = painted(false);
-    expect([picture.width, picture.height]).toEqual([3, 2]);
-    expect(at(picture, 0, 1)).toEqual(rgb(0));
-    expect(at(picture, 2, 1)).toEqual(rgb(100));
-    expect(at(picture, 1, 0)[3]).toBe(0);
-  });
-
-  it("gives values outside the range the end's colour", () => {
-    expect(at(painted(false), 0, 0)).toEqual(rgb(100));
-    expect(at(painted(false), 2, 0)).toEqual(rgb(0));
-  });
-
-  it("stripes only the cells that were filled in", () => {
-    const size = magnification(2, 3);
-    const colours = (col: number, row: number) => {
-      const picture = painted(true);
-      const seen = new Set<string>();
-      for (let y = 0; y < size; y++)
-        for (let x = 0; x < size; x++) seen.add(at(picture, col * size + x, row * size + y).join());
-      return seen.size;
-    };
-    expect(colours(0, 0)).toBe(3);
-    expect(colours(0, 1)).toBe(1);
-  });
 });
 
 describe("contours", () => {

@@ -89,16 +89,23 @@ export interface CellReading {
 }
 
 /** Row and column of a place, with fractions; null outside the grid, which is a parallelogram between its corners. */
-export function cellOf(map: SeaFloor, [lng, lat]: Place): { row: number; col: number } | null {
-  const [northWest, , southEast, southWest] = map.corners;
-  if (!northWest || !southEast || !southWest) return null;
+export function cellOf(map: SeaFloor, place: Place): { row: number; col: number } | null {
+  const { row, col } = gridPlace(map, place);
+  return row >= 0 && row < map.rows && col >= 0 && col < map.cols ? { row, col } : null;
+}
+
+/** Row and column of a place, with fractions, also outside the grid. */
+export function gridPlace(
+  map: Pick<SeaFloor, "corners" | "rows" | "cols">,
+  [lng, lat]: Place,
+): { row: number; col: number } {
+  const [northWest, , southEast, southWest] = map.corners as [LngLat, LngLat, LngLat, LngLat];
   const eastward = [southEast[0] - southWest[0], southEast[1] - southWest[1]] as const;
   const northward = [northWest[0] - southWest[0], northWest[1] - southWest[1]] as const;
   const to = [lng - southWest[0], lat - southWest[1]] as const;
   const determinant = eastward[0] * northward[1] - eastward[1] * northward[0];
   const u = (to[0] * northward[1] - to[1] * northward[0]) / determinant;
   const v = (eastward[0] * to[1] - eastward[1] * to[0]) / determinant;
-  if (!(u >= 0 && u < 1 && v >= 0 && v < 1)) return null;
   return { row: v * map.rows, col: u * map.cols };
 }
 

@@ -1,12 +1,12 @@
 /** What lies still on the map: the sea floor with its contours, the grid, area and zones, where vehicles have been. */
 
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { type Land, paintCoasts, showsCoast } from "./coast";
 import type { Contour } from "./contours";
 import { graticule, graticuleStep } from "./geo";
 import type { Track } from "./marks";
 import { type Paper, striped } from "./paper";
 import { line, stroke, trace, way } from "./pen";
-import type { PictureResult } from "./picture.worker";
 import type { Projection } from "./projection";
 import { labelPlaces, type Pixel, simplified } from "./strokes";
 
@@ -16,6 +16,9 @@ const LABEL_PX = 12;
 const LABEL_SPACING_PX = 260;
 /** Free room around a label. */
 const LABEL_PADDING_PX = 8;
+/** Between the stripes of what is guessed, and how strong they are. */
+const STRIPES_PX = 9;
+const HATCHED = 0.3;
 /** Every so many contours one is drawn stronger and labelled. */
 const MAIN_EVERY = 2;
 
@@ -24,6 +27,10 @@ export interface FloorPicture {
   rows: number;
   cols: number;
   image: HTMLCanvasElement;
+  /** Opaque where depths are guessed; null where nothing is. */
+  guessed: HTMLCanvasElement | null;
+  /** Whether cells flow into each other. */
+  smooth: boolean;
   contours: readonly Contour[];
   /** Contours' levels are whole numbers: so many make a metre. */
   scale: number;
@@ -31,7 +38,11 @@ export interface FloorPicture {
 }
 
 export interface StillContent {
+  /** Coasts of the world, where they are wanted and here. */
+  lands: readonly Land[];
   floor: FloorPicture | null;
+  /** Whether what is guessed is hatched. */
+  hatched: boolean;
   area: PolygonGeometry | null;
   keepOut: readonly PolygonGeometry[];
   tracks: readonly Track[];
@@ -45,7 +56,7 @@ export interface StillContent {
 
 /** A picture as something that can be drawn again and again. */
 export function imageOf(
-  picture: Pick<PictureResult, "pixels" | "width" | "height">,
+  picture: { pixels: Uint8ClampedArray<ArrayBuffer>; width: number; height: number },
   before: HTMLCanvasElement | undefined,
 ): HTMLCanvasElement {
   const canvas = before ?? document.createElement("canvas");
@@ -61,11 +72,17 @@ export function paintStill(
   context: CanvasRenderingContext2D,
   at: Projection,
   window: Projection,
-  { floor, area, keepOut, tracks, holidays, crossings, site }: StillContent,
+  { lands, floor, hatched, area, keepOut, tracks, holidays, crossings, site }: StillContent,
   paper: Paper,
 ): void {
   context.lineCap = context.lineJoin = "round";
-  if (floor) paintFloor(context, at, floor);
+  if (showsCoast(window.camera.zoom)) paintCoasts(context, at, lands, paper);
+  if (floor) {
+    context.save();
+    clip(context, at, area);
+    paintFloor(context, at, hatched ? floor : { ...floor, guessed: null }, paper);
+    context.restore();
+  }
   if (site) paintGridded(context, at, site.corners, site.image);
   paintGrid(context, at, window, paper);
   for (const zone of keepOut) paintStriped(context, at, zone.coordinates as LngLat[][], paper.keepOut);
@@ -75,6 +92,14 @@ export function paintStill(
   }
   for (const track of tracks) way(context, at, track, paper.casing);
   for (const place of crossings) paintCrossing(context, at, place, paper);
+}
+
+/** Nothing is known beyond the area: cells that it cuts are drawn as far as it reaches. */
+function clip(context: CanvasRenderingContext2D, at: Projection, area: PolygonGeometry | null): void {
+  if (!area) return;
+  context.beginPath();
+  for (const ring of area.coordinates) trace(context, at, ring as LngLat[], true);
+  context.clip("evenodd");
 }
 
 /** Half the width of the sign of a crossing, pixels. */
@@ -102,6 +127,7 @@ function paintGridded(
   at: Projection,
   corners: readonly LngLat[],
   image: HTMLCanvasElement,
+  smooth = false,
 ): { northWest: Pixel; east: Pixel; south: Pixel } | null {
   const [northWest, northEast, , southWest] = corners.map(([lng, lat]): Pixel => [at.x(lng), at.y(lat)]);
   if (!northWest || !northEast || !southWest) return null;
@@ -117,23 +143,62 @@ function paintGridded(
     northWest[0],
     northWest[1],
   );
-  // Enlarged, cells stay cells.
-  context.imageSmoothingEnabled = Math.hypot(...east) < image.width;
+  context.imageSmoothingEnabled = smooth || Math.hypot(...east) < image.width;
+  context.imageSmoothingQuality = "high";
   context.drawImage(image, 0, 0);
   context.restore();
   return { northWest, east, south };
 }
 
-function paintFloor(context: CanvasRenderingContext2D, at: Projection, floor: FloorPicture): void {
+function paintFloor(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  floor: FloorPicture,
+  paper: Paper,
+): void {
   const { rows, cols } = floor;
-  const placed = paintGridded(context, at, floor.corners, floor.image);
+  const placed = paintGridded(context, at, floor.corners, floor.image, floor.smooth);
   if (!placed) return;
+  if (floor.guessed) paintGuessed(context, at, floor, floor.guessed, paper);
   const { northWest, east, south } = placed;
   const pixel = ([col, row]: [number, number]): Pixel => {
     const [u, v] = [col / cols, 1 - row / rows];
     return [northWest[0] + u * east[0] + v * south[0], northWest[1] + u * east[1] + v * south[1]];
   };
   paintContours(context, at, floor, pixel);
+}
+
+/** Where what is guessed is hatched first, then laid on the sheet. */
+let hatchSheet: CanvasRenderingContext2D | null = null;
+
+/** Hatches what is guessed: stripes of the sheet, whatever the size of cells, that stay where they are on the ground. */
+function paintGuessed(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  { corners, smooth }: FloorPicture,
+  guessed: HTMLCanvasElement,
+  paper: Paper,
+): void {
+  hatchSheet ??= document.createElement("canvas").getContext("2d");
+  const corner = corners[0];
+  if (!hatchSheet || !corner) return;
+  const { canvas } = hatchSheet;
+  canvas.width = context.canvas.width;
+  canvas.height = context.canvas.height;
+  hatchSheet.setTransform(context.getTransform());
+  const pattern = hatchSheet.createPattern(striped(paper.ink, STRIPES_PX, 1), "repeat");
+  if (!pattern) return;
+  const phase = (pixels: number) => Math.round(pixels) % STRIPES_PX;
+  pattern.setTransform(new DOMMatrix([1, 0, 0, 1, phase(at.x(corner[0])), phase(at.y(corner[1]))]));
+  hatchSheet.fillStyle = pattern;
+  hatchSheet.fillRect(0, 0, at.width, at.height);
+  hatchSheet.globalCompositeOperation = "destination-in";
+  paintGridded(hatchSheet, at, corners, guessed, smooth);
+  context.save();
+  context.resetTransform();
+  context.globalAlpha = HATCHED;
+  context.drawImage(canvas, 0, 0);
+  context.restore();
 }
 
 function paintContours(

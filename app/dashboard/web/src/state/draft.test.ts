@@ -11,6 +11,7 @@ import {
   faultsOf,
   fieldOf,
   toMission,
+  vehicleNames,
 } from "./draft";
 
 const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
@@ -225,7 +226,7 @@ describe("the length of a mission", () => {
 it("says before the start how long it takes at most and how dense it gets", () => {
   expect(
     estimate({ ...draft, simulated: "2", steps: "100", max_step_m: "10", speed_mps: "1" }, 10_000),
-  ).toEqual({
+  ).toMatchObject({
     seconds: 1000,
     metres: 2000,
     spacing_m: 5,
@@ -239,11 +240,11 @@ describe("names of simulated vehicles", () => {
     expect(mission.vehicles.map((v) => v.name)).toEqual(["north", "south"]);
   });
 
-  it.each([
-    ["north", "1 names for 2 vehicles"],
-    ["north, north", "Two vehicles are called north"],
-  ])("%s is refused", (names, words) => {
-    expect(faultsOf({ ...draft, simulated: "2", names }).names).toContain(words);
+  it("are filled up with such as nobody else has, and refused where two are the same", () => {
+    const named = (names: string) => ({ ...draft, simulated: "2", names });
+    expect(vehicleNames(named("sim-1"))).toEqual(["sim-1", "sim-2"]);
+    expect(vehicleNames(named("north, south, west"))).toEqual(["north", "south"]);
+    expect(faultsOf(named("north, north")).names).toContain("Two vehicles are called north");
   });
 });
 
@@ -328,4 +329,27 @@ describe("a site", () => {
     expect(toMission({ ...copy, site: "" })).not.toHaveProperty("site");
     expect(fieldOf("site")).toBe("site");
   });
+});
+
+it("lines so far apart ask of each vehicle its share of the way, also when the area changes", () => {
+  const draft = { ...emptyDraft([-8.7, 41.2]), name: "Lines", spacing_m: "10", simulated: "2" };
+  const small = { ...draft, east_m: "200", north_m: "100" };
+  expect(toMission(small).budget).toEqual({ km_per_vehicle: 1 });
+  expect(toMission({ ...small, north_m: "200" }).budget).toEqual({ km_per_vehicle: 2 });
+  expect(estimate(small, 20_000)?.spacing_m).toBeCloseTo(10, 1);
+  expect(faultsOf({ ...small, spacing_m: "0" }).spacing_m).toContain("Distance of lines must be more than 0");
+});
+
+it("tells whether each vehicle's energy lasts, and how far it is from home", () => {
+  const draft = {
+    ...emptyDraft([-8.7, 41.2]),
+    ...{ length: "minutes" as const, minutes: "30", recovery: "41.2, -8.7", east_m: "100", north_m: "100" },
+    own: { "sim-2": { endurance_min: "20" } },
+  };
+  const found = estimate(draft, 10_000);
+  expect(found?.shares.map(({ seconds, endurance_s }) => [Math.round(seconds), endurance_s])).toEqual([
+    [1800, null],
+    [1800, 1200],
+  ]);
+  expect(found?.farthest_m).toBeCloseTo(Math.hypot(50, 50), 0);
 });

@@ -2,14 +2,13 @@
 
 import SPEC from "../api/mission.json";
 import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSpec } from "../api/types";
-import { areaFault, polygonOf, ringOf } from "../map/area";
-import { rectangle } from "../map/geo";
+import { areaFault, polygonOf, ringOf, sizeOf } from "../map/area";
+import { rectangle, wayBetween } from "../map/geo";
 import {
   FIELDS,
   type FieldName,
   fieldFault,
   fieldsOf,
-  isWithin,
   type LengthUnit,
   type MissionKind,
   numberFault,
@@ -27,6 +26,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./fields";
+import { PLACE_SAMPLE, placeOf, typedPlace } from "./place";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -41,6 +41,8 @@ export interface Draft extends Texts {
   /** Id of the site that a survey belongs to; empty: to none. */
   site: string;
   length: LengthUnit;
+  /** How far apart lines over the whole area are to be, which is another way to give the length; empty: it is given. */
+  spacing_m: string;
   /** As "latitude, longitude". */
   goal: string;
   entry: string;
@@ -75,8 +77,9 @@ export type Faults = Partial<Record<keyof Draft, string>>;
 /** Planners in plain words, the sensible one first. */
 export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: string }>> = {
   cao: {
-    title: "Adaptive",
-    words: "Begins evenly and goes where the map is least sure. The right choice for nearly every survey.",
+    title: "As sure as the time allows",
+    words:
+      "Adaptive: begins evenly and goes where the map is least sure. The right choice for nearly every survey.",
   },
   lawnmower: {
     title: "Even lines",
@@ -88,7 +91,6 @@ export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: st
     words:
       "Lines as far apart as the measured depth lets swath sonars see, then what was missed. Needs a multibeam on every vehicle.",
   },
-  random: { title: "Random", words: "Wanders about. Only to compare the others with." },
 };
 
 /** What the service has no default for. */
@@ -103,6 +105,7 @@ export function emptyDraft(middle: LngLat): Draft {
     kind: "survey",
     site: "",
     length: "steps",
+    spacing_m: "",
     goal: "",
     entry: "",
     obstacles: [],
@@ -180,13 +183,16 @@ export function turnedInto(kind: MissionKind, draft: Draft): Partial<Draft> {
   return { kind, ...Object.fromEntries(untouched.map(([name, field]) => [name, startOf(field, kind)])) };
 }
 
-/** Names of the simulated vehicles, each another one than those that were chosen have. */
+/** Names of the simulated vehicles: those that were given, for the rest such as nobody else has. */
 export function simulatedNames(draft: Draft): string[] {
-  const given = draft.names.split(",").map((name) => name.trim());
-  if (draft.names.trim() !== "") return given.filter((name) => name !== "");
-  const taken = new Set(draft.chosen.map((v) => v.name));
-  const names: string[] = [];
-  for (let n = 1; names.length < Number(draft.simulated); n++) {
+  const wanted = Number(draft.simulated);
+  const given = draft.names
+    .split(",")
+    .map((name) => name.trim())
+    .filter((name) => name !== "");
+  const names = given.slice(0, wanted);
+  const taken = new Set([...draft.chosen.map((v) => v.name), ...names]);
+  for (let n = 1; names.length < wanted; n++) {
     if (!taken.has(`sim-${n}`)) names.push(`sim-${n}`);
   }
   return names;
@@ -229,13 +235,40 @@ const CORNER = [
 ] as const;
 const VEHICLES: Schema = { type: "integer", minimum: 0, maximum: SPEC.vehicles.maxItems };
 
+/** The draft with the length that its lines ask of each vehicle, where it is given by how far they are apart. */
+export function resolved(draft: Draft): Draft {
+  const spacing_m = Number(draft.spacing_m);
+  const vehicles = vehicleNames(draft).length;
+  const corners = cornersOf(draft);
+  if (!(spacing_m > 0) || vehicles === 0 || corners.length < 3) return draft;
+  const each_km = sizeOf(corners).area_m2 / (spacing_m * vehicles * 1000);
+  return { ...draft, length: "km_per_vehicle", km_per_vehicle: String(Number(each_km.toPrecision(3))) };
+}
+
+/** What a mission's length is said in. */
+export type LengthChoice = LengthUnit | "spacing_m";
+
+export const lengthChoiceOf = (draft: Draft): LengthChoice =>
+  draft.spacing_m.trim() === "" ? draft.length : "spacing_m";
+
+/** The length said in something else; lines begin as far apart as the length that there was would lay them. */
+export function withLength(choice: LengthChoice, draft: Draft): Partial<Draft> {
+  if (choice !== "spacing_m") return { length: choice, spacing_m: "" };
+  const corners = cornersOf(draft);
+  const now = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
+  return { spacing_m: now ? String(Number(now.spacing_m.toPrecision(2))) : "1" };
+}
+
 /** What is wrong with a draft, field by field, with what would be right. */
-export function faultsOf(draft: Draft): Faults {
+export function faultsOf(described: Draft): Faults {
   const faults: Faults = {};
+  const draft = resolved(described);
   const note = (field: keyof Draft, fault: string) => {
     if (fault) faults[field] = fault;
   };
   note("name", draft.name.trim() ? "" : "Give the mission a name");
+  if (draft.spacing_m.trim() !== "")
+    note("spacing_m", numberFault("Distance of lines", draft.spacing_m, SIZE));
   if (draft.source === "typed") {
     for (const [field, label, schema] of CORNER) note(field, numberFault(label, draft[field], schema));
   }
@@ -271,12 +304,9 @@ export function faultsOf(draft: Draft): Faults {
     faults.max_depth_m = "Deepest travel must not be above the shallowest";
   }
   if (!faults.simulated) {
-    const names = simulatedNames(draft);
     const all = vehicleNames(draft);
     const twice = all.find((name, i) => all.indexOf(name) !== i);
-    if (names.length !== Number(draft.simulated))
-      faults.names = `${names.length} names for ${draft.simulated} vehicles: one for each, separated by commas`;
-    else if (twice !== undefined) faults.names = `Two vehicles are called ${twice || "nothing"}`;
+    if (twice !== undefined) faults.names = `Two vehicles are called ${twice || "nothing"}`;
   }
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = "Choose at least one vehicle, or simulate some";
@@ -287,8 +317,6 @@ export function faultsOf(draft: Draft): Faults {
   }
   return faults;
 }
-
-const PLACE_SAMPLE = '"41.1852, -8.7046"';
 
 /** What is wrong with what a vehicle has of its own. */
 function ownFault(name: string, draft: Draft): string {
@@ -302,23 +330,10 @@ function ownFault(name: string, draft: Draft): string {
   return fault ?? (point === "" || placeOf(point) ? "" : `Recovery point of ${name}: type ${PLACE_SAMPLE}`);
 }
 
-/** A place typed as "latitude, longitude" in decimal degrees; null when it is none. */
-export function placeOf(text: string): LngLat | null {
-  const [lat, lng, ...rest] = text.trim() === "" ? [] : text.split(/[,;\s]+/).map(Number);
-  if (lat === undefined || lng === undefined || rest.some((n) => n !== 0)) return null;
-  return isWithin(lat, LATITUDE) && isWithin(lng, LONGITUDE) ? [lng, lat] : null;
-}
-
-/** A place as it is typed. */
-export function typedPlace([lng, lat]: LngLat): string {
-  return `${lat.toFixed(6)}, ${lng.toFixed(6)}`;
-}
-
 /** The area that a draft describes; null while it describes none. */
 export function areaOf(draft: Draft) {
   if (draft.source === "drawn") return draft.ring.length >= 3 ? polygonOf(draft.ring) : null;
-  const faults = faultsOf(draft);
-  if (faults.latitude || faults.longitude || faults.east_m || faults.north_m) return null;
+  if (CORNER.some(([field, label, schema]) => numberFault(label, draft[field], schema) !== "")) return null;
   return rectangle(
     [Number(draft.longitude), Number(draft.latitude)],
     Number(draft.east_m),
@@ -333,7 +348,8 @@ export function cornersOf(draft: Draft): LngLat[] {
 }
 
 /** What to send for a draft without faults. */
-export function toMission(draft: Draft): NewMission {
+export function toMission(described: Draft): NewMission {
+  const draft = resolved(described);
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
   const { search, budget: _, recovery: before, site: _site, ...base } = draft.base;
@@ -391,19 +407,40 @@ function searchOf({ base, goal, entry, obstacles }: Draft, vehicles: readonly Ve
   };
 }
 
-/** How long a mission takes at most, how far its vehicles go, and how far apart lines over the whole area would be. */
-export function estimate(
-  draft: Draft,
-  area_m2: number,
-): { seconds: number; metres: number; spacing_m: number } | null {
-  const ways = vehicleNames(draft).map((name) => {
-    const speed = Number(draft.own[name]?.speed_mps?.trim() || draft.speed_mps);
-    const way = wayOf(draft, speed);
-    return { metres: way, seconds: way / speed };
+/** What one vehicle does at most: its way, its time, and how long its energy lasts; null: that is not known. */
+export interface Share {
+  name: string;
+  metres: number;
+  seconds: number;
+  endurance_s: number | null;
+}
+
+export interface Estimate {
+  seconds: number;
+  metres: number;
+  /** How far apart lines over the whole area would be. */
+  spacing_m: number;
+  shares: readonly Share[];
+  /** From the recovery point to the farthest corner of the area; null: there is none. */
+  farthest_m: number | null;
+}
+
+/** How long a mission takes at most and how far its vehicles go; null while that is not said. */
+export function estimate(described: Draft, area_m2: number): Estimate | null {
+  const draft = resolved(described);
+  const shares = vehicleNames(draft).map((name): Share => {
+    const own = draft.own[name];
+    const speed = Number(own?.speed_mps?.trim() || draft.speed_mps);
+    const metres = wayOf(draft, speed);
+    const endurance_s = Number(own?.endurance_min?.trim() ?? "") * 60;
+    return { name, metres, seconds: metres / speed, endurance_s: endurance_s > 0 ? endurance_s : null };
   });
-  const metres = ways.reduce((sum, way) => sum + way.metres, 0);
-  const seconds = Math.max(...ways.map((way) => way.seconds));
-  return metres > 0 && seconds > 0 ? { seconds, metres, spacing_m: area_m2 / metres } : null;
+  const metres = shares.reduce((sum, share) => sum + share.metres, 0);
+  const seconds = Math.max(...shares.map((share) => share.seconds));
+  if (!(metres > 0 && seconds > 0)) return null;
+  const home = placeOf(draft.recovery);
+  const farthest_m = home && Math.max(...cornersOf(draft).map((corner) => wayBetween(home, corner).metres));
+  return { seconds, metres, spacing_m: area_m2 / metres, shares, farthest_m };
 }
 
 /** How far a vehicle of this speed goes at most, metres. */

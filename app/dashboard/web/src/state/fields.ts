@@ -18,13 +18,15 @@ export interface Schema {
   example?: number;
   inSearch?: unknown;
   nullable?: boolean;
+  /** What each order of S-44 asks for. */
+  orders?: Readonly<Record<string, number>>;
 }
 
 export interface Field {
   /** Where the value stands in a mission. */
   path: keyof typeof SPEC;
   /** Where it stands in the form. */
-  part: "length" | "limits" | "search" | "tide" | "recovery" | "coverage" | "uncertainty";
+  part: "quality" | "length" | "limits" | "search" | "tide" | "recovery" | "coverage" | "uncertainty";
   label: string;
   unit?: string;
   placeholder?: string;
@@ -91,7 +93,7 @@ export const FIELDS = {
     placeholder: "one size",
     optional: true,
   },
-  accuracy_m: { path: "accuracy_m", part: "limits", label: "Accuracy", unit: "m" },
+  accuracy_m: { path: "accuracy_m", part: "quality", label: "Accuracy", unit: "m" },
   overlap_pct: {
     path: "coverage.overlap_pct",
     part: "coverage",

@@ -18,7 +18,9 @@ import type {
   WaypointView,
 } from "../api/types";
 import { kept } from "../kept";
+import { certaintyFor } from "../map/certainty";
 import type { Bounds } from "../map/geo";
+import { NORTH_WEST_DEG } from "../map/hillshade";
 import { fittingRange, type Range } from "../map/layers";
 import type { PlaceMark } from "../map/marks";
 import { type DepthPalette, vehicleColour } from "../map/palette";
@@ -150,6 +152,10 @@ export function layerNamed(name: string): LayerView | undefined {
 
 export const depthPalette = kept<DepthPalette>("palette", "deep");
 export const showHatching = kept("hatching", true);
+/** Whether cells are drawn as squares when they are enlarged. */
+export const sharpCells = kept("sharp-cells", false);
+/** Where the light on depths comes from, degrees from north; null: there is none. */
+export const lightFrom = kept<number | null>("light", NORTH_WEST_DEG);
 export const showContours = kept("contours", true);
 export const showTracks = kept("tracks", true);
 export const showRanges = kept("com-range", false);
@@ -163,6 +169,12 @@ export const ships = computed(() => view.value.ships);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
 export const fixedRanges = kept<Partial<Record<string, Range>>>("ranges", {});
 export const shownRange = computed(() => rangeOf(layer.value));
+
+/** How guesses fade on the map; null while nothing is known. */
+export const shownCertainty = computed(() => {
+  const depths = rangeOf("depth");
+  return seaFloor.value && depths ? certaintyFor(seaFloor.value.accuracy_m, depths) : null;
+});
 
 export function rangeOf(name: string): Range | null {
   const kind = layerNamed(name);
@@ -179,6 +191,10 @@ export const cursor = signal<LngLat | null>(null);
 export const mapCentre = signal<LngLat>([-8.7044, 41.1854]);
 /** What the map is to go to next; taken back when it has. */
 export const destination = signal<Bounds | null>(null);
+/** A place that was typed to go to; null: none is marked. */
+export const marked = signal<LngLat | null>(null);
+/** Whether a place to go to is being asked for. */
+export const goingTo = signal(false);
 export const in3d = signal(false);
 
 /** Corners of the line being measured; null while nothing is measured. */
@@ -217,10 +233,14 @@ export const chosenSounding = signal<number | null>(null);
 /** Height of the closed bottom strip as it came out, pixels: how much of the map lies under it. */
 export const stripHeight = signal(0);
 
+/** Whether the legend shows more than a line. */
+export const legendOpen = kept("legend-open", false);
 export const panelOpen = signal(matchMedia("(min-width: 1180px)").matches);
 export const describing = signal(false);
 /** The mission that the one being described begins as a copy of. */
 export const copied = signal<MissionView | null>(null);
+/** The mission that the one being described is to replace. */
+export const editedMission = signal<MissionView | null>(null);
 /** What is being asked before an abort: of the whole team, or of one vehicle. */
 export const abortDialogOpen = signal(false);
 export const abortOne = signal<string | null>(null);

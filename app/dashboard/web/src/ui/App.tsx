@@ -15,12 +15,19 @@ import { MissionPanel } from "./MissionPanel";
 import { Notices } from "./Notices";
 import { PreflightDialog } from "./PreflightDialog";
 import { Readout } from "./Readout";
+import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom } from "./room";
 import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
 import { VehicleCards } from "./VehicleCards";
 
 /** Before the strip's height was measured. */
 const LEAST_STRIP_PX = 106;
+
+/** Panels leave room for the map, however large they were made on a larger screen. */
+const MOST_OF_WINDOW = { across: "36vw", up: "60vh" };
+
+const sized = (name: string, size: number | null, most: string) =>
+  size === null ? {} : { [name]: `min(${size}px, ${most})` };
 
 export function App() {
   const root = useRef<HTMLDivElement>(null);
@@ -34,19 +41,26 @@ export function App() {
     watcher.observe(bar);
     return () => watcher.disconnect();
   }, []);
+  useEffect(() => (root.current ? watchRoom(root.current) : undefined), []);
   // What lies under a dialog is out of reach; the top bar with the stop never is.
   const covered = dialogOpen.value;
   const classes = [
     "app",
     panelOpen.value && !signedOut.value ? "with-missions" : "",
     mission.value ? "with-mission" : "",
+    shownFolded.value ? "folded-cards" : "",
   ];
+  const { top, bottom } = legendReach.value;
+  const sizes = {
+    "--strip": `${Math.max(LEAST_STRIP_PX, stripHeight.value)}px`,
+    "--legend-top": `${top}px`,
+    "--legend-bottom": `${bottom}px`,
+    ...sized("--left", panelWidth.value, MOST_OF_WINDOW.across),
+    ...(shownFolded.value ? {} : sized("--right", cardsWidth.value, MOST_OF_WINDOW.across)),
+    ...sized("--pane", paneHeight.value, MOST_OF_WINDOW.up),
+  };
   return (
-    <div
-      ref={root}
-      class={classes.join(" ")}
-      style={{ "--strip": `${Math.max(LEAST_STRIP_PX, stripHeight.value)}px` }}
-    >
+    <div ref={root} class={classes.join(" ")} style={sizes}>
       <TopBar />
       <main class="stage" inert={covered}>
         <ChartPane />

@@ -9,7 +9,9 @@ import { Compare } from "./Compare";
 import { Button } from "./Controls";
 import { EventLog } from "./EventLog";
 import { Files } from "./Files";
+import { Grip } from "./Grip";
 import { Review } from "./Review";
+import { paneHeight } from "./room";
 import { TimeSlider } from "./TimeSlider";
 
 export function BottomStrip() {
@@ -37,6 +39,9 @@ export function BottomStrip() {
   const newest = view.value.events.at(-1);
   return (
     <section ref={strip} class="bottom" aria-label="Progress and log">
+      {tab.value === null ? null : (
+        <Grip what="the pane" size={paneHeight} side="top" least={120} most={900} id="grip-pane" />
+      )}
       {tab.value === "log" ? <EventLog /> : null}
       {tab.value === "files" ? <Files /> : null}
       {tab.value === "charts" ? <Charts /> : null}

@@ -4,8 +4,9 @@ import { useEffect, useRef } from "preact/hooks";
 import type { Chart, GridFrame } from "../map/chart";
 import { latitude, longitude } from "../state/format";
 import { chosenSounding, cursor, in3d, isDark, mapCentre, measured, picking, theme } from "../state/store";
-import { follow, overlaid } from "./follow";
+import { follow } from "./follow";
 import { MapTools } from "./MapTools";
+import { overlaid } from "./room";
 
 // Most of the page's code: it is read while the service is asked, not before.
 const charting = import("../map/chart");

@@ -2,8 +2,9 @@
 
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
-import { type Draft, type Faults, typedPlace } from "../state/draft";
-import { type Field, type FieldName, fieldsOf, schemaOf } from "../state/fields";
+import type { Draft, Faults } from "../state/draft";
+import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../state/fields";
+import { typedPlace } from "../state/place";
 import { picking } from "../state/store";
 import { Button, Choice, same } from "./Controls";
 
@@ -112,11 +113,33 @@ export function PlaceField({ field, label }: { field: "goal" | "entry" | "recove
 }
 
 /** The plain values of one part of the form, as the service and the table of fields declare them. */
-export function Part({ of }: { of: Field["part"] }) {
+export function Part({ of, explained = false }: { of: Field["part"]; explained?: boolean }) {
   const { draft } = useForm();
-  return fieldsOf(draft.kind, draft.length, of).map(([name, field]) => (
-    <Plain key={name} name={name} field={field} />
-  ));
+  return fieldsOf(draft.kind, draft.length, of).map(([name, field]) =>
+    explained ? (
+      <div key={name} class="explained">
+        <Plain name={name} field={field} />
+        <Reason field={field} />
+      </div>
+    ) : (
+      <Plain key={name} name={name} field={field} />
+    ),
+  );
+}
+
+/** What a value is for, and what is usual. */
+function Reason({ field }: { field: Field }) {
+  const { draft } = useForm();
+  const usual = startOf(field, draft.kind) || (field.placeholder ?? "");
+  const { description = "" } = schemaOf(field);
+  return (
+    <small>
+      {description}
+      {usual
+        ? `${description ? ". " : ""}Usual: ${usual}${field.unit && startOf(field, draft.kind) ? ` ${field.unit}` : ""}`
+        : ""}
+    </small>
+  );
 }
 
 function Plain({ name, field }: { name: FieldName; field: Field }) {

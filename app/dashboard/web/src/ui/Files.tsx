@@ -5,6 +5,7 @@ import type { ProductView, QualityView } from "../api/types";
 import { duration, megabytes } from "../state/format";
 import { now, selectedId, view } from "../state/store";
 import { Button } from "./Controls";
+import { save } from "./saving";
 
 /** A file that is on its way. */
 interface Making {
@@ -56,12 +57,7 @@ export function Files() {
     fault.value = "";
     try {
       const file = await api.file(product.href, note);
-      const address = URL.createObjectURL(file.content);
-      const link = document.createElement("a");
-      link.href = address;
-      link.download = file.name;
-      link.click();
-      URL.revokeObjectURL(address);
+      save(file.name, file.content);
     } catch (error) {
       fault.value = `${product.name}: ${said(error)}`;
     } finally {

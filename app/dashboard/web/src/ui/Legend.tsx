@@ -13,16 +13,20 @@ import {
   fixedRanges,
   layer,
   layers,
+  legendOpen,
+  lightFrom,
   mission,
   seaFloor,
+  sharpCells,
   showContours,
   showHatching,
+  shownCertainty,
   shownLayer,
   shownRange,
   showSite,
   site,
 } from "../state/store";
-import { Button, Choice, into, titles } from "./Controls";
+import { Button, Choice, flips, into, titles } from "./Controls";
 import { STAGES, VehicleShape } from "./marks";
 
 /** Layer switch, colour scale and its range, which stays what the operator set until changed. */
@@ -33,7 +37,7 @@ export function Legend() {
   if (!mission.value || !shown) return null;
   const palette = paletteOf(shown, depthPalette.value);
   return (
-    <section class="legend" aria-label="Map layer and legend">
+    <section class={`legend${legendOpen.value ? "" : " folded"}`} aria-label="Map layer and legend">
       <label class="layer-choice">
         <span class="visually-hidden">Layer</span>
         <Choice
@@ -65,9 +69,22 @@ export function Legend() {
       ) : (
         <p class="empty">{map ? missing(map, shown) : "The sea floor appears with the first soundings"}</p>
       )}
-      {map ? <Options shown={shown} /> : null}
-      {site.value && showSite.value ? <SiteStates /> : null}
-      {mission.value.vehicles.some((v) => v.recovery_point !== null) ? <Stages /> : null}
+      <Button
+        id="toggle-legend"
+        kind="fold"
+        aria-expanded={legendOpen.value}
+        title={legendOpen.value ? "Show only the scale" : "Colours, light, contours, and what signs mean"}
+        onClick={flips(legendOpen)}
+      >
+        {legendOpen.value ? "Less ▴" : "More ▾"}
+      </Button>
+      {legendOpen.value ? (
+        <>
+          {map ? <Options shown={shown} /> : null}
+          {site.value && showSite.value ? <SiteStates /> : null}
+          {mission.value.vehicles.some((v) => v.recovery_point !== null) ? <Stages /> : null}
+        </>
+      ) : null}
     </section>
   );
 }
@@ -172,30 +189,69 @@ function Stages() {
   );
 }
 
+/** Sides that light can come from. */
+const SIDES = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"] as const;
+const LIGHTS: readonly (readonly [value: string, words: string])[] = [
+  ...SIDES.map((side, i) => [String((i * 360) / SIDES.length), `Light from ${side}`] as const),
+  ["none", "No light and shadow"],
+];
+
 function Options({ shown }: { shown: LayerView }) {
   return (
     <>
       {shown.palette === "deep" ? (
-        <label>
-          <span class="visually-hidden">Colours of depths</span>
+        <>
+          <label>
+            <span class="visually-hidden">Colours of depths</span>
+            <Choice
+              value={depthPalette.value}
+              options={titles(DEPTH_PALETTES)}
+              title="Colours of depths"
+              id="palette"
+              onChoose={into(depthPalette)}
+            />
+          </label>
           <Choice
-            value={depthPalette.value}
-            options={titles(DEPTH_PALETTES)}
-            title="Colours of depths"
-            id="palette"
-            onChoose={into(depthPalette)}
+            value={lightFrom.value === null ? "none" : String(lightFrom.value)}
+            options={LIGHTS}
+            label="Where light comes from"
+            title="Heights are exaggerated until they show. Light from the north-west is usual on charts"
+            id="light"
+            onChoose={(side) => {
+              lightFrom.value = side === "none" ? null : Number(side);
+            }}
           />
-        </label>
+        </>
       ) : null}
       <Check signal={showContours} id="contours">
         contours
       </Check>
-      <Check signal={showHatching} id="hatching">
-        <span class="hatch-sample" aria-hidden="true" /> interpolated
+      <Check signal={sharpCells} id="sharp-cells">
+        sharp cells
       </Check>
+      {shown.of_depths ? <Guesses /> : null}
     </>
   );
 }
+
+/** How what was not measured is drawn. */
+function Guesses() {
+  const certainty = shownCertainty.value;
+  return (
+    <>
+      <Check signal={showHatching} id="hatching">
+        <span class="hatch-sample" aria-hidden="true" /> guessed
+      </Check>
+      {certainty ? (
+        <span class="certainty" data-testid="certainty">
+          fades from ±{round(certainty.full_m)} m, nothing from ±{round(certainty.none_m)} m
+        </span>
+      ) : null}
+    </>
+  );
+}
+
+const round = (value_m: number) => Number(value_m.toPrecision(2));
 
 function Check({
   signal,

@@ -1,12 +1,18 @@
 import "./MapTools.css";
-import type { Signal } from "@preact/signals";
+import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
+import { useEffect, useRef } from "preact/hooks";
 import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";
+import { followOwn, ownFault, whyNoPosition } from "../state/own";
+import { PLACE_SAMPLE, placeOf } from "../state/place";
 import {
   coordinateFormat,
   crossovers,
+  destination,
+  goingTo,
   in3d,
+  marked,
   measured,
   mission,
   seaFloor,
@@ -39,6 +45,25 @@ export function MapTools({ onFit }: { onFit: () => void }) {
           }}
         >
           <path d="M2,14 L14,2 L18,6 L6,18 Z M6,10 l2,2 M9,7 l2,2 M12,4 l2,2" />
+        </Tool>
+        <Tool
+          label={goingTo.value ? "Close the field for a position" : "Go to a position"}
+          pressed={goingTo.value}
+          id="go-to"
+          onClick={flips(goingTo)}
+        >
+          <path d="M10,18 C6,12 4,10 4,7 a6,6 0 0 1 12,0 C16,10 14,12 10,18 Z M10,7 h0.01" />
+        </Tool>
+        <Tool
+          label={
+            whyNoPosition() || (followOwn.value ? "Hide where this device is" : "Show where this device is")
+          }
+          pressed={followOwn.value}
+          id="own-position"
+          disabled={whyNoPosition() !== ""}
+          onClick={flips(followOwn)}
+        >
+          <path d="M10,1 V5 M10,15 V19 M1,10 H5 M15,10 H19 M10,5 a5,5 0 1 1 -0.01,0" />
         </Tool>
         <Shown what="Tracks" signal={showTracks}>
           <path d="M3,17 C3,9 10,13 10,8 S17,9 17,3" />
@@ -93,8 +118,64 @@ export function MapTools({ onFit }: { onFit: () => void }) {
           <path d="M2,13 L8,5 L12,10 L14,8 L18,13 M2,13 L10,18 L18,13" />
         </Tool>
       </div>
-      {measuring ? <Measured /> : null}
+      <div class="beside-tools">
+        {goingTo.value ? <GoTo /> : null}
+        {ownFault.value ? (
+          <p class="tool-note reason warning" role="status" data-testid="own-fault">
+            {ownFault.value}
+          </p>
+        ) : null}
+        {measuring ? <Measured /> : null}
+      </div>
     </>
+  );
+}
+
+/** As much about a place as is shown of it, degrees. */
+const ABOUT = 0.002;
+
+/** Asks for a position in any of the usual ways, goes there and marks it. */
+function GoTo() {
+  const text = useSignal("");
+  const fault = useSignal("");
+  const field = useRef<HTMLInputElement>(null);
+  useEffect(() => field.current?.focus(), []);
+  const go = (event: SubmitEvent) => {
+    event.preventDefault();
+    const at = placeOf(text.value);
+    fault.value = at ? "" : `Type a position such as ${PLACE_SAMPLE}`;
+    if (!at) return;
+    marked.value = at;
+    destination.value = [at[0] - ABOUT, at[1] - ABOUT, at[0] + ABOUT, at[1] + ABOUT];
+  };
+  return (
+    <form class="go-to" onSubmit={go}>
+      <input
+        ref={field}
+        type="text"
+        aria-label="Position to go to"
+        placeholder="41°11.112′ N 8°42.276′ W"
+        aria-invalid={fault.value !== ""}
+        value={text.value}
+        data-testid="go-to-position"
+        onInput={(event) => {
+          text.value = event.currentTarget.value;
+        }}
+      />
+      <button type="submit" class="command" data-testid="go">
+        Go
+      </button>
+      {marked.value ? (
+        <Button kind="link-button" onClick={sets(marked, null)}>
+          Unmark
+        </Button>
+      ) : null}
+      {fault.value ? (
+        <span class="fault" role="alert" data-testid="go-to-fault">
+          ▲ {fault.value}
+        </span>
+      ) : null}
+    </form>
   );
 }
 

@@ -1,17 +1,31 @@
 import "./MissionPanel.css";
 import { useSignal } from "@preact/signals";
-import type { MissionSummary } from "../api/types";
+import type { MissionSummary, NewMission } from "../api/types";
 import { whyNotCommand } from "../state/access";
+import { fileNameOf, missionFile } from "../state/missionFile";
 import { deleteMission, selectMission } from "../state/session";
-import { copied, describing, fleetOpen, mission, missions, selectedId, serviceFault } from "../state/store";
+import {
+  copied,
+  describing,
+  editedMission,
+  fleetOpen,
+  mission,
+  missions,
+  selectedId,
+  serviceFault,
+} from "../state/store";
 import { capital, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { Button, sets } from "./Controls";
+import { Grip } from "./Grip";
 import { NewMissionForm } from "./NewMissionForm";
+import { panelWidth } from "./room";
+import { saveText } from "./saving";
 
 export function MissionPanel() {
   return (
     <aside class="panel missions" id="missions" aria-label="Missions">
-      {describing.value ? <NewMissionForm /> : <MissionList />}
+      <div class="panel-scroll">{describing.value ? <NewMissionForm /> : <MissionList />}</div>
+      <Grip what="the missions" size={panelWidth} side="right" least={240} most={640} id="grip-missions" />
     </aside>
   );
 }
@@ -81,7 +95,31 @@ function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
           describing.value = true;
         }}
       >
-        Copy
+        Same again
+      </Button>
+      {empty && (state === "draft" || state === "ready") ? (
+        <Button
+          id="edit-mission"
+          disabled={forbidden !== "" || mission.value?.id !== id}
+          title={forbidden || "Change the description, as long as nothing was flown"}
+          onClick={() => {
+            editedMission.value = mission.value;
+            describing.value = true;
+          }}
+        >
+          Edit
+        </Button>
+      ) : null}
+      <Button
+        id="export-mission"
+        disabled={mission.value?.id !== id}
+        title="The mission's description as one file, for another service or another day"
+        onClick={() => {
+          const shown = mission.value;
+          if (shown) saveText(fileNameOf(shown.name), missionFile(shown.spec as unknown as NewMission));
+        }}
+      >
+        Export
       </Button>
       {asked.value ? (
         <>

@@ -2,41 +2,44 @@ import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
-import type { PlannerView } from "../api/types";
-import { polygonOf, sizeOf } from "../map/area";
+import { polygonOf } from "../map/area";
 import type { PlaceMark } from "../map/marks";
 import { recoveryMarks } from "../map/recovery";
 import {
   areaOf,
-  canPlan,
   copyOf,
-  cornersOf,
   type Draft,
   emptyDraft,
-  estimate,
   type Faults,
   faultsOf,
   fieldOf,
-  PLANNER_PRESETS,
-  placeOf,
   toMission,
   turnedInto,
   vehicleNames,
 } from "../state/draft";
-import { distance, duration } from "../state/format";
-import { createMission, said } from "../state/session";
-import { copied, describing, draftShapes, drawing, mapCentre, picking } from "../state/store";
+import { placeOf } from "../state/place";
+import { createMission, deleteMission, said } from "../state/session";
+import { copied, describing, draftShapes, drawing, editedMission, mapCentre, picking } from "../state/store";
 import { AreaFields } from "./AreaFields";
-import { Button, Choice, FileButton, same, useEscape } from "./Controls";
-import { Fault, Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
-import { Forecast } from "./Forecast";
+import { AskedFields } from "./AskedFields";
+import { Beginnings, Keeping } from "./Beginnings";
+import { Button, FileButton, useEscape } from "./Controls";
+import { ExpertFields } from "./ExpertFields";
+import { Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
 import { SearchFields } from "./SearchFields";
 import { SiteFields } from "./SiteFields";
 import { VehicleFields } from "./VehicleFields";
 
 export function NewMissionForm() {
   const original = copied.peek();
-  const draft = useSignal(original ? copyOf(original) : emptyDraft(mapCentre.peek()));
+  const edited = editedMission.peek();
+  const draft = useSignal(
+    edited
+      ? { ...copyOf(edited), name: edited.name }
+      : original
+        ? copyOf(original)
+        : emptyDraft(mapCentre.peek()),
+  );
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
@@ -60,6 +63,13 @@ export function NewMissionForm() {
   const close = () => {
     describing.value = false;
     copied.value = null;
+    editedMission.value = null;
+  };
+  /** Begins with what a file or a template says. */
+  const begin = (next: Draft) => {
+    draft.value = next;
+    faults.value = {};
+    refused.value = null;
   };
   const set: FormState["set"] = (how) => {
     const change = typeof how === "function" ? how(draft.value) : how;
@@ -86,6 +96,8 @@ export function NewMissionForm() {
           source: draft.value.tide_source || "tide table",
         });
       }
+      // The one that it replaces goes last: whatever fails, one of them is there.
+      if (edited) await deleteMission(edited.id);
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;
@@ -108,38 +120,26 @@ export function NewMissionForm() {
         data-testid="mission-form"
       >
         <header class="panel-head">
-          <h2>{original ? "Copy of a mission" : "New mission"}</h2>
+          <h2>{edited ? "Edit a mission" : original ? "Same again" : "New mission"}</h2>
           <Button onClick={close}>Cancel</Button>
         </header>
+        {edited ? (
+          <p class="hint">
+            It is made anew under another number. Files that it was to begin with, and a tide table, have to
+            be given again.
+          </p>
+        ) : (
+          <Beginnings draft={draft.value} onBegin={begin} />
+        )}
         <Text field="name" label="Name" placeholder="Leixões quay" />
         <Kind />
+        {draft.value.kind === "survey" ? <AskedFields /> : null}
         <AreaFields />
         {draft.value.kind === "survey" ? <SiteFields /> : null}
+        {draft.value.kind === "search" ? <SearchFields /> : null}
         <VehicleFields />
         <RecoveryFields />
-        {draft.value.kind === "search" ? (
-          <SearchFields />
-        ) : (
-          <>
-            <Planner />
-            <Length />
-            <Expected />
-          </>
-        )}
-        <details>
-          <summary>Limits and grid</summary>
-          <div class="pair">
-            <Part of="limits" />
-          </div>
-        </details>
-        {draft.value.kind === "survey" ? (
-          <details>
-            <summary>Uncertainty of swath sonars</summary>
-            <div class="pair">
-              <Part of="uncertainty" />
-            </div>
-          </details>
-        ) : null}
+        <ExpertFields />
         <details>
           <summary>Tide</summary>
           <div class="pair">
@@ -166,8 +166,9 @@ export function NewMissionForm() {
           disabled={sending.value}
           data-testid="create-mission"
         >
-          {sending.value ? "Creating…" : "Create mission"}
+          {sending.value ? "One moment…" : edited ? "Save mission" : "Create mission"}
         </button>
+        <Keeping draft={draft.value} />
       </form>
     </Form.Provider>
   );
@@ -234,177 +235,5 @@ function RecoveryFields() {
         </div>
       )}
     </fieldset>
-  );
-}
-
-const LENGTHS = [
-  ["steps", "steps"],
-  ["minutes", "minutes"],
-  ["km_per_vehicle", "kilometres"],
-] as const;
-
-/** How long the mission is, in the unit of the operator's choice. */
-function Length() {
-  const { draft, set } = useForm();
-  return (
-    <div class="pair">
-      <Part of="length" />
-      <label class="field">
-        Length in
-        <Choice
-          value={draft.length}
-          options={LENGTHS}
-          id="field-length"
-          onChoose={(length) => set({ length })}
-        />
-      </label>
-    </div>
-  );
-}
-
-/** How long it takes at most and how dense it gets, before anything is created. */
-function Expected() {
-  const { draft } = useForm();
-  const corners = cornersOf(draft);
-  const found = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
-  if (!found) return null;
-  const whole = Object.keys(faultsOf({ ...draft, name: draft.name || "forecast" })).length === 0;
-  return (
-    <>
-      <p class="hint" data-testid="estimate">
-        At most {duration(found.seconds)} and {distance(found.metres)} of tracks, as much as lines{" "}
-        {found.spacing_m.toFixed(1)} m apart.
-      </p>
-      {whole ? (
-        <Forecast
-          of={JSON.stringify(toMission({ ...draft, name: "forecast" }))}
-          ask={(gone) => api.forecastOf(toMission({ ...draft, name: draft.name || "forecast" }), gone)}
-        />
-      ) : null}
-    </>
-  );
-}
-
-function Planner() {
-  const { draft, set } = useForm();
-  const planners = useSignal<readonly PlannerView[]>([]);
-  const fault = useSignal("");
-  useEffect(() => {
-    api.planners().then(
-      (list) => {
-        planners.value = list;
-      },
-      (error: unknown) => {
-        fault.value = said(error);
-      },
-    );
-  }, []);
-  const presets = Object.entries(PLANNER_PRESETS).filter(
-    ([name]) => name === draft.planner || canPlan(name, draft),
-  );
-  const usable = planners.value.filter((p) => !p.problem);
-  const broken = planners.value.filter((p) => p.problem);
-  const others = usable.filter((p) => !(p.name in PLANNER_PRESETS));
-  const other = others.find((p) => p.name === draft.planner);
-  return (
-    <fieldset class="planner">
-      <legend>Planner</legend>
-      {presets.map(([name, { title, words }]) => (
-        <label key={name} class="preset">
-          <input
-            type="radio"
-            name="planner"
-            checked={draft.planner === name}
-            data-testid={`planner-${name}`}
-            onChange={() => set({ planner: name })}
-          />
-          <span>
-            <b>{title}</b> <small>{words}</small>
-          </span>
-        </label>
-      ))}
-      {draft.planner === "swath" ? (
-        <div class="pair">
-          <Part of="coverage" />
-        </div>
-      ) : null}
-      <details>
-        <summary>More planners and their settings</summary>
-        <label class="field">
-          Planner
-          <Choice
-            value={draft.planner}
-            options={same(usable.length > 0 ? usable.map((p) => p.name) : [draft.planner])}
-            id="field-planner"
-            onChoose={(planner) => set({ planner })}
-          />
-          {other ? (
-            <small>
-              {other.summary} ({other.package})
-            </small>
-          ) : null}
-        </label>
-        {broken.map((p) => (
-          <small key={p.name} class="fault" data-testid={`broken-planner-${p.name}`}>
-            ▲ {p.name} of {p.package} cannot be used: {p.problem}
-          </small>
-        ))}
-        <Options schema={planners.value.find((p) => p.name === draft.planner)?.options} />
-      </details>
-      {fault.value ? <span class="fault">▲ {fault.value}</span> : null}
-      <Fault field="planner" />
-    </fieldset>
-  );
-}
-
-interface OptionSchema {
-  description?: string;
-  default?: unknown;
-  type?: string;
-  enum?: string[];
-  anyOf?: { type?: string; $ref?: string }[];
-}
-
-/** The planner's settings as the service declares them; an empty field takes the default. */
-function Options({ schema }: { schema: Record<string, unknown> | undefined }) {
-  const { draft, set } = useForm();
-  const all = Object.entries((schema?.properties ?? {}) as Record<string, OptionSchema>);
-  // A whole document, such as a trained model, is no field of a form: it comes by REST.
-  const properties = all.filter(([, option]) => !option.anyOf?.some((kind) => kind.$ref));
-  const change = (name: string, value: unknown) => {
-    const { [name as keyof typeof draft.options]: _, ...rest } = draft.options;
-    set({ options: value === undefined ? rest : { ...rest, [name]: value } });
-  };
-  return (
-    <div class="options">
-      {properties.map(([name, option]) => (
-        <div key={name} class="field">
-          <label for={`option-${name}`}>{name.replaceAll("_", " ")}</label>
-          {option.enum ? (
-            <select
-              id={`option-${name}`}
-              value={String(draft.options[name as keyof typeof draft.options] ?? option.default)}
-              onChange={(event) => change(name, event.currentTarget.value)}
-            >
-              {option.enum.map((value) => (
-                <option key={value}>{value}</option>
-              ))}
-            </select>
-          ) : (
-            <input
-              id={`option-${name}`}
-              type="text"
-              inputMode="decimal"
-              placeholder={option.default === null ? "automatic" : String(option.default)}
-              onInput={(event) => {
-                const text = event.currentTarget.value.trim();
-                change(name, text === "" || !Number.isFinite(Number(text)) ? undefined : Number(text));
-              }}
-            />
-          )}
-          <small>{option.description}</small>
-        </div>
-      ))}
-    </div>
   );
 }

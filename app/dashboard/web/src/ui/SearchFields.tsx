@@ -24,6 +24,7 @@ export function SearchFields() {
       <PlaceField field="entry" label="Entry and exit" />
       <div class="pair">
         <Part of="search" />
+        <Part of="quality" />
       </div>
       <FileButton accept=".geojson,.json,.kml" id="obstacles-file" onText={read}>
         Known obstacles from a file

@@ -4,7 +4,17 @@ import { useEffect, useRef } from "preact/hooks";
 import { DEPTH_PALETTES } from "../map/palette";
 import type { SceneVehicle } from "../map/scene";
 import { replayed } from "../state/replay";
-import { depthPalette, in3d, isDark, rangeOf, seaFloor, theme, vehicles, view } from "../state/store";
+import {
+  depthPalette,
+  in3d,
+  isDark,
+  rangeOf,
+  seaFloor,
+  shownCertainty,
+  theme,
+  vehicles,
+  view,
+} from "../state/store";
 import { Button, sets } from "./Controls";
 
 /** The sea floor in space over the whole map. */
@@ -35,8 +45,9 @@ export function SpaceView() {
           effect(() => {
             const map = seaFloor.value;
             const range = rangeOf("depth");
-            if (map && range) {
-              scene.setSeaFloor(map, DEPTH_PALETTES[depthPalette.value].palette, range.low, range.high);
+            const certainty = shownCertainty.value;
+            if (map && range && certainty) {
+              scene.setSeaFloor(map, DEPTH_PALETTES[depthPalette.value].palette, range, certainty);
             }
           }),
           effect(() => scene.setVehicles(seaFloor.value ? fleetInSpace() : [])),

@@ -30,9 +30,11 @@ import {
   vehicleState,
   WAYPOINT_WORDS,
 } from "../state/words";
-import { Button } from "./Controls";
+import { Button, flips } from "./Controls";
 import { CrosslinesCard } from "./CrosslinesCard";
+import { Grip } from "./Grip";
 import { WaypointShape } from "./marks";
+import { cardsFolded, cardsWidth, shownFolded } from "./room";
 import { SearchCard } from "./SearchCard";
 import { SwathCard } from "./SwathCard";
 import { TargetCards } from "./TargetCards";
@@ -41,25 +43,41 @@ export function VehicleCards() {
   const present = mission.value;
   if (!present) return null;
   return (
-    <section
-      class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
-      aria-label="Vehicles"
-      // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
-      tabIndex={0}
-    >
-      <SearchCard />
-      <SwathCard />
-      {vehicles.value.length === 0 ? (
-        <p class="empty">
-          No vehicle takes part yet. Switch one on within reach of this network, or create a mission with
-          simulated vehicles. If a vehicle is on but missing here, run <code>bathyfleet doctor</code>.
-        </p>
-      ) : (
-        vehicles.value.map((vehicle) => <Card key={vehicle.view.name} vehicle={vehicle} />)
+    <div class="cards-column">
+      <section
+        class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
+        aria-label="Vehicles"
+        // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
+        tabIndex={0}
+      >
+        <div class="cards-head">
+          <Button
+            id="fold-cards"
+            kind="fold"
+            aria-pressed={shownFolded.value}
+            title={shownFolded.value ? "Show whole cards" : "Show only what one has to know of each vehicle"}
+            onClick={flips(cardsFolded)}
+          >
+            {shownFolded.value ? "◂ Whole cards" : "Fold cards ▸"}
+          </Button>
+        </div>
+        <SearchCard />
+        <SwathCard />
+        {vehicles.value.length === 0 ? (
+          <p class="empty">
+            No vehicle takes part yet. Switch one on within reach of this network, or create a mission with
+            simulated vehicles. If a vehicle is on but missing here, run <code>bathyfleet doctor</code>.
+          </p>
+        ) : (
+          vehicles.value.map((vehicle) => <Card key={vehicle.view.name} vehicle={vehicle} />)
+        )}
+        <TargetCards />
+        <CrosslinesCard />
+      </section>
+      {shownFolded.value ? null : (
+        <Grip what="the cards" size={cardsWidth} side="left" least={250} most={520} id="grip-cards" />
       )}
-      <TargetCards />
-      <CrosslinesCard />
-    </section>
+    </div>
   );
 }
 

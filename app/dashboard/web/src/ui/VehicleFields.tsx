@@ -2,6 +2,7 @@ import type { Sensor, VehicleSpec, VehicleView } from "../api/types";
 import { type Own, sensorOf, simulatedNames, vehicleNames } from "../state/draft";
 import { SENSORS, schemaOf, vehicleFieldsOf } from "../state/fields";
 import { fleet } from "../state/store";
+import { batteryWords, vehicleState } from "../state/words";
 import { Button, Choice } from "./Controls";
 import { Fault, Place, Text, useForm } from "./Fields";
 
@@ -16,12 +17,6 @@ export function VehicleFields() {
       <FleetChoice />
       <div class="pair">
         <Text field="simulated" label="Simulated vehicles" numeric />
-        <Text
-          field="names"
-          label="Their names"
-          placeholder={simulatedNames({ ...draft, names: "" }).join(", ")}
-          hint="Separated by commas; empty: sim-1, sim-2 and so on"
-        />
         <label class="field">
           Their sensor
           <Choice
@@ -32,8 +27,46 @@ export function VehicleFields() {
           />
         </label>
       </div>
+      <SimulatedNames />
       <Singles />
     </fieldset>
+  );
+}
+
+/** Each simulated vehicle's name, to be changed. */
+function SimulatedNames() {
+  const { draft, set } = useForm();
+  const names = simulatedNames(draft);
+  const rename = (index: number, name: string) => {
+    const before = names[index] ?? "";
+    const clean = name.replaceAll(",", " ").trim();
+    set(({ own }) => {
+      const { [before]: its, ...others } = own;
+      return {
+        names: names.map((one, i) => (i === index ? clean : one)).join(", "),
+        own: its ? { ...others, [clean]: its } : others,
+      };
+    });
+  };
+  return (
+    <div class="pair names">
+      {names.map((name, i) => (
+        // The place in the list is what stays while a name is typed.
+        <input
+          key={i}
+          type="text"
+          autocomplete="off"
+          aria-label={`Name of simulated vehicle ${i + 1}`}
+          value={name}
+          data-testid={`sim-name-${i + 1}`}
+          onChange={(event) => {
+            if (event.currentTarget.value.trim()) rename(i, event.currentTarget.value);
+            else event.currentTarget.value = name;
+          }}
+        />
+      ))}
+      <Fault field="names" />
+    </div>
   );
 }
 
@@ -122,7 +155,18 @@ function FleetChoice() {
             checked={chosen.has(v.name)}
             onChange={(event) => toggle(v, event.currentTarget.checked)}
           />
-          {v.name} <small>{v.kind === "imc" ? "IMC" : v.kind}</small>
+          <span>
+            {v.name}{" "}
+            <small>
+              {[
+                v.kind === "imc" ? "IMC" : v.kind,
+                vehicleState(v, undefined).words,
+                v.battery_pct === null ? null : `battery ${batteryWords(v)}`,
+              ]
+                .filter((part) => part !== null)
+                .join(" · ")}
+            </small>
+          </span>
         </label>
       ))}
     </>

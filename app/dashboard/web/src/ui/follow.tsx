@@ -3,25 +3,29 @@
 import { effect, type Signal } from "@preact/signals";
 import { render } from "preact";
 import SPEC from "../api/mission.json";
-import type { LngLat, MissionView, Place, WaypointView } from "../api/types";
-import type { Chart, Padding, Pin } from "../map/chart";
+import type { LngLat, MissionView, Place, PolygonGeometry, WaypointView } from "../api/types";
+import { ringOf } from "../map/area";
+import type { Chart, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { outliersOf, placeOf } from "../map/crossings";
 import { paletteOf } from "../map/layers";
-import type { Route, Track } from "../map/marks";
+import type { PlaceMark, Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
 import { recoveryMarks } from "../map/recovery";
-import type { SeaFloor } from "../map/seafloor";
+import { gridPlace, type SeaFloor } from "../map/seafloor";
 import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
+import { place } from "../state/format";
+import { ownPosition } from "../state/own";
 import { replayed } from "../state/replay";
 import {
   chosenSounding,
   colourOf,
+  coordinateFormat,
   crossovers,
   cursor,
   depthPalette,
@@ -33,16 +37,21 @@ import {
   editingReady,
   holidays,
   isDark,
+  lightFrom,
+  marked,
   measured,
   mission,
+  panelOpen,
   replayStep,
   reviewed,
   seaFloor,
+  sharpCells,
   ships,
   showContours,
   showCrossings,
   showHatching,
   showHolidays,
+  shownCertainty,
   shownLayer,
   shownRange,
   showRanges,
@@ -58,6 +67,7 @@ import {
 } from "../state/store";
 import { tilesAddress } from "../state/tiles";
 import { VehicleMark, WaypointMark } from "./marks";
+import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./room";
 
 /** For measurements: when something was shown for the first time. */
 function markOnce(name: string): void {
@@ -87,8 +97,14 @@ export function follow(chart: Chart): () => void {
       });
     }),
     followDraft(chart),
+    effect(() => chart.setCovers(covers.value)),
     effect(() => {
       stripHeight.value;
+      legendReach.value;
+      panelOpen.value;
+      panelWidth.value;
+      cardsWidth.value;
+      shownFolded.value;
       requestAnimationFrame(() => chart.refit());
     }),
     followDrawing(chart),
@@ -138,6 +154,7 @@ export function follow(chart: Chart): () => void {
         ...(spec?.search ? searchMarks(spec.search) : []),
         ...(spec ? homesOf(spec) : []),
         ...(draftShapes.value?.marks ?? []),
+        ...pointedOut(),
       ]);
     }),
     effect(() =>
@@ -155,6 +172,24 @@ export function follow(chart: Chart): () => void {
   return () => {
     for (const stop of stops) stop();
   };
+}
+
+/** A place that was asked for, and where this device is. */
+function pointedOut(): PlaceMark[] {
+  const [asked, own] = [marked.value, ownPosition.value];
+  return [
+    ...(asked
+      ? [
+          {
+            words: place(asked, coordinateFormat.value),
+            sign: "position" as const,
+            at: asked,
+            radius_m: 0,
+          },
+        ]
+      : []),
+    ...(own ? [{ words: "here", sign: "own" as const, at: own.at, radius_m: own.accuracy_m }] : []),
+  ];
 }
 
 /** While an area is being typed every digit would be another place. */
@@ -221,7 +256,8 @@ function followSeaFloor(chart: Chart): () => void {
   let interval = 1;
   const painter = new Painter((picture) => {
     if (!map) return;
-    chart.setSeaFloor(map.corners, map.rows, map.cols, picture, scale, interval);
+    const { corners, rows, cols } = map;
+    chart.setSeaFloor({ corners, rows, cols, picture, scale, interval });
     markOnce("sea-floor");
   });
   const stop = effect(() => {
@@ -229,36 +265,56 @@ function followSeaFloor(chart: Chart): () => void {
     const range = shownRange.value;
     const shown = shownLayer.value;
     const values = shown && map?.layers[shown.name];
-    const { flags, depth } = map?.layers ?? {};
-    const hatched = showHatching.value;
+    const { flags, depth, uncertainty } = map?.layers ?? {};
     const palette = shown && paletteOf(shown, depthPalette.value);
     const wanted = showContours.value;
+    const certainty = shownCertainty.value;
+    const azimuth_deg = shown?.palette === "deep" ? lightFrom.value : null;
     if (!map || !range || !values || !flags || !depth) {
       painter.forget();
-      chart.setSeaFloor([], 0, 0, null, 1, 1);
+      chart.setSeaFloor(null);
       return;
     }
     scale = map.scales.depth ?? 1;
     interval = Math.round(contourInterval(map.min_depth_m ?? 0, map.max_depth_m ?? 1) * scale) || 1;
     const layerScale = map.scales[shown.name] ?? 1;
+    const sdScale = map.scales.uncertainty ?? 1;
     painter.paint({
       painting: {
         rows: map.rows,
         cols: map.cols,
         values,
         flags,
+        depths: depth,
         low: range.low * layerScale,
         high: range.high * layerScale,
         table: palette ? lookupTable(palette) : null,
-        hatched,
+        guesses:
+          certainty && uncertainty && shown.of_depths
+            ? { sds: uncertainty, full: certainty.full_m * sdScale, none: certainty.none_m * sdScale }
+            : null,
+        light: azimuth_deg === null ? null : { azimuth_deg, cell: map.cell_m * scale },
+        ring: ringIn(map, mission.peek()?.spec.area as PolygonGeometry | undefined),
       },
-      contours: wanted ? { depths: depth, interval } : null,
+      interval: wanted ? interval : null,
     });
   });
+  const stopSmooth = effect(() => chart.setSmooth(!sharpCells.value));
+  const stopHatching = effect(() => chart.setHatching(showHatching.value));
   return () => {
     stop();
+    stopSmooth();
+    stopHatching();
     painter.close();
   };
+}
+
+/** An area's outline in columns and rows of a map. */
+function ringIn(map: SeaFloor, area: PolygonGeometry | undefined): [number, number][] {
+  return (area ? ringOf(area) : []).map((corner) => {
+    const { col, row } = gridPlace(map, corner);
+    return [col, row];
+  });
 }
 
 function followTracks(chart: Chart): () => void {
@@ -356,11 +412,4 @@ function pastPins(): Pin[] {
       },
     ];
   });
-}
-
-/** How far panels reach over the map, as the style sheet says for this width of window. */
-export function overlaid(): Padding {
-  const styles = getComputedStyle(document.querySelector(".app") ?? document.body);
-  const pixels = (side: string) => (Number.parseFloat(styles.getPropertyValue(`--over-${side}`)) || 0) + 30;
-  return { top: pixels("top"), right: pixels("right"), bottom: pixels("bottom"), left: pixels("left") };
 }

@@ -1,0 +1,34 @@
+import { expect, it } from "vitest";
+import { boxOf, type Label, placed } from "./labels";
+
+const label = (x: number, y: number, changes: Partial<Label> = {}): Label => ({
+  at: [x, y],
+  width: 60,
+  height: 16,
+  reach: 15,
+  side: "right",
+  ...changes,
+});
+
+it("a label stays where it was while nothing is in its way", () => {
+  expect(placed([label(200, 200)], [], 400, 400)).toEqual(["right"]);
+  expect(placed([label(200, 200, { side: "below" })], [], 400, 400)).toEqual(["below"]);
+});
+
+it("labels leave each other, other signs, covers and the window's edge alone", () => {
+  const three = [label(200, 200), label(240, 200), label(380, 100)];
+  const cover = { left: 100, top: 190, right: 185, bottom: 210 };
+  const sides = placed(three, [cover], 400, 400);
+  const boxes = three.map((one, i) => boxOf(one, sides[i] ?? "right"));
+  expect(sides[2]).toBe("left");
+  expect(["above", "below"]).toContain(sides[0]);
+  const overlap = (a: (typeof boxes)[0], b: typeof cover) =>
+    a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  expect(boxes.some((box) => overlap(box, cover))).toBe(false);
+  expect(overlap(boxes[0] as (typeof boxes)[0], boxes[1] as typeof cover)).toBe(false);
+});
+
+it("where every side is taken the least hidden one is", () => {
+  const everywhere = { left: 0, top: 0, right: 400, bottom: 400 };
+  expect(placed([label(2, 200)], [everywhere], 400, 400)).toEqual(["right"]);
+});

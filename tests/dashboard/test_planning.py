@@ -1,0 +1,82 @@
+"""Describing missions in an operator's words, and keeping what was described, in Chromium against the real service."""
+
+import json
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.mapping.s44 import Order, strictest_sd_m
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+
+
+def named(service: Service, name: str) -> list[str]:
+    return [one["id"] for one in service.get("/missions") if one["name"] == name]
+
+
+def test_a_mission_is_described_changed_exported_and_used_again(page: Page, service: Service) -> None:
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Asked")
+    by_id(page, "field-order").select_option("Special Order")
+    expect(by_id(page, "field-accuracy_m")).to_have_value(str(strictest_sd_m(Order.SPECIAL)))
+    by_id(page, "field-length").select_option("spacing_m")
+    by_id(page, "field-spacing_m").fill("10")
+    by_id(page, "sim-name-2").fill("south")
+    by_id(page, "sim-name-2").press("Tab")
+    expect(by_id(page, "share-south")).to_contain_text("500 m")
+    expect(by_id(page, "estimate")).to_contain_text("as much as lines 10.0 m apart")
+    # The plan follows the area.
+    by_id(page, "field-east_m").fill("200")
+    expect(by_id(page, "share-south")).to_contain_text("1.00 km")
+    page.get_by_text("Single vehicles: speed, endurance").click()
+    by_id(page, "endurance_min-south").fill("5")
+    expect(by_id(page, "share-south")).to_contain_text(re.compile(r"▲ \d{3} % of its endurance"))
+    by_id(page, "endurance_min-south").fill("60")
+    page.get_by_text("Expert settings").click()
+    expect(by_id(page, "expert")).to_contain_text("Usual: 10 m")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Asked")
+    [first] = named(service, "Asked")
+    spec = service.get(f"/missions/{first}")["spec"]
+    assert spec["accuracy_m"] == strictest_sd_m(Order.SPECIAL)
+    assert spec["budget"] == {"km_per_vehicle": 1.0}
+    assert [vehicle["name"] for vehicle in spec["vehicles"]] == ["sim-1", "south"]
+
+    by_id(page, "edit-mission").click()
+    expect(by_id(page, "field-name")).to_have_value("Asked")
+    by_id(page, "field-name").fill("Asked otherwise")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Asked otherwise")
+    expect(by_id(page, f"mission-{first}")).to_be_hidden()
+    assert named(service, "Asked") == []
+    [second] = named(service, "Asked otherwise")
+
+    with page.expect_download() as waited:
+        by_id(page, "export-mission").click()
+    assert waited.value.suggested_filename == "Asked-otherwise.mission.json"
+    content = json.loads(waited.value.path().read_text())
+    assert content["mission"]["area"] == service.get(f"/missions/{second}")["spec"]["area"]
+    by_id(page, "new-mission").click()
+    by_id(page, "mission-file").set_input_files(waited.value.path())
+    expect(by_id(page, "field-name")).to_have_value("Asked otherwise")
+    expect(by_id(page, "vehicle-south")).to_be_visible()
+    by_id(page, "field-name").fill("Imported")
+    by_id(page, "keep-template").click()
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Imported")
+    [third] = named(service, "Imported")
+    assert service.get(f"/missions/{third}")["spec"]["accuracy_m"] == strictest_sd_m(Order.SPECIAL)
+
+    page.reload()
+    by_id(page, "new-mission").click()
+    by_id(page, "template").select_option("Imported")
+    expect(by_id(page, "field-order")).to_have_value("Special Order")
+    expect(by_id(page, "field-name")).to_have_value("")
+    expect(by_id(page, "field-latitude")).to_be_visible()
+    by_id(page, "template").select_option("Multibeam, full coverage")
+    expect(by_id(page, "field-sensor")).to_have_value("multibeam")
