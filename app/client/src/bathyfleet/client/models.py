@@ -783,6 +783,8 @@ class LayerView(Model):
     """It can be seen as `map.overlay.png`"""
     in_files: bool
     """Files with every layer have it"""
+    of_depths: bool
+    """Its values are as sure as the depths: guessed where those are"""
     absence: str
     """Why a mission may have no such layer; empty: each has it"""
     remedy: str
