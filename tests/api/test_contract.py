@@ -33,9 +33,11 @@ from tests.support.databases import Databases
 from tests.support.rest import mission_spec, running_in_thread, soundings
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
-# what they are called, profiles go down, there is a reference grid to differ from.
+# what they are called, profiles go down, times go on, there is such a site, there is a reference grid to differ from.
 BEYOND_THE_SCHEMA = {
+    "changeSite",
     "createMission",
+    "createSite",
     "addVehicle",
     "forecastDescription",
     "forecastMission",
@@ -49,6 +51,8 @@ BEYOND_THE_SCHEMA = {
     "importSoundings",
     "proposeZones",
     "setReference",
+    "setSite",
+    "setSystematicErrors",
     "setTide",
     "setSoundSpeed",
     "testAlarm",

@@ -39,7 +39,6 @@ async def test_it_is_said_as_long_as_functions_are_compiled(server: Server, clie
 
 
 async def test_a_lost_database_is_not_ready_but_alive(server: Server, client: httpx.AsyncClient) -> None:
-    await server.config.app.state.edge.service._database.close()
     server.config.app.state.edge.service._database.ping = _fail
     ready = await client.get("/health/ready")
     assert (ready.status_code, ready.json()["status"]) == (503, "failing")

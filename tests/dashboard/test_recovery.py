@@ -35,6 +35,7 @@ def expect_homecoming(page: Page, end: str, names: Sequence[str]) -> None:
 
 def test_a_mission_is_finished_once_everybody_is_home(page: Page, service: Service) -> None:
     under_way(page, service, "Finished at home", NEAR)
+    by_id(page, "toggle-legend").click()
     expect(by_id(page, "stage-legend")).to_contain_text("returning")
     by_id(page, "finish").click()
     expect(by_id(page, "finish-return")).to_be_checked()

@@ -22,6 +22,7 @@ def test_an_operator_sees_what_a_search_has_looked_at(watched: Watched, service:
         expect(page.get_by_test_id("search-state")).to_contain_text("In time")
         expect(page.get_by_test_id("site-seen")).to_have_text(re.compile(r"^[1-9]\d* %"))
         expect(page.get_by_test_id("time-left")).to_contain_text("min")
+        page.get_by_test_id("toggle-legend").click()
         expect(page.get_by_test_id("site-legend")).to_contain_text("obstacle found")
         page.get_by_test_id("show-site").click()
         expect(page.get_by_test_id("site-legend")).to_have_count(0)

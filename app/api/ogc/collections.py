@@ -133,7 +133,6 @@ COLLECTIONS = {
                 "length_m": _OPEN_NUMBER,
                 "width_m": _OPEN_NUMBER,
                 "draught_m": _OPEN_NUMBER,
-                "age_s": _NUMBER,
                 "closest_vehicle": _OPEN_TEXT,
                 "closest_m": _OPEN_NUMBER,
                 "closest_in_s": _OPEN_NUMBER,

@@ -70,10 +70,9 @@ class ShipsAbout:
         """Return the ships near the mission, the nearest first, each with the vehicle that it comes closest to."""
         if self.traffic is None:
             return []
-        frame, own, now_s = self._frame, self.traffic.settings.own_mmsi, self.traffic.now_s
-        ships = self.traffic.near(frame.origin_lat_deg, frame.origin_lon_deg)[:MOST_SHOWN]
+        ships = self.traffic.near(self._frame.origin_lat_deg, self._frame.origin_lon_deg)[:MOST_SHOWN]
         closest = self.closest(ships)
-        return [ship_view(ship, now_s, own, closest.get(ship.position.mmsi)) for ship in ships]
+        return [ship_view(ship, self.traffic, closest.get(ship.position.mmsi)) for ship in ships]
 
     def closest(self, ships: list[Ship]) -> dict[int, ApproachView]:
         """Return by MMSI to which vehicle ships come closest, of those that come close to any."""

@@ -12,7 +12,6 @@ from shapely.geometry.base import BaseGeometry
 
 from app.mapping.products.contours import find_contours, usual_interval_m
 from app.mapping.products.tracks import utc_text
-from app.missions.clock import now
 from app.missions.errors import ConflictError, MapNotReadyError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.products import snapshot_holidays
@@ -197,15 +196,14 @@ _VEHICLE_FIELDS = (
 def _traffic(live: LiveMission) -> list[Feature]:
     if live.header.state in ENDED:
         return []
-    found, now_s = [], now().timestamp()
+    found = []
     for view in sorted(live.ships.views(), key=lambda view: str(view.mmsi)):
-        shown = view.model_dump(mode="json", exclude={"lat_deg", "lon_deg", "closest", "age_s"})
-        at_s, closest = now_s - view.age_s, view.closest
+        shown = view.model_dump(mode="json", exclude={"lat_deg", "lon_deg", "closest", "heard_at", "age_s"})
+        at_s, closest = view.heard_at.timestamp(), view.closest
         properties = {
             "mission": live.id,
             "datetime": utc_text(at_s),
             **shown,
-            "age_s": view.age_s,
             "closest_vehicle": None if closest is None else closest.vehicle,
             "closest_m": None if closest is None else closest.distance_m,
             "closest_in_s": None if closest is None else closest.in_s,

@@ -24,10 +24,8 @@ def traffic_view(traffic: Traffic, missions: Iterable[LiveMission]) -> TrafficVi
         for mmsi, approach in live.ships.closest(near(traffic, live)).items():
             if mmsi not in closest or approach.distance_m < closest[mmsi].distance_m:
                 closest[mmsi] = approach
-    own = traffic.settings.own_mmsi
-    now_s = traffic.now_s
     return TrafficView(
-        ships=[ship_view(ship, now_s, own, closest.get(ship.position.mmsi)) for ship in ships],
+        ships=[ship_view(ship, traffic, closest.get(ship.position.mmsi)) for ship in ships],
         sources=source_views(traffic),
         malformed=traffic.malformed,
         dropped=traffic.dropped,

@@ -4,9 +4,11 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import structlog
 
+from app.missions.clock import now
 from app.missions.settings import AisSettings
 from app.missions.traffic.roster import NEAR_M, Roster, Ship, distance_m
 from app.missions.traffic.sentences import SentenceError, SentenceReader, ShipPosition
@@ -58,6 +60,7 @@ class Traffic:
         self._waiting: deque[tuple[bytes, Source]] = deque()
         self._task: asyncio.Task[None] | None = None
         self._began_s: float | None = None
+        self._epoch_s = 0.0
         self.sources: list[Source] = []
         if settings.udp_port is not None:
             self.sources.append(UdpSource(settings.udp_address, settings.udp_port, self._put))
@@ -81,6 +84,7 @@ class Traffic:
         if not self.listens:
             return
         self._began_s = self.now_s
+        self._epoch_s = now().timestamp() - self._began_s
         for source in self.sources:
             source.open()
         self._task = asyncio.create_task(self._keep())
@@ -116,6 +120,10 @@ class Traffic:
             )
             for source in self.sources
         ]
+
+    def utc_of(self, clock_s: float) -> datetime:
+        """Return a time of the clock that ``heard_s`` is by as the wall clock had it, were it never set since."""
+        return datetime.fromtimestamp(self._epoch_s + clock_s, UTC)
 
     @property
     def listened_s(self) -> float:

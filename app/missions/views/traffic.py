@@ -38,6 +38,7 @@ class ShipView(View):
     length_m: float | None
     width_m: float | None
     draught_m: float | None
+    heard_at: datetime = Field(description="When it was heard, UTC")
     age_s: float = Field(description="Since it was heard")
     closest: ApproachView | None = Field(
         default=None,
@@ -82,9 +83,9 @@ class TrafficFinding(View):
     remedy: str = ""
 
 
-def ship_view(ship: Ship, now_s: float, own: tuple[int, ...], closest: ApproachView | None = None) -> ShipView:
-    """Return a ship as it is shown; ``own`` are the operation's."""
-    position, told = ship.position, ship.particulars
+def ship_view(ship: Ship, traffic: Traffic, closest: ApproachView | None = None) -> ShipView:
+    """Return a ship that was heard as it is shown."""
+    position, told, own = ship.position, ship.particulars, traffic.settings.own_mmsi
     return ShipView(
         mmsi=position.mmsi,
         name=told.name,
@@ -100,7 +101,8 @@ def ship_view(ship: Ship, now_s: float, own: tuple[int, ...], closest: ApproachV
         length_m=None if told.to_bow_m is None or told.to_stern_m is None else told.to_bow_m + told.to_stern_m,
         width_m=None if told.to_port_m is None or told.to_starboard_m is None else told.to_port_m + told.to_starboard_m,
         draught_m=told.draught_m,
-        age_s=round(max(now_s - ship.heard_s, 0.0), 1),
+        heard_at=traffic.utc_of(ship.heard_s),
+        age_s=round(max(traffic.now_s - ship.heard_s, 0.0), 1),
         closest=closest,
     )
 

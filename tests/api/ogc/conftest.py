@@ -1,6 +1,7 @@
-"""A service whose features are read: a mission with tracks, soundings and contours, and one with holidays."""
+"""A service whose features are read: a mission with tracks, soundings and contours, one with holidays, and a ship."""
 
 import asyncio
+import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -10,11 +11,13 @@ import numpy as np
 import pytest
 
 from app.api.tokens import Role, TokenStore
-from app.missions.settings import ImcSettings
+from app.missions.settings import AisSettings, ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
+from tests.support.ais import position
 from tests.support.databases import Databases
 from tests.support.missions.specs import lon_lat, rectangle
+from tests.support.ports import free_ports
 from tests.support.rest import mission_spec, running_in_thread
 
 START_S = 1_795_225_140.0
@@ -94,6 +97,14 @@ def pings() -> list[dict[str, Any]]:
     return items
 
 
+def _show_a_ship(client: httpx.Client, url: str, port: int | None) -> None:
+    """Send where a ship lies until the service has heard it."""
+    lon, lat = lon_lat(30.0, 30.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
+        while not client.get(f"{url}/api/v1/traffic").raise_for_status().json()["ships"]:
+            radio.sendto(position(123_456_789, lat, lon), ("127.0.0.1", port))
+
+
 @pytest.fixture(scope="package")
 def gis(databases: Databases, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Gis]:
     url = databases.fresh()
@@ -104,6 +115,7 @@ def gis(databases: Databases, tmp_path_factory: pytest.TempPathFactory) -> Itera
         max_failed_logins=1000,
         imc=ImcSettings(enabled=False),
         pings_url=str(tmp_path_factory.mktemp("pings")),
+        ais=AisSettings(udp_address="127.0.0.1", udp_port=free_ports(1)[0], max_age_s=86_400),
     )
     headers = {"Authorization": f"Bearer {operator}"}
     with running_in_thread(settings) as server, httpx.Client(headers=headers, timeout=120) as client:
@@ -123,4 +135,5 @@ def gis(databases: Databases, tmp_path_factory: pytest.TempPathFactory) -> Itera
             client.post(f"{address}/pause").raise_for_status()
             client.get(f"{api}/{made[-1]}/map").raise_for_status()
         client.headers["Authorization"] = f"Bearer {key}"
+        _show_a_ship(client, server.url, settings.ais.udp_port)
         yield Gis(client, server.url, made[0], made[1], key, operator)

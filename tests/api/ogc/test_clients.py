@@ -69,7 +69,7 @@ def test_gdal_reads_every_layer_page_by_page(gis: Gis) -> None:
     lat, lon = FRAME.to_geographic([0.0, 25.0], [0.0, 25.0])
     box = map(str, (lon[0], lat[0], lon[1], lat[1]))
     found = elsewhere(READ_LAYERS, f"{DRIVER}:{keyed(gis)}", f"{DRIVER}:{keyed(gis, gis.single)}", *box)
-    names = {"areas", "tracks", "soundings", "contours", "holidays", "vehicles"}
+    names = {"areas", "tracks", "soundings", "contours", "holidays", "vehicles", "traffic"}
     assert {name: number for name, (number, _) in found["layers"].items()} == {
         name: len(gis.everything(name)) for name in names
     }

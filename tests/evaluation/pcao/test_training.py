@@ -25,7 +25,7 @@ from app.exploration.pcao.controller import gains
 from app.exploration.pcao.model import PcaoModel, default_model
 from simulator.terrain import TerrainError
 
-SMALL = {"robots": 2, "landmarks": 60, "steps": 12}
+SMALL: dict[str, Any] = {"robots": 2, "landmarks": 60, "steps": 12}
 
 
 @pytest.fixture(scope="module")
