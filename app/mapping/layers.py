@@ -8,8 +8,8 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.shoals import shoal_chance
 from app.mapping.s44 import Order, thu_m, tvu_fraction, tvu_m
+from app.mapping.shoals import shoal_chance
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.swath.gridded import area_of, is_of_swaths
 from app.mapping.tiers import asked_of, by_depth

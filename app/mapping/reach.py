@@ -93,9 +93,7 @@ class Reach:
         likely = np.maximum(sd_m * self.factor, self._unseen_m(distance_m))
         return np.where(np.isnan(sd_m) | supported, likely, np.inf)
 
-    def plausible(
-        self, depth_m: FloatArray, distance_m: FloatArray, cell_m: float
-    ) -> tuple[FloatArray, FloatArray]:
+    def plausible(self, depth_m: FloatArray, distance_m: FloatArray, cell_m: float) -> tuple[FloatArray, FloatArray]:
         """Return depths that soundings allow to be told, and what that adds to their deviation, metres.
 
         A process goes on with every trend, up through the water line and down without end. Where no sounding supports

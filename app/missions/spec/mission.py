@@ -435,7 +435,6 @@ class MissionSpec(Model):
         allow_inf_nan=False,
         description="What is shallower counts as shoal, metres below the datum of the map: its layer shoal_pct is the "
         "chance of that in each cell. It keeps no vehicle away: limits.min_altitude_m does. null: no such layer",
-        examples=[5.0],
     )
     sounding_noise: float = Field(
         default=0.01,
