@@ -266,7 +266,7 @@ async def test_the_chance_of_shoal_water_is_a_layer_where_the_mission_says_what_
     assert ((told >= 0.0) & (told <= 100.0)).all()
     picture = await client.get(f"{path}/map.overlay.png", params={"layer": "shoal_pct"})
     assert picture.status_code == 200
-    with MemoryFile((await client.get(f"{path}/map.tif")).content) as memory, memory.open() as file:
+    with rasterio.MemoryFile((await client.get(f"{path}/map.tif")).content) as memory, memory.open() as file:
         assert file.units[file.descriptions.index("shoal_pct")] == "percent"
     wrong = await client.post("/missions", json=mission_spec(shoal_depth_m=1e6))
     assert [error["field"] for error in wrong.json()["errors"]] == ["shoal_depth_m"]

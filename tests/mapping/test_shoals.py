@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.layers import LAYERS, LayerSource, file_layers
-from app.mapping.shoals import shoal_chance
+from app.mapping.shoals import rises_m, rock_chance, shoal_chance
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map, without_guesses
 from app.mapping.types import BathymetricMap, Grid, Soundings
