@@ -53,7 +53,7 @@ def floor(name: str, seed: int) -> FloatArray:
     for e, n, radius in zip(*rng.uniform(0.0, SIDE_M, (2, 60)), rng.uniform(0.7, 3.0, 60), strict=True):
         dome = np.clip(1.0 - ((east - e) ** 2 + (north - n) ** 2) / radius**2, 0.0, None)
         z = z - rng.uniform(0.5, 2.5) * np.sqrt(dome)
-    return z
+    return np.asarray(z)
 
 
 def sounded(z: FloatArray, cell_m: float, east: FloatArray, north: FloatArray, seed: int) -> Soundings:
