@@ -332,6 +332,8 @@ class GaussianProcessMap:
         process_sd, bound = None, None
         if self._reach is not None:
             distance = nearest(self._levels.fine_tree, grid.centres_m, 1)[0].reshape(shape)
+            depth, moved = self._reach.plausible(depth, distance, grid.cell_m)
+            deviation = np.hypot(deviation, moved)
             process_sd, bound = deviation, self._reach.bound(deviation, distance, grid.cell_m)
             deviation = self._reach.deviation(deviation, distance)
         count = count_per_cell(grid, self.soundings_)

@@ -9,6 +9,7 @@ from scipy.ndimage import distance_transform_edt
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.s44 import Order, thu_m, tvu_fraction, tvu_m
+from app.mapping.shoals import shoal_chance
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.swath.gridded import area_of, is_of_swaths
 from app.mapping.tiers import asked_of, by_depth
@@ -58,6 +59,8 @@ class LayerSource:
         Returns the papers' interpolation of every sounding so far; None where there is none.
     cell_of_depth
         The share of its depth that a place's cell is judged by for density; None: all are judged by the map's cell.
+    shoal_depth_m
+        What the layer ``shoal_pct`` calls shoal is shallower; None: there is no such layer.
     """
 
     map: BathymetricMap
@@ -67,6 +70,7 @@ class LayerSource:
     reference_m: FloatArray | None = None
     live: Callable[[], BathymetricMap | None] = lambda: None
     cell_of_depth: float | None = None
+    shoal_depth_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -203,6 +207,12 @@ def _thu(source: LayerSource) -> FloatArray | None:
     return None if horizontal is None else thu_m(horizontal)
 
 
+def _shoal_pct(source: LayerSource) -> FloatArray | None:
+    if source.shoal_depth_m is None:
+        return None
+    return 100.0 * shoal_chance(source.map, source.shoal_depth_m, source.common_sd_m)
+
+
 def _live(source: LayerSource) -> FloatArray | None:
     live = source.live()
     return None if live is None else live.depth_m
@@ -334,6 +344,19 @@ LAYERS = {
             scale=100,
             absence="no swath sonar has measured in this mission, so nothing is known of places",
             remedy="Send pings of a vehicle with sensor multibeam, or start a mission with one",
+        ),
+        LayerKind(
+            "shoal_pct",
+            "Chance of shoal water",
+            "chance that the bottom is shallower than the mission's shoal_depth_m somewhere in the cell; none is given "
+            "where no sounding supports the cell, which does not mean that it is safe",
+            "percent",
+            _shoal_pct,
+            Palette.MATTER,
+            range=(0, 100),
+            scale=100,
+            absence="the mission does not say what counts as shoal",
+            remedy="Create it with shoal_depth_m, for example 5",
         ),
         LayerKind(
             "live",

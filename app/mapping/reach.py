@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.calibration import HeldOut
 from app.mapping.levels import TwoLevels
 from app.mapping.neighbours import nearest
@@ -72,12 +72,16 @@ class Reach:
         On the deviation: what the checks leave possible.
     slope, relief_m
         Beyond ``checked_m`` the depth is uncertain by at least ``slope`` times the rest of the way, up to ``relief_m``.
+    shallowest_m, deepest_m
+        What was sounded, single soundings of a square merged.
     """
 
     checked_m: float
     factor: float
     slope: float
     relief_m: float
+    shallowest_m: float
+    deepest_m: float
 
     def deviation(self, sd_m: FloatArray, distance_m: FloatArray) -> FloatArray:
         """Return the deviation at a distance from the soundings where the process says ``sd_m``."""
@@ -85,9 +89,24 @@ class Reach:
 
     def bound(self, sd_m: FloatArray, distance_m: FloatArray, cell_m: float) -> FloatArray:
         """Return what the deviation hardly exceeds; infinite where no sounding supports it."""
-        supported = distance_m <= max(self.checked_m, LEAST_CELLS * cell_m)
+        supported = self._supported(distance_m, cell_m)
         likely = np.maximum(sd_m * self.factor, self._unseen_m(distance_m))
         return np.where(np.isnan(sd_m) | supported, likely, np.inf)
+
+    def plausible(self, depth_m: FloatArray, distance_m: FloatArray, cell_m: float) -> tuple[FloatArray, FloatArray]:
+        """Return depths that soundings allow to be told, and what that adds to their deviation, metres.
+
+        A process goes on with every trend, up through the water line and down without end. Where no sounding supports
+        a cell its depth stays between the shallowest and the deepest one sounded, and nowhere is it above the map's
+        datum where no sounding was. As far as a depth was moved it is less certain, up to the relief of unseen ground.
+        """
+        bounded = np.maximum(depth_m, min(self.shallowest_m, 0.0))
+        within = np.clip(depth_m, self.shallowest_m, self.deepest_m)
+        bounded = np.where(self._supported(distance_m, cell_m), bounded, within)
+        return bounded, np.minimum(np.abs(bounded - depth_m), self.relief_m)
+
+    def _supported(self, distance_m: FloatArray, cell_m: float) -> BoolArray:
+        return np.asarray(distance_m <= max(self.checked_m, LEAST_CELLS * cell_m))
 
     def _unseen_m(self, distance_m: FloatArray) -> FloatArray:
         return np.minimum(self.slope * np.maximum(distance_m - self.checked_m, 0.0), self.relief_m)
@@ -105,7 +124,9 @@ def reach(levels: TwoLevels, unit_m: float, factor: float) -> Reach:
     """
     fine = levels.fine
     slope, relief = _steepness(levels), RELIEF * abs(float(fine.depth_m.mean()))
-    return Reach(_checked_m(levels, unit_m), factor, slope, max(relief, float(fine.depth_m.std())))
+    relief = max(relief, float(fine.depth_m.std()))
+    shallowest, deepest = float(fine.depth_m.min()), float(fine.depth_m.max())
+    return Reach(_checked_m(levels, unit_m), factor, slope, relief, shallowest, deepest)
 
 
 def radii(levels: TwoLevels, unit_m: float, step: float = RADIUS_STEP) -> list[float]:

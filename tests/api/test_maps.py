@@ -245,3 +245,28 @@ async def test_a_format_that_is_not_made_lists_those_that_are(client: httpx.Asyn
             answer.json()["remedy"]
             == "Use one of .tif, .nc, .bag, .vr.bag, .tiers.zip, .s102, .xyz, .csv, .geojson, .kml, .png"
         )
+
+
+async def test_the_chance_of_shoal_water_is_a_layer_where_the_mission_says_what_is_shoal(
+    client: httpx.AsyncClient,
+) -> None:
+    paths = []
+    for fields in ({}, {"shoal_depth_m": 8.0}):
+        answer = await client.post("/missions", json=mission_spec(**fields))
+        assert answer.json()["spec"]["shoal_depth_m"] == fields.get("shoal_depth_m")
+        paths.append(f"/missions/{answer.json()['id']}")
+        await client.post(f"{paths[-1]}/measurements", json={"items": soundings()})
+    without, path = paths
+    refused = await client.get(f"{without}/map", params={"layer": "shoal_pct"})
+    assert (refused.status_code, "shoal_depth_m" in refused.json()["remedy"]) == (422, True)
+    shown = (await client.get(f"{path}/map", params={"layer": "shoal_pct"})).json()
+    chance = np.array(shown["layers"]["shoal_pct"], float)
+    told = chance[np.isfinite(chance)]
+    assert told.size
+    assert ((told >= 0.0) & (told <= 100.0)).all()
+    picture = await client.get(f"{path}/map.overlay.png", params={"layer": "shoal_pct"})
+    assert picture.status_code == 200
+    with rasterio.MemoryFile((await client.get(f"{path}/map.tif")).content) as memory, memory.open() as file:
+        assert file.units[file.descriptions.index("shoal_pct")] == "percent"
+    wrong = await client.post("/missions", json=mission_spec(shoal_depth_m=1e6))
+    assert [error["field"] for error in wrong.json()["errors"]] == ["shoal_depth_m"]

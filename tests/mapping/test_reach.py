@@ -7,7 +7,7 @@ from app.arrays import FloatArray
 from app.mapping.calibration import HeldOut
 from app.mapping.gp import GaussianProcessMap
 from app.mapping.levels import two_levels
-from app.mapping.reach import SLOPE, UNCHECKED_FACTOR, likely_factor, likely_square, reach
+from app.mapping.reach import SLOPE, UNCHECKED_FACTOR, Reach, likely_factor, likely_square, reach
 from app.mapping.types import BathymetricMap, Grid, Soundings
 
 GRID = Grid(0.0, 0.0, 2.0, 50, 50)
@@ -110,3 +110,39 @@ def test_checks_that_fail_raise_the_factor_and_few_checks_leave_more_possible(to
     assert too_small < factor(2000) < 1.1 * too_small
     assert factor(20) > factor(2000)
     assert factor(3) == UNCHECKED_FACTOR
+
+
+def diving() -> Soundings:
+    """A short track down a slope, from 2 to 8 m: followed back, the slope leaves the water."""
+    along = np.arange(0.0, 30.0, 0.5)
+    depth = 2.0 + 0.2 * along + 0.05 * np.random.default_rng(4).standard_normal(len(along))
+    return Soundings(35.0 + along, 50.0 + 0.4 * along, depth, np.full(len(along), 0.05))
+
+
+def test_far_from_soundings_the_depth_is_no_other_than_was_sounded_and_less_sure() -> None:
+    soundings = diving()
+    free = GaussianProcessMap(reject_outliers=False, calibrate=False).fit(soundings).predict(GRID)
+    assert free.depth_m.min() < 0.0
+    bathymetry = mapped(soundings)
+    unsupported = np.isinf(bathymetry.claim_sd_m)
+    low, high = soundings.depth_m.min(), soundings.depth_m.max()
+    assert unsupported.mean() > 0.9
+    assert low - 0.2 <= bathymetry.depth_m[unsupported].min()
+    assert bathymetry.depth_m[unsupported].max() <= high + 0.2
+    assert (bathymetry.depth_m >= 0.0).all()
+    moved = unsupported & (np.abs(bathymetry.depth_m - free.depth_m) > 1.0)
+    assert moved.any()
+    assert (bathymetry.sd_m[moved] >= 1.0).all()
+    # Where soundings support the map it is what they make of it.
+    np.testing.assert_allclose(bathymetry.depth_m[~unsupported], free.depth_m[~unsupported], atol=1e-9)
+
+
+@pytest.mark.parametrize("ends_m", [(-1.0, 5.0), (3.0, 9.0)])
+def test_ground_above_the_datum_is_told_only_where_it_was_sounded(ends_m: tuple[float, float]) -> None:
+    low, high = ends_m
+    believed = Reach(5.0, 1.0, 0.1, 3.0, shallowest_m=low, deepest_m=high)
+    depth, away = np.array([-40.0, -0.5, 4.0, 40.0]), np.array([1.0, 9.0])[:, None]
+    bounded, moved = believed.plausible(np.tile(depth, (2, 1)), np.tile(away, (1, 4)), 1.0)
+    assert bounded[0].tolist() == [min(low, 0.0), max(-0.5, min(low, 0.0)), 4.0, 40.0]
+    assert bounded[1].tolist() == [low, max(low, -0.5), 4.0, high]
+    assert (moved == np.minimum(np.abs(bounded - depth), 3.0)).all()

@@ -231,7 +231,8 @@ def _tiers(material: Material, options: ProductOptions) -> bytes:
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w") as file:
         for tier in tiers(material.snapshot.built.map, _cell_of_depth(material)):
-            layers = file_layers(LayerSource(tier.map, options.order, facts.common_sd_m))
+            source = LayerSource(tier.map, options.order, facts.common_sd_m, shoal_depth_m=facts.spec.shoal_depth_m)
+            layers = file_layers(source)
             content = geotiff(tier.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
             name = zipfile.ZipInfo(f"{slug(facts.spec.name)}-{tier.map.grid.cell_m:g}m.tif", ZIP_EPOCH)
             file.writestr(name, content)

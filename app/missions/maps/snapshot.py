@@ -88,6 +88,7 @@ class MapSnapshot:
             self.reference_m,
             lambda: None if self.interpolation is None else self.interpolation.map(),
             self.facts.spec.coverage.cell_of_depth,
+            self.facts.spec.shoal_depth_m,
         )
 
     def ensonified(self) -> Ensonified | None:

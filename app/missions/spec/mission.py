@@ -428,6 +428,14 @@ class MissionSpec(Model):
         # What each order of S-44 asks for where it is strictest.
         json_schema_extra={"x-orders": {order.spoken: strictest_sd_m(order) for order in Order}},
     )
+    shoal_depth_m: float | None = Field(
+        default=None,
+        ge=-100,
+        le=11_000,
+        allow_inf_nan=False,
+        description="What is shallower counts as shoal, metres below the datum of the map: its layer shoal_pct is the "
+        "chance of that in each cell. It keeps no vehicle away: limits.min_altitude_m does. null: no such layer",
+    )
     sounding_noise: float = Field(
         default=0.01,
         ge=0,

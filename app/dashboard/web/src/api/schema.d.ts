@@ -2927,7 +2927,7 @@ export interface components {
          * @description A layer that the tiles hold on request.
          * @enum {string}
          */
-        FurtherLayer: "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu";
+        FurtherLayer: "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "shoal_pct";
         /**
          * Guidance
          * @description How a vehicle of kind ``imc`` is led.
@@ -3084,7 +3084,7 @@ export interface components {
          * @description A layer of the map beside those that its JSON always has.
          * @enum {string}
          */
-        LayerName: "uncertainty" | "count" | "sounded" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "live";
+        LayerName: "uncertainty" | "count" | "sounded" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "shoal_pct" | "live";
         /**
          * LayerView
          * @description A layer of the map: what its values say and how it is shown.
@@ -3604,6 +3604,11 @@ export interface components {
              */
             accuracy_m: number;
             /**
+             * Shoal Depth M
+             * @description What is shallower counts as shoal, metres below the datum of the map: its layer shoal_pct is the chance of that in each cell. It keeps no vehicle away: limits.min_altitude_m does. null: no such layer
+             */
+            shoal_depth_m?: number | null;
+            /**
              * Sounding Noise
              * @description Standard deviation of a range as a fraction of it, where the vehicle states none
              * @default 0.01
@@ -3798,6 +3803,11 @@ export interface components {
                  */
                 accuracy_m: number;
                 /**
+                 * Shoal Depth M
+                 * @description What is shallower counts as shoal, metres below the datum of the map: its layer shoal_pct is the chance of that in each cell. It keeps no vehicle away: limits.min_altitude_m does. null: no such layer
+                 */
+                shoal_depth_m?: number | null;
+                /**
                  * Sounding Noise
                  * @description Standard deviation of a range as a fraction of it, where the vehicle states none
                  * @default 0.01
@@ -3896,7 +3906,7 @@ export interface components {
          * @description A layer that can be seen as a picture.
          * @enum {string}
          */
-        OverlayLayer: "depth" | "uncertainty" | "count" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "live";
+        OverlayLayer: "depth" | "uncertainty" | "count" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "shoal_pct" | "live";
         /**
          * Palette
          * @description Colours of the dashboard's map.

@@ -94,6 +94,15 @@ export const FIELDS = {
     optional: true,
   },
   accuracy_m: { path: "accuracy_m", part: "quality", label: "Accuracy", unit: "m" },
+  shoal_depth_m: {
+    path: "shoal_depth_m",
+    part: "quality",
+    label: "Shoal above",
+    unit: "m",
+    kind: "survey",
+    placeholder: "no layer",
+    optional: true,
+  },
   overlap_pct: {
     path: "coverage.overlap_pct",
     part: "coverage",
