@@ -9,8 +9,8 @@ from app.mapping.swath.pings import Footprints, Pings
 from app.mapping.types import Grid
 from app.missions.maps.swath_grid import SwathGrid
 
-GRID = Grid(0.0, 0.0, 1.0, 40, 40)
-MASK = np.ones((40, 40), dtype=bool)
+GRID = Grid(0.0, 0.0, 1.0, 80, 80)
+MASK = np.ones((80, 80), dtype=bool)
 
 
 def swept(depth_m: float, cell_of_depth: float | None) -> Coverage:

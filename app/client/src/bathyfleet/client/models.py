@@ -45,7 +45,7 @@ Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "
 Fit: TypeAlias = Annotated[Literal["data", "from_zero", "about_zero"], Open]
 """How a range of colours follows the values: from the least, from zero, or as far below zero as above."""
 
-FurtherLayer: TypeAlias = Annotated[Literal["density", "slope", "tvu_fraction", "difference", "tvu", "thu"], Open]
+FurtherLayer: TypeAlias = Annotated[Literal["density", "slope", "tvu_fraction", "difference", "tvu", "thu", "shoal_pct"], Open]
 """A layer that the tiles hold on request."""
 
 Guidance: TypeAlias = Annotated[Literal["follow", "legs", "acoustic"], Open]
@@ -57,7 +57,7 @@ Homecoming: TypeAlias = Annotated[Literal["return", "stop"], Open]
 Language: TypeAlias = Annotated[Literal["en", "pt"], Open]
 """A language that reports are written in."""
 
-LayerName: TypeAlias = Annotated[Literal["uncertainty", "count", "sounded", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "live"], Open]
+LayerName: TypeAlias = Annotated[Literal["uncertainty", "count", "sounded", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "shoal_pct", "live"], Open]
 """A layer of the map beside those that its JSON always has."""
 
 Level: TypeAlias = Annotated[Literal["info", "warning", "alarm"], Open]
@@ -81,7 +81,7 @@ Notice: TypeAlias = Annotated[Literal["raised", "escalated", "acknowledged"], Op
 Order: TypeAlias = Annotated[Literal["exclusive", "special", "1a", "1b", "2"], Open]
 """An order of survey."""
 
-OverlayLayer: TypeAlias = Annotated[Literal["depth", "uncertainty", "count", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "live"], Open]
+OverlayLayer: TypeAlias = Annotated[Literal["depth", "uncertainty", "count", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "shoal_pct", "live"], Open]
 """A layer that can be seen as a picture."""
 
 Palette: TypeAlias = Annotated[Literal["deep", "violet", "matter", "balance", "landmarks", "classes"], Open]
@@ -985,6 +985,10 @@ class MissionSpec(Model):
     """After this many seconds of vehicle time a step goes on without stragglers"""
     accuracy_m: float = 0.25
     """Standard deviation below which a cell counts as accurately known"""
+    shoal_depth_m: float | None = None
+    """What is shallower counts as shoal, metres below the datum of the map: its layer shoal_pct is the chance of
+    that in each cell. It keeps no vehicle away: limits.min_altitude_m does. null: no such layer
+    """
     sounding_noise: float = 0.01
     """Standard deviation of a range as a fraction of it, where the vehicle states none"""
     uncertainty: SoundingErrors | None = None
@@ -1494,6 +1498,8 @@ class ShipView(Model):
     length_m: float | None
     width_m: float | None
     draught_m: float | None
+    heard_at: datetime
+    """When it was heard, UTC"""
     age_s: float
     """Since it was heard"""
     closest: ApproachView | None

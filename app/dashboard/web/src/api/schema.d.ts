@@ -4990,6 +4990,12 @@ export interface components {
             /** Draught M */
             draught_m: number | null;
             /**
+             * Heard At
+             * Format: date-time
+             * @description When it was heard, UTC
+             */
+            heard_at: string;
+            /**
              * Age S
              * @description Since it was heard
              */
