@@ -18,8 +18,10 @@ from app.storage.ping_files import PingFileError, PingFiles, digest_in
 
 SQLITE_MAGIC = b"SQLite format 3\0"
 ARCHIVE_MAGIC = b"PGDMP"
-_WITHOUT_PROCESSES = ("--exclude-table-data=mission_owners", "--exclude-table-data=processes")
-"""The list of live processes is of no use later, and their secrets are private."""
+_WITHOUT_PROCESSES = tuple(
+    f"--exclude-table-data={table}" for table in ("mission_owners", "alarm_deliveries", "processes")
+)
+"""The list of live processes, and what they are at, is of no use later, and their secrets are private."""
 
 
 class BackupError(Exception):

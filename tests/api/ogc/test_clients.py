@@ -134,6 +134,8 @@ def test_gdal_opens_tiles_where_the_map_lies(gis: Gis, tmp_path: Path) -> None:
     assert ((colour[3] > 0) == known).mean() > 0.995
     shown = known & (colour[3] > 0)
     brightness = colour[:3].astype(float).mean(axis=0)
+    # In the deep corner, which nobody sounded, guesses are held to what was sounded, and are pale.
+    shown &= depth < np.quantile(depth[shown], 0.7)
     assert np.corrcoef(depth[shown], brightness[shown])[0, 1] < -0.9
 
 
