@@ -69,5 +69,5 @@ async def test_pings_survive_being_killed_at_random_moments(databases: Databases
         # What was said to be stored is; of what was not said yet at most one transaction more.
         assert said <= len(found["a"]) <= said + 3
         number = len(found["a"])
-    assert len(files.names("m1")) > KILLS
+    assert len(files.names("m1")) > 1, "some were moved into files meanwhile"
     await database.close()

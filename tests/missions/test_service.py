@@ -775,6 +775,24 @@ async def test_a_watcher_gets_a_snapshot_first_and_then_every_event_in_order(ser
     assert seen == sorted(set(seen))
 
 
+async def test_a_line_whose_writer_is_cancelled_is_seen_if_it_is_stored(service: MissionService) -> None:
+    live = await service.get((await service.create(sim_spec(steps=3))).id)
+    with live.broadcaster.subscribe() as messages:
+        writing = asyncio.create_task(live.journal.log(Level.INFO, "note", "cut off"))
+        await asyncio.sleep(0)  # it has begun
+        writing.cancel()
+        await asyncio.gather(writing, return_exceptions=True)
+        await live.journal.log(Level.INFO, "note", "whole")
+        told = []
+        async for message in messages:
+            if isinstance(message, EventMessage):
+                told.append(message.event.message)
+            if told[-1:] == ["whole"]:
+                break
+    stored = [line.message for line in await events_after(live)]
+    assert [text for text in stored if text in ("cut off", "whole")] == told == ["cut off", "whole"]
+
+
 async def test_a_crowd_is_told_of_a_new_map_less_often_but_always_of_the_last(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -290,19 +290,18 @@ class Journal(WriteBehind[Noted]):
             except Exception as error:
                 self.storage.note(error)
                 self._note_lines(*copies)
-                return
-            for row in rows:
-                self.tell(row)
 
     async def write(self, row: EventRow) -> None:
         """Write a line now and show it; raises when that cannot be."""
         async with self._logging:
             await to_the_end(self._add(row))
-            self.tell(row)
 
     async def _add(self, *rows: EventRow) -> None:
+        """Write lines and show them: whoever is cancelled meanwhile, what is stored is seen."""
         async with self._database.writing() as session:
             session.add_all(rows)
+        for row in rows:
+            self.tell(row)
 
     def _begin_trouble(self, trouble: str) -> None:
         """Raise an alarm that nothing can be written: it is told before it can be stored."""
