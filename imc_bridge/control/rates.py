@@ -20,7 +20,10 @@ DUNE_DEFAULTS = (
     "StorageUsage:0.05, Temperature:0.1, Voltage:0.1"
 )
 """Likely rates of a vehicle that never reported them."""
-RESTORE_TRIES = 3
+RESTORE_TRIES = 20
+"""How often the former rates are sent until the vehicle reports them: one that is gone is not asked for ever."""
+RESTORE_TRIES_AT_ONCE = 3
+"""How often they are sent where nobody will hear an answer."""
 RESTORE_RETRY_S = 1.0
 
 
@@ -91,6 +94,8 @@ class RateRequest:
             self._restores -= 1
             self._due = now + RESTORE_RETRY_S
             self._send(_set_message(self._former))
+            # DUNE says nothing to a new value: asked for, it tells the one that holds.
+            self._send(parameter_query(ENTITY))
         if not self._active or self._confirmed or now < self._due or self._tries >= MAX_TRIES + QUERY_TRIES:
             return
         self._due = now + RETRY_S
@@ -113,6 +118,8 @@ class RateRequest:
                 elif self._former is None and self._set is None:
                     self._former = value
                     self._due = now
+                elif self._former is not None and not self._active and _same(value, self._former):
+                    self._restores = 0
 
     def observed(self, state_rate_hz: float) -> None:
         """Let a vehicle that does not answer confirm by what it sends."""
@@ -125,11 +132,11 @@ class RateRequest:
                     return
 
     def restore(self) -> None:
-        """Give the vehicle its former rates back; sent again later, since a packet can be lost."""
+        """Give the vehicle its former rates back: sent until it reports them, since packets get lost."""
         if self._active and self._set is not None:
             self._former = self._former or DUNE_DEFAULTS
             self._send(_set_message(self._former))
-            self._restores = RESTORE_TRIES - 1
+            self._restores = RESTORE_TRIES
             self._due = 0.0
         self._active = False
         self._set = None
@@ -137,9 +144,10 @@ class RateRequest:
     def restore_now(self) -> None:
         """Give the former rates back with the last message."""
         self.restore()
-        while self._restores and self._former is not None:
-            self._restores -= 1
-            self._send(_set_message(self._former))
+        if self._restores and self._former is not None:
+            for _ in range(RESTORE_TRIES_AT_ONCE - 1):
+                self._send(_set_message(self._former))
+        self._restores = 0
 
 
 def parameter_query(entity: str) -> Message:

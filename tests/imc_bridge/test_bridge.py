@@ -9,7 +9,9 @@ import pytest
 
 from imc_bridge import Bridge, Guidance, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
 from imc_bridge.control.plans import OPERATION_START, plan_control
+from imc_bridge.control.rates import DUNE_DEFAULTS
 from imc_bridge.network.codec import encode
+from imc_bridge.network.transport import Address
 from tests.support.imc.sea import Peer, Sea, open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until
@@ -250,11 +252,39 @@ async def test_rates_are_restored_though_packets_are_lost() -> None:
     async with open_sea(loss=0.3) as sea:
         (name,) = await sea.ready()
         node = sea.fleet.nodes[0]
-        former = node._rate_text
+        # A vehicle that never got to tell its own rates is given those that DUNE comes with.
+        restored = {node._rate_text, DUNE_DEFAULTS}
         await sea.bridge.engage(name)
         await until(lambda: "Distance:5" in node._rate_text, "the rates were set")
         await sea.bridge.stop(name, timeout_s=20.0)
+        await until(lambda: node._rate_text in restored, "the rates are as before")
+
+
+async def test_rates_are_sent_until_the_vehicle_reports_them() -> None:
+    async with open_sea() as sea:
+        (name,) = await sea.ready()
+        node, send = sea.fleet.nodes[0], sea.bridge.transport.send
+        former = node._rate_text
+        await sea.bridge.engage(name)
+        await until(lambda: "Distance:5" in node._rate_text, "the rates were set")
+        setting = imcpy.SetEntityParameters().msg_id.to_bytes(2, "little")
+        lost: list[bytes] = []
+
+        def send_but_the_first(packet: bytes, address: Address) -> None:
+            if packet[2:4] == setting and len(lost) < 8:
+                lost.append(packet)
+            else:
+                send(packet, address)
+
+        sea.bridge.transport.send = send_but_the_first
+        await sea.bridge.stop(name, timeout_s=20.0)
         await until(lambda: node._rate_text == former, "the rates are as before")
+        known = sea.bridge._roster.named(name)
+        assert known is not None
+        request = sea.bridge._crew.asked_rates(known)
+        assert request is not None
+        await until(lambda: not request.restoring, "it has heard so and sends no more")
+        assert len(lost) == 8
 
 
 @pytest.mark.parametrize("north_m", [30.0, 95.0], ids=["near: DUNE expects a new path", "far: it times out"])
