@@ -270,11 +270,11 @@ async def test_rates_are_sent_until_the_vehicle_reports_them() -> None:
         setting = imcpy.SetEntityParameters().msg_id.to_bytes(2, "little")
         lost: list[bytes] = []
 
-        def send_but_the_first(packet: bytes, address: Address) -> None:
+        def send_but_the_first(packet: bytes, address: Address) -> bool:
             if packet[2:4] == setting and len(lost) < 8:
                 lost.append(packet)
-            else:
-                send(packet, address)
+                return True
+            return send(packet, address)
 
         sea.bridge.transport.send = send_but_the_first
         await sea.bridge.stop(name, timeout_s=20.0)
