@@ -17,13 +17,14 @@ import typer
 from simulator import seafloors
 from simulator.battery import BatterySpec
 from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.fleet import EQUIPMENT
 from simulator.dune.lost_comms import TIMEOUT_S
 from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
+from simulator.equipment import Equipment
 from simulator.network import NetworkFaults
 from simulator.sensors import SensorKind, SonarNoise
 from simulator.swath import SwathSonar
 from simulator.targets import RangingNoise, TargetSpec
-from simulator.terrain import Terrain
 from simulator.terrain_files import load_terrain
 
 NEW_BATTERY = BatterySpec()
@@ -139,19 +140,29 @@ def main(
         if origin is not None:
             lat, lon = _numbers("origin", origin, 2)
             floor = floor.placed_at(lat, lon)
-        fleet = _fleet(
-            floor,
-            vehicles=vehicles,
-            speed=speed,
+        equipment = Equipment(
             sensor=sensor,
-            swath=None if swath is None else _swath(swath),
             noise=SonarNoise(noise, outliers, dropouts),
-            drift=drift,
-            current=current,
-            starts=start or [],
+            ping_period_s=EQUIPMENT.ping_period_s,
+            swath=SwathSonar() if swath is None else _swath(swath),
+            drift_m2ps=drift,
+            battery=BatterySpec(endurance, nominal_speed, battery, consumption_factor, battery_confidence),
+        )
+        specs = default_specs(
+            vehicles,
+            floor,
             names=[name.strip() for name in names.split(",") if name.strip()],
             ids=[_imc_id(text) for text in ids.split(",") if text.strip()],
+            starts=[_start(text) for text in start or []],
             base_port=base_port,
+        )
+        east, north = _numbers("current", current, 2)
+        fleet = DuneFleet(
+            floor,
+            specs,
+            equipment,
+            speed=speed,
+            current=(east, north),
             options=DuneOptions(
                 bind_address=bind,
                 announce_addresses=tuple(announce_address or ["127.0.0.1"]),
@@ -165,7 +176,6 @@ def main(
             seed=seed,
             targets=[_target(text) for text in target or []],
             ranging=RangingNoise(relative_sd=range_noise, period_s=range_period, hearing_m=hearing or math.inf),
-            battery=BatterySpec(endurance, nominal_speed, battery, consumption_factor, battery_confidence),
         )
         asyncio.run(_run(fleet, json_ready))
     except (ValueError, OSError) as error:
@@ -173,47 +183,9 @@ def main(
         raise typer.Exit(2) from error
 
 
-def _fleet(
-    floor: Terrain,
-    *,
-    vehicles: int,
-    speed: float,
-    sensor: SensorKind,
-    swath: SwathSonar | None,
-    noise: SonarNoise,
-    drift: float,
-    current: str,
-    starts: list[str],
-    names: list[str],
-    ids: list[int],
-    base_port: int,
-    options: DuneOptions,
-    seed: int,
-    targets: list[TargetSpec],
-    ranging: RangingNoise,
-    battery: BatterySpec,
-) -> DuneFleet:
-    places = []
-    for text in starts:
-        values = _numbers("start", text, 2, 3)
-        places.append((values[0], values[1], values[2] if len(values) == 3 else 0.0))
-    specs = default_specs(vehicles, floor, names=names, ids=ids, starts=places, base_port=base_port)
-    east, north = _numbers("current", current, 2)
-    return DuneFleet(
-        floor,
-        specs,
-        speed=speed,
-        sensor=sensor,
-        swath=swath,
-        noise=noise,
-        drift_m2ps=drift,
-        current=(east, north),
-        options=options,
-        seed=seed,
-        targets=targets,
-        ranging=ranging,
-        battery=battery,
-    )
+def _start(text: str) -> tuple[float, float, float]:
+    east, north, *depth = _numbers("start", text, 2, 3)
+    return east, north, depth[0] if depth else 0.0
 
 
 def _swath(text: str) -> SwathSonar:

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulator.arrays import FloatArray
-from simulator.battery import Battery, BatterySpec
+from simulator.battery import Battery
+from simulator.equipment import Equipment
 from simulator.navigation import Navigation
-from simulator.sensors import SensorKind, Sonar, SonarNoise, to_local_frame
-from simulator.swath import SwathErrors, SwathSonar, SwathSounder
+from simulator.sensors import SensorKind, Sonar, to_local_frame
+from simulator.swath import SwathErrors, SwathSounder
 from simulator.terrain import Terrain
-from simulator.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle, VehicleLimits
+from simulator.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle
 
 log = logging.getLogger(__name__)
 
@@ -145,22 +146,16 @@ class SimulatedVehicle:
         Unique within the fleet.
     terrain
         The truth.
-    sensor
-        Kind of sonar.
     start
         (east, north, depth) in metres, heading optional through ``heading_rad``.
     rng
         Source of all its randomness; the same generator state gives the same run.
-    noise, drift_m2ps, current, limits
-        Sonar errors, growth of the position variance under water, water velocity (east, north), abilities.
-    ping_period_s, max_range_m
-        Simulated time between measurements, and how far they reach, of a sonar that is no swath sonar.
-    swath
-        What a swath sonar can do. Without any noise its ranges are exact.
+    equipment
+        What it carries and can do.
+    current
+        Water velocity (east, north), m/s.
     start_time_s
         The vehicle's clock at the start.
-    battery
-        Once it is empty the motor is off: the vehicle drifts and floats up. None: energy without end.
 
     Raises
     ------
@@ -172,20 +167,13 @@ class SimulatedVehicle:
         self,
         name: str,
         terrain: Terrain,
-        sensor: SensorKind | str,
         start: Sequence[float],
         rng: np.random.Generator,
+        equipment: Equipment | None = None,
         *,
         heading_rad: float = 0.0,
-        noise: SonarNoise | None = None,
-        drift_m2ps: float = 0.0,
         current: tuple[float, float] = (0.0, 0.0),
-        limits: VehicleLimits | None = None,
-        ping_period_s: float = 0.2,
-        max_range_m: float = 100.0,
-        swath: SwathSonar | None = None,
         start_time_s: float = 0.0,
-        battery: BatterySpec | None = None,
     ) -> None:
         east, north, depth = (float(value) for value in start)
         if not terrain.contains(east, north):
@@ -196,18 +184,24 @@ class SimulatedVehicle:
         floor = terrain.depth_at_point(east, north)
         if depth < 0.0 or depth > floor:
             raise ValueError(f"{name}: start depth {depth:g} m is not between the surface and {floor:.2f} m")
+        carried = equipment or Equipment()
         self.name = name
         self.terrain = terrain
         self.time_s = float(start_time_s)
-        self.vehicle = Vehicle(Motion(east, north, depth, heading_rad), limits, current)
+        self.vehicle = Vehicle(Motion(east, north, depth, heading_rad), carried.limits, current)
         sonar_rng, navigation_rng = rng.spawn(2)
-        self.battery = None if battery is None else Battery(battery)
-        self.navigation = Navigation(drift_m2ps, navigation_rng)
-        noise = noise or SonarNoise()
+        self.battery = None if carried.battery is None else Battery(carried.battery)
+        self.navigation = Navigation(carried.drift_m2ps, navigation_rng)
         self.sonar: Sonar | SwathSounder = (
-            SwathSounder(swath or SwathSonar(), SwathErrors.of(noise), sonar_rng)
-            if sensor == SensorKind.MULTIBEAM
-            else Sonar(SensorKind(sensor), noise, sonar_rng, ping_period_s=ping_period_s, max_range_m=max_range_m)
+            SwathSounder(carried.swath, SwathErrors.of(carried.noise), sonar_rng)
+            if carried.sensor == SensorKind.MULTIBEAM
+            else Sonar(
+                SensorKind(carried.sensor),
+                carried.noise,
+                sonar_rng,
+                ping_period_s=carried.ping_period_s,
+                max_range_m=carried.max_range_m,
+            )
         )
         self.collisions: list[tuple[float, LocalPosition]] = []
         """Time and place of every contact with the bottom (one entry per contact, not per step)."""

@@ -17,12 +17,11 @@ from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
 from simulator.dune.discovery import listen_for_announces
 from simulator.dune.node import DuneOptions, FakeDune
+from simulator.equipment import Equipment
 from simulator.network import Address, UdpEndpoint
-from simulator.sensors import SensorKind, SonarNoise
-from simulator.swath import SwathSonar
 from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
 from simulator.terrain import Terrain
-from simulator.vehicle import STEP_S, VehicleLimits
+from simulator.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)
@@ -33,6 +32,8 @@ TICK_S = 0.02
 """Least wall time between two rounds of the simulation."""
 MOST_BEHIND_S = 0.5
 """Wall time by which the simulation may lag before vehicle time is left out."""
+EQUIPMENT = Equipment(ping_period_s=0.1, battery=BatterySpec())
+"""Of vehicles of which nothing else is said."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +98,10 @@ class DuneFleet:
         The vehicles.
     speed
         Vehicle seconds per wall second.
-    sensor, noise, drift_m2ps, current, limits, ping_period_s, swath
-        As for :class:`simulator.world.SimulatedVehicle`.
+    equipment
+        Of every vehicle; None: :data:`EQUIPMENT`.
+    current
+        Water velocity (east, north), m/s.
     options
         Network side of the nodes.
     clock_offset_s
@@ -107,29 +110,21 @@ class DuneFleet:
         Of all randomness.
     targets, ranging
         What moves about in the water, and how well the vehicles' modems range to it.
-    battery
-        Of every vehicle.
     """
 
     def __init__(
         self,
         terrain: Terrain,
         specs: Sequence[VehicleSpec],
+        equipment: Equipment | None = None,
         *,
         speed: float = 1.0,
-        sensor: SensorKind | str = SensorKind.SINGLE,
-        noise: SonarNoise | None = None,
-        drift_m2ps: float = 0.0,
         current: tuple[float, float] = (0.0, 0.0),
-        limits: VehicleLimits | None = None,
-        ping_period_s: float = 0.1,
-        swath: SwathSonar | None = None,
         options: DuneOptions | None = None,
         clock_offset_s: float = 0.0,
         seed: int = 0,
         targets: Sequence[TargetSpec] = (),
         ranging: RangingNoise | None = None,
-        battery: BatterySpec | None = None,
     ) -> None:
         self.terrain = terrain
         self.options = options or DuneOptions()
@@ -142,18 +137,12 @@ class DuneFleet:
                 SimulatedVehicle(
                     spec.name,
                     terrain,
-                    sensor,
                     spec.start,
                     rngs[2 * k],
+                    equipment or EQUIPMENT,
                     heading_rad=spec.heading_rad,
-                    noise=noise,
-                    drift_m2ps=drift_m2ps,
                     current=current,
-                    limits=limits,
-                    ping_period_s=ping_period_s,
-                    swath=swath,
                     start_time_s=self._simulated_s,
-                    battery=battery or BatterySpec(),
                 ),
                 spec.imc_id,
                 spec.port,

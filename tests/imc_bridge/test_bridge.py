@@ -33,7 +33,7 @@ def truth_errors(sea: Sea) -> list[float]:
     ("loss", "sensor"), [(0.0, "single"), (0.05, "single"), (0.0, "dvl")], ids=["clean", "5 % loss", "dvl"]
 )
 async def test_two_vehicles_follow_three_waypoints_and_stop(loss: float, sensor: str) -> None:
-    async with open_sea(vehicles=2, loss=loss, sensor=sensor) as sea:
+    async with open_sea(vehicles=2, loss=loss, equipment={"sensor": sensor}) as sea:
         names = await sea.ready()
         await asyncio.gather(*(sea.bridge.engage(name) for name in names))
         assert all(node.engaged for node in sea.bridge.nodes())
@@ -357,7 +357,7 @@ async def test_plan_that_the_vehicle_refuses_is_told_in_its_words() -> None:
 
 @pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
 async def test_waypoints_are_reached_in_a_current_of_half_the_speed(guidance: Guidance) -> None:
-    async with open_sea(family="flat", water={"current": (0.35, -0.35)}, bridge={"unknown_bottom_depth_m": 0.0}) as sea:
+    async with open_sea(family="flat", current=(0.35, -0.35), bridge={"unknown_bottom_depth_m": 0.0}) as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name, guidance)
         for step, (east, north) in enumerate([(30, 60), (70, 60), (30, 30)]):

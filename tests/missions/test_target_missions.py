@@ -1,6 +1,7 @@
 """Missions that keep track of moving targets: real services, simulated vehicles, UDP."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from app.missions.states import MissionState
 from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.fleet import EQUIPMENT
 from simulator.seafloors import generate
 from simulator.targets import RangingNoise, TargetSpec
 from tests.support.missions.harbour import Harbour, Rover, act, until_state, view_of
@@ -145,11 +147,11 @@ async def test_vehicles_over_udp_find_what_swims_about_and_every_waypoint_was_ch
     fleet = DuneFleet(
         floor,
         default_specs(2, floor, base_port=ports[0]),
+        replace(EQUIPMENT, drift_m2ps=0.02),
         speed=20.0,
         options=DuneOptions(announce_ports=tuple(ports[3:])),
         targets=targets,
         ranging=RangingNoise(period_s=1.0, outliers=0.2),
-        drift_m2ps=0.02,
     )
     async with fleet:
         imc = ImcSettings(port=ports[2], announce_ports=tuple(ports[3:]), loopback_only=True)

@@ -5,6 +5,7 @@ import pytest
 
 from simulator import seafloors
 from simulator.battery import Battery, BatterySpec
+from simulator.equipment import Equipment
 from simulator.vehicle import Guidance
 from simulator.world import SimulatedVehicle
 
@@ -13,7 +14,7 @@ FLAT = seafloors.generate("flat", 0)
 
 def swimmer(**battery: float) -> SimulatedVehicle:
     spec = BatterySpec(**battery)
-    return SimulatedVehicle("one", FLAT, "single", (20, 20, 2), np.random.default_rng(0), battery=spec)
+    return SimulatedVehicle("one", FLAT, (20, 20, 2), np.random.default_rng(0), Equipment(battery=spec))
 
 
 def drained(seconds: float, speed: float, **spec: float) -> float:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from simulator import seafloors
+from simulator.equipment import Equipment
 from simulator.navigation import LEAST_VARIANCE_M2, Navigation
 from simulator.sensors import SonarNoise
 from simulator.swath import SwathSonar
@@ -18,12 +19,13 @@ FLAT = seafloors.generate("flat", 0)
 
 def vehicle(
     terrain: Terrain = HARBOUR,
-    sensor: str = "single",
     start: tuple[int, int, int] = (20, 20, 0),
     seed: int = 0,
-    **kwargs: Any,
+    start_time_s: float = 0.0,
+    **carried: Any,
 ) -> SimulatedVehicle:
-    return SimulatedVehicle("one", terrain, sensor, start, np.random.default_rng(seed), **kwargs)
+    rng = np.random.default_rng(seed)
+    return SimulatedVehicle("one", terrain, start, rng, Equipment(**carried), start_time_s=start_time_s)
 
 
 def test_it_arrives_and_circles_there() -> None:

@@ -20,6 +20,7 @@ from app.exploration.core.track import along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.mapping.types import Soundings
+from simulator.equipment import Equipment
 from simulator.sensors import SonarNoise
 from simulator.world import SimulatedVehicle
 
@@ -238,10 +239,10 @@ def _take_back(crafts: list[_Craft], names: tuple[str, ...], chooser: Planner) -
 
 def _crafts(scenario: SurveyScenario, stream: int) -> list[_Craft]:
     rng = np.random.default_rng([scenario.seed, 4, stream])
-    noise = SonarNoise(scenario.relative_noise)
+    equipment = Equipment(noise=SonarNoise(scenario.relative_noise))
     return [
         _Craft(
-            SimulatedVehicle(f"auv-{i + 1}", scenario.terrain, "single", [*start[:2], 0.0], own, noise=noise),
+            SimulatedVehicle(f"auv-{i + 1}", scenario.terrain, [*start[:2], 0.0], own, equipment),
             float(start[2]),
         )
         for i, (start, own) in enumerate(zip(scenario.starts_m, rng.spawn(scenario.vehicles), strict=True))

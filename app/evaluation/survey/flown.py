@@ -7,6 +7,7 @@ from app.evaluation.survey.world import SPEED_MPS
 from app.exploration.core.constraints import Constraints
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
+from simulator.equipment import Equipment
 from simulator.sensors import SonarNoise
 from simulator.terrain import Terrain
 from simulator.world import BeamReturn, SimulatedVehicle
@@ -35,13 +36,12 @@ def fly_lawnmower(
     (n_vehicles, 3), depths positive down.
     """
     budget_m = distance_m
+    equipment = Equipment(noise=SonarNoise(relative_noise))
     for _ in range(TRIES):
         routes = lawnmower_routes(constraints, starts_m[:, :2], np.full(len(starts_m), budget_m))
         rng = np.random.default_rng([seed, 2])
         vehicles = [
-            SimulatedVehicle(
-                f"lawnmower-{i + 1}", terrain, "single", [*start[:2], 0.0], stream, noise=SonarNoise(relative_noise)
-            )
+            SimulatedVehicle(f"lawnmower-{i + 1}", terrain, [*start[:2], 0.0], stream, equipment)
             for i, (start, stream) in enumerate(zip(starts_m, rng.spawn(len(starts_m)), strict=True))
         ]
         measured: list[BeamReturn] = []

@@ -90,7 +90,7 @@ async def test_address_where_nothing_listens() -> None:
 
 
 async def test_a_multibeam_measures_the_bottom_too() -> None:
-    async with open_sea(sensor="multibeam") as sea:
+    async with open_sea(equipment={"sensor": "multibeam"}) as sea:
         (name,) = await sea.ready()
         await until(lambda: any(event.vehicle == name for event in sea.of(SwathPing)), "it pings")
         (node,) = sea.bridge.nodes()

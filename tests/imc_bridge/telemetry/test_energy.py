@@ -51,7 +51,7 @@ def test_levels_that_cannot_be_are_left_out(value: float, confidence: float, ene
 
 async def test_energy_and_current_come_with_the_states() -> None:
     battery = BatterySpec(endurance_min=100.0, level_pct=50.0, confidence_pct=70.0)
-    async with open_sea(water={"battery": battery, "current": (0.1, -0.2)}) as sea:
+    async with open_sea(equipment={"battery": battery}, current=(0.1, -0.2)) as sea:
 
         def last() -> StateReport:
             return sea.of(StateReport)[-1]

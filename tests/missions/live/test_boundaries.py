@@ -14,8 +14,9 @@ from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor, VehicleKind
 from app.missions.views.mission import CheckStatus, EventView, Level
+from simulator.equipment import Equipment
 from simulator.seafloors import generate
-from simulator.sensors import SensorKind, SonarNoise
+from simulator.sensors import SonarNoise
 from simulator.world import SimulatedVehicle
 from tests.support.missions.harbour import Rover, act, view_of
 from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle
@@ -63,12 +64,9 @@ def test_no_vehicle_that_waits_at_its_waypoint_circles_farther_than_the_margin(s
     body = SimulatedVehicle(
         "a",
         terrain,
-        SensorKind.SINGLE,
         (80.0, 88.0, 0.0),
         np.random.default_rng(1),
-        noise=SonarNoise(relative_sd=0.01),
-        start_time_s=0.0,
-        drift_m2ps=0.0,
+        Equipment(noise=SonarNoise(relative_sd=0.01)),
     )
     body.go_to(100, 100, 2.0, speed_mps, arrival_radius_m=3.0)
     farthest_m = 0.0

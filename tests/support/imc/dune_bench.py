@@ -12,6 +12,7 @@ from simulator import seafloors
 from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
 from simulator.dune.node import DuneOptions, FakeDune
+from simulator.equipment import Equipment
 from simulator.swath import SwathSonar
 from simulator.terrain import Terrain
 from simulator.vehicle import STEP_S
@@ -132,14 +133,11 @@ class Bench:
         self.vehicle = SimulatedVehicle(
             "lauv-sim-1",
             terrain,
-            sensor,
             start,
             np.random.default_rng(0),
-            ping_period_s=0.1,
+            Equipment(sensor=sensor, ping_period_s=0.1, battery=battery, swath=swath or SwathSonar()),
             start_time_s=self.clock.now(),
-            battery=battery,
             current=current,
-            swath=swath,
         )
         self.node = FakeDune(
             self.vehicle, imc_id, HOME[1], self.clock, DuneOptions(**options), np.random.default_rng(0)

@@ -5,7 +5,7 @@ import json
 import socket
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ import imcpy
 from imc_bridge import Bridge, BridgeEvent, BridgeSettings, NodeState, Waypoint, WaypointChange, WaypointStatus
 from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.fleet import EQUIPMENT
 from simulator.network import NetworkFaults
 from simulator.terrain import Terrain
 from tests.support.ports import free_ports
@@ -32,10 +33,10 @@ class Sea:
     base_port: int
     vehicles: int
     faults: NetworkFaults = field(default_factory=NetworkFaults)
-    sensor: str = "single"
+    equipment: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=dict)
     clock_offset_s: float = 0.0
-    water: dict[str, Any] = field(default_factory=dict)
+    current: tuple[float, float] = (0.0, 0.0)
     bridge: Bridge = field(init=False)
     running: DuneFleet | None = None
     events: list[BridgeEvent] = field(default_factory=list)
@@ -47,11 +48,11 @@ class Sea:
         self.running = DuneFleet(
             self.floor,
             specs,
+            replace(EQUIPMENT, **self.equipment),
             speed=self.settings.time_scale,
             options=options,
-            sensor=self.sensor,
             clock_offset_s=self.clock_offset_s,
-            **self.water,
+            current=self.current,
         )
         await self.running.start()
 
@@ -108,16 +109,16 @@ class Sea:
 async def open_sea(
     vehicles: int = 1,
     loss: float = 0.0,
-    sensor: str = "single",
     speed: float = SPEED,
     family: str = "harbour",
     clock_offset_s: float = 0.0,
     connected: bool = True,
     bridge: dict[str, Any] | None = None,
-    water: dict[str, Any] | None = None,
+    equipment: dict[str, Any] | None = None,
+    current: tuple[float, float] = (0.0, 0.0),
     **options: Any,
 ) -> AsyncIterator[Sea]:
-    """A sea with its vehicles ready to be engaged; ``options`` are those of the fake DUNEs, ``water`` of their fleet.
+    """A sea with its vehicles ready to be engaged; ``options`` are those of the fake DUNEs.
 
     With ``connected`` false nobody listens on the bridge's ports yet.
     """
@@ -126,7 +127,15 @@ async def open_sea(
     settings = BridgeSettings(port=port, announce_ports=tuple(announce_ports), time_scale=speed, **changes)
     floor = seafloors.generate(family, 0, width_m=100.0, height_m=100.0)
     sea = Sea(
-        floor, settings, base_port, vehicles, NetworkFaults(loss=loss), sensor, options, clock_offset_s, water or {}
+        floor,
+        settings,
+        base_port,
+        vehicles,
+        NetworkFaults(loss=loss),
+        equipment or {},
+        options,
+        clock_offset_s,
+        current,
     )
     sea.bridge = Bridge(settings)
     if connected:

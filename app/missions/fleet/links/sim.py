@@ -38,6 +38,7 @@ from app.missions.spec.mission import Sensor
 from app.missions.spec.sonar import SwathSonarSpec
 from app.missions.spec.targets import TargetSpec
 from simulator.battery import Battery, BatterySpec
+from simulator.equipment import Equipment
 from simulator.obstacles import ObstacleWorld
 from simulator.raycasting import warm_up
 from simulator.scanning import Scan, Scanning
@@ -301,16 +302,18 @@ class SimFleetLink(FleetLink):
         body = SimulatedVehicle(
             launch.vehicle,
             terrain,
-            SENSORS[launch.sensor],
             (*self._start(launch, terrain), 0.0),
             np.random.default_rng(seed),
-            noise=SonarNoise(relative_sd=launch.noise),
-            swath=launch.swath,
-            start_time_s=started_s,
-            drift_m2ps=self._settings.drift_m2ps,
+            Equipment(
+                sensor=SENSORS[launch.sensor],
+                noise=SonarNoise(relative_sd=launch.noise),
+                swath=launch.swath or SwathSonar(),
+                drift_m2ps=self._settings.drift_m2ps,
+                limits=None if launch.lookout is None else BOAT,
+                battery=launch.battery,
+            ),
             current=self._settings.current_mps,
-            limits=None if launch.lookout is None else BOAT,
-            battery=launch.battery,
+            start_time_s=started_s,
         )
         ranging = Ranging(targets, launch.ranging, np.random.default_rng([*seed, 1]), started_s)
         scanning = None

@@ -79,7 +79,7 @@ async def test_one_waypoint_from_engaging_to_stopping() -> None:
 
 async def test_pings_of_a_multibeam_come_by_udp_and_keep_the_vehicle_off_the_bottom() -> None:
     swath = SwathSonar(aperture_deg=90.0, beams=64)
-    async with open_sea(sensor="multibeam", family="slope", water={"swath": swath}) as sea:
+    async with open_sea(equipment={"sensor": "multibeam", "swath": swath}, family="slope") as sea:
         await sea.bridge.close()
         link = make_imc_link(
             ImcSettings(
