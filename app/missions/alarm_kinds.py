@@ -155,6 +155,16 @@ ALARMS: Mapping[AlarmKind, AlarmRule] = {
 }
 """Every alarm there is."""
 
+OF_A_MISSION = (
+    AlarmKind.NO_VEHICLE,
+    AlarmKind.NO_WAYPOINT,
+    AlarmKind.NO_SCAN,
+    AlarmKind.SEARCH_LATE,
+    AlarmKind.SEARCH_STUCK,
+    AlarmKind.NO_WATER_LEVEL,
+)
+"""Those that are over when their mission is: they say that it does not go on as it should."""
+
 
 def alarms_text() -> str:
     """Return the table as Markdown."""

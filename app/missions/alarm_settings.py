@@ -89,7 +89,9 @@ class Route(_Section):
         le=86_400,
         description="Told when nobody has acknowledged the alarm for so long; 0: at once",
     )
-    acknowledgements: bool = Field(default=True, description="Whether they are told, too, who acknowledged it")
+    acknowledgements: bool = Field(
+        default=True, description="Whether they are told, too, who acknowledged it, and that it is over"
+    )
 
 
 class MailServer(_Section):

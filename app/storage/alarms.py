@@ -38,6 +38,19 @@ async def held(session: AsyncSession, alarm_id: str) -> AlarmRow | None:
     return (await session.scalars(query)).first()
 
 
+async def end(
+    session: AsyncSession, mission_id: str, kinds: Collection[str], vehicle: str | None, at: datetime
+) -> None:
+    """Note that what raised a mission's alarms of some kinds is over, and that those who were told are to hear it."""
+    query = update(AlarmRow).where(
+        AlarmRow.mission_id == mission_id,
+        AlarmRow.kind.in_(kinds),
+        AlarmRow.vehicle.is_(None) if vehicle is None else AlarmRow.vehicle == vehicle,
+        AlarmRow.ended_at.is_(None),
+    )
+    await session.execute(query.values(ended_at=at, next_at=at))
+
+
 async def to_be_told(session: AsyncSession, at: datetime, limit: int) -> Sequence[AlarmRow]:
     """Return alarms of which somebody is to be told by now, and that no other transaction is at, oldest first."""
     query = select(AlarmRow).where(AlarmRow.next_at <= at).order_by(AlarmRow.next_at).limit(limit)

@@ -512,6 +512,8 @@ class AlarmRow(Base):
     vehicle: Mapped[str | None] = mapped_column(String(64))
     message: Mapped[str] = mapped_column(Text)
     raised_at: Mapped[datetime]
+    ended_at: Mapped[datetime | None]
+    """When its cause was over; it stays open until somebody acknowledges it."""
     acknowledged_at: Mapped[datetime | None]
     acknowledged_by: Mapped[str | None] = mapped_column(String(120))
     told_after_s: Mapped[float | None]

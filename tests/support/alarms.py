@@ -24,6 +24,7 @@ from app.missions.alarm_settings import AlarmSettings
 from app.missions.alarms.desk import AlarmDesk
 from app.missions.alarms.raised import make_alarm
 from app.missions.views.alarms import AlarmReport
+from app.storage import alarms as alarm_queries
 from app.storage.database import Database
 from app.storage.models import AlarmRow, ProcessRow
 from tests.support import rows
@@ -204,6 +205,11 @@ class Watch:
             session.add(row)
         self.desk.stored(row)
         return row
+
+    async def end(self, row: AlarmRow) -> None:
+        """Store that an alarm's cause is over, as a mission's journal does."""
+        async with self.database.writing() as session:
+            await alarm_queries.end(session, "m1", [row.kind], row.vehicle, self.clock())
 
     async def look(self) -> None:
         """Look, wait for what was sent, and write down what came of it."""

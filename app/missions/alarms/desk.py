@@ -353,7 +353,7 @@ class AlarmDesk:
             gone = shown - {row.id for row in rows} - self._unstored.keys()
             rows += await alarm_queries.of_ids(session, gone)
         for row in reversed(rows):
-            if row.acknowledged_at is not None or row.id not in shown:
+            if row.acknowledged_at is not None or row.ended_at is not None or row.id not in shown:
                 self._show(row)
 
 

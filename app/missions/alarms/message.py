@@ -12,7 +12,12 @@ from app.missions.views.alarms import AlarmView, Notice
 MAIL_DOMAIN = "bathyfleet.invalid"
 """Of message ids: what is told twice has the same, and nobody's domain is in it."""
 
-_TITLES = {Notice.RAISED: "", Notice.ESCALATED: "NOT ACKNOWLEDGED: ", Notice.ACKNOWLEDGED: "acknowledged: "}
+_TITLES = {
+    Notice.RAISED: "",
+    Notice.ESCALATED: "NOT ACKNOWLEDGED: ",
+    Notice.ACKNOWLEDGED: "acknowledged: ",
+    Notice.ENDED: "over: ",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,8 @@ class Message:
             f"To do:     {ALARMS[alarm.kind].action}",
             f"Alarm id:  {alarm.id}",
         ]
+        if alarm.ended_at is not None:
+            lines.insert(4, f"Over since {alarm.ended_at:%Y-%m-%d %H:%M:%S} UTC")
         if alarm.acknowledged_at is not None:
             lines.insert(4, f"Acknowledged by {alarm.acknowledged_by} at {alarm.acknowledged_at:%Y-%m-%d %H:%M:%S} UTC")
         elif self.notice is Notice.ESCALATED:

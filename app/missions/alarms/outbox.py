@@ -80,11 +80,17 @@ async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> 
     planned: list[AlarmDeliveryRow] = []
     for alarm in await alarm_queries.to_be_told(session, at, AT_ONCE):
         first = alarm.told_after_s is None
+        if alarm.ended_at is not None and not first:
+            planned += await _end(session, settings, alarm, at)
+            alarm.next_at = None
+            continue
         if first and await alarm_queries.like_it(session, alarm, settings.repeat_after_s):
             alarm.next_at = None
             continue
         made, alarm.next_at = deliveries(settings, alarm, await _name(session, alarm), at)
         alarm.told_after_s = max(0.0, (at - alarm.raised_at).total_seconds())
+        if alarm.ended_at is not None:
+            alarm.next_at = None
         planned += made
     await session.flush()
     await alarm_queries.add_deliveries(session, planned)
@@ -102,21 +108,48 @@ async def acknowledge(
 ) -> None:
     """Let nobody be told any more that an alarm is open, and everybody who was be told who has taken it."""
     alarm.acknowledged_at, alarm.acknowledged_by = alarm.acknowledged_at or at, alarm.acknowledged_by or actor
-    alarm.next_at = None
-    reached: set[str] = set()
-    for row in await alarm_queries.deliveries_of(session, [alarm.id]):
-        if row.state == DeliveryState.DELIVERED or row.attempts or row.process_id is not None:
-            reached.add(row.recipient)
+    # That it is over is still told.
+    alarm.next_at = alarm.next_at if alarm.ended_at is not None else None
+    known = await alarm_queries.deliveries_of(session, [alarm.id])
+    reached = _reached(known)
+    for row in known:
         if row.state == DeliveryState.WAITING and row.process_id is None:
             row.state, row.done_at = DeliveryState.SUPERSEDED, at
     await session.flush()
-    kind, severity, name = AlarmKind(alarm.kind), AlarmSeverity(alarm.severity), await _name(session, alarm)
-    told = [
-        new_delivery(alarm.id, recipient, Notice.ACKNOWLEDGED, at)
-        for recipient in sorted(reached)
-        if routes.hears_acknowledgements(settings, recipient, kind, severity, alarm.mission_id, name)
-    ]
+    told = await _further(session, settings, alarm, reached, Notice.ACKNOWLEDGED, at)
     await alarm_queries.add_deliveries(session, told)
+
+
+def _reached(deliveries_made: Sequence[AlarmDeliveryRow]) -> set[str]:
+    """Return who knows of an alarm, or may."""
+    return {
+        row.recipient
+        for row in deliveries_made
+        if row.state == DeliveryState.DELIVERED or row.attempts or row.process_id is not None
+    }
+
+
+async def _end(session: AsyncSession, settings: AlarmSettings, alarm: AlarmRow, at: datetime) -> list[AlarmDeliveryRow]:
+    """Return what is told to those who know of an alarm whose cause is over; who does not yet hears both at once."""
+    reached = _reached(await alarm_queries.deliveries_of(session, [alarm.id]))
+    return await _further(session, settings, alarm, reached, Notice.ENDED, at)
+
+
+async def _further(
+    session: AsyncSession,
+    settings: AlarmSettings,
+    alarm: AlarmRow,
+    reached: Collection[str],
+    notice: Notice,
+    at: datetime,
+) -> list[AlarmDeliveryRow]:
+    """Return what those who know of an alarm, and want to know what becomes of it, are told."""
+    kind, severity, name = AlarmKind(alarm.kind), AlarmSeverity(alarm.severity), await _name(session, alarm)
+    return [
+        new_delivery(alarm.id, recipient, notice, at)
+        for recipient in sorted(reached)
+        if routes.hears_what_follows(settings, recipient, kind, severity, alarm.mission_id, name)
+    ]
 
 
 async def take(

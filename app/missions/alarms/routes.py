@@ -42,7 +42,7 @@ def due(ladder: Sequence[Step], told_after_s: float | None, age_s: float) -> tup
     return now, next((step.after_s for step in ladder if step.after_s > max(age_s, told_s)), None)
 
 
-def hears_acknowledgements(
+def hears_what_follows(
     settings: AlarmSettings,
     recipient: str,
     kind: AlarmKind,
@@ -50,7 +50,7 @@ def hears_acknowledgements(
     mission_id: str | None,
     mission_name: str,
 ) -> bool:
-    """Tell whether somebody who was told of an alarm is told who acknowledged it."""
+    """Tell whether somebody who was told of an alarm is told who acknowledged it, and that it is over."""
     routes = _matching(settings, kind, severity, mission_id, mission_name)
     return any(route.acknowledgements for route in routes if recipient in route.to)
 

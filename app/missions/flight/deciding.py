@@ -132,7 +132,9 @@ class Decider:
         refusals = {leg.vehicle: leg.refusal for leg in decisions[0].legs if leg.refusal}
         if len(refusals) < len(decisions[0].legs) or not decisions[0].legs:
             self._told = {}
-            self._live.standstill = ""
+            if self._live.standstill:
+                self._live.standstill = ""
+                await self._live.journal.end([AlarmKind.NO_WAYPOINT], "a vehicle can be sent on again")
             return decisions
         self.planner.restore(memory)
         if refusals != self._told:

@@ -107,7 +107,7 @@ class Engagement:
             await journal.alarm(AlarmKind.VEHICLE_LOST, words, vehicle=member.name)
         else:
             self._lost.discard(member.name)
-            await journal.log(Level.INFO, "vehicle", f"{member.name} is heard again", vehicle=member.name)
+            await journal.end([AlarmKind.VEHICLE_LOST], f"{member.name} is heard again", vehicle=member.name)
 
     async def _advise(self, member: Member, info: VehicleInfo) -> None:
         if info.advice and member.name not in self._advised:
@@ -150,7 +150,8 @@ class Engagement:
         member.refusal = ""
         member.link = info.state
         member.report = info.report or member.report
-        await live.journal.log(Level.INFO, "vehicle", f"{member.name} follows", vehicle=member.name)
+        kinds = [AlarmKind.VEHICLE_REFUSES, AlarmKind.VEHICLE_RESTARTED]
+        await live.journal.end(kinds, f"{member.name} follows", vehicle=member.name)
         live.changed.set()
         if member.ordered:
             await self._send(member)

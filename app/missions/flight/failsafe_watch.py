@@ -236,9 +236,11 @@ class FailsafeWatch:
                     await self._live.journal.alarm(AlarmKind(failsafe.value), words, **facts)
         for failsafe in before.keys() - now.keys():
             words = f"{who}{failsafe.replace('_', ' ')} is over"
-            await self._live.journal.log(
-                Level.INFO, "failsafe", words, failsafe=failsafe, **({"vehicle": name} if name else {})
-            )
+            facts = {"failsafe": failsafe} | ({"vehicle": name} if name else {})
+            if failsafe is Failsafe.SEPARATION_LOST:
+                await self._live.journal.log(Level.INFO, "failsafe", words, **facts)
+            else:
+                await self._live.journal.end([AlarmKind(failsafe.value)], words, **facts)
         if before.keys() != now.keys():
             self._live.publish_summary()
 

@@ -74,6 +74,7 @@ class SearchHooks:
         message = f"no scan tells what is around {', '.join(blind)}: the search waits for one"
         await live.journal.alarm(AlarmKind.NO_SCAN, message, vehicles=blind)
         await self._wait(lambda: not course.unseen(live.team.present), None)
+        await live.journal.end([AlarmKind.NO_SCAN], "scans tell again what is around every vehicle")
 
     async def tell_of(self, barred: list[Member]) -> None:
         """Write down why a step ends early."""

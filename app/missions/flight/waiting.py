@@ -46,6 +46,7 @@ class Waiting:
         )
         await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=absent)
         await self.until(lambda: bool(team.present) or self._nobody_surveys, None)
+        await live.journal.end([AlarmKind.NO_VEHICLE], "a vehicle can be sent again")
 
     @property
     def _all_present(self) -> bool:

@@ -1,5 +1,8 @@
 """The alarms of a mission that nobody has acknowledged, as everyone who watches it sees them."""
 
+from collections.abc import Collection
+from datetime import datetime
+
 from app.missions.alarms.raised import AlarmWatch, alarm_view
 from app.missions.live.broadcast import Broadcaster
 from app.missions.views.alarms import AlarmState, AlarmView
@@ -41,6 +44,12 @@ class MissionAlarms:
         self.show(alarm_view(row))
         if self.watch is not None:
             self.watch.stored(row)
+
+    def ended(self, kinds: Collection[str], vehicle: str | None, at: datetime) -> None:
+        """Show that what raised the alarms of some kinds is over; they stay until they are acknowledged."""
+        for alarm in self.open:
+            if alarm.kind in kinds and alarm.vehicle == vehicle and alarm.ended_at is None:
+                self.show(alarm.model_copy(update={"ended_at": at}))
 
     def show(self, alarm: AlarmView) -> None:
         """Show an alarm as it is now; whoever sees it so already is told nothing."""

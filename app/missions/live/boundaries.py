@@ -27,8 +27,11 @@ class _Breach:
 class Crossing:
     """A vehicle that went where it must not be, or came back: a line for the log."""
 
-    alarm: AlarmKind | None
-    """None: it came back."""
+    alarm: AlarmKind
+    begins: bool
+    """False: it came back."""
+    ends: bool
+    """It is nowhere any more that raised this alarm."""
     message: str
     data: dict[str, Any]
 
@@ -97,13 +100,13 @@ class Boundaries:
         known = self._breaches.setdefault(vehicle, {})
         breach = known.get(key)
         data = {"vehicle": vehicle, "zone": key or None}
+        alarm = AlarmKind.ZONE_ENTERED if key else AlarmKind.AREA_LEFT
         if breach is None:
             if not began:
                 return []
             known[key] = _Breach(words, at_s, by_m)
             message = f"{vehicle} is {words}, at {depth_m:.1f} m depth: abort it if it goes on"
-            alarm = AlarmKind.ZONE_ENTERED if key else AlarmKind.AREA_LEFT
-            return [Crossing(alarm, message, data | {"begins": True})]
+            return [Crossing(alarm, True, False, message, data | {"begins": True})]
         breach.farthest_m = max(breach.farthest_m, by_m)
         if not over:
             return []
@@ -112,7 +115,9 @@ class Boundaries:
             f"{vehicle} is no longer {words}: it was for {max(at_s - breach.began_s, 0.0):.0f} s, "
             f"by up to {breach.farthest_m:.1f} m"
         )
-        return [Crossing(None, message, data | {"begins": False, "farthest_m": round(breach.farthest_m, 2)})]
+        elsewhere = any(bool(other) == bool(key) for other in known)
+        facts = data | {"begins": False, "farthest_m": round(breach.farthest_m, 2)}
+        return [Crossing(alarm, False, not elsewhere, message, facts)]
 
 
 def _signed_distance_m(polygon: Polygon, place: Point) -> float:

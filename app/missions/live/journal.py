@@ -32,6 +32,7 @@ from app.missions.views.messages import EventMessage
 from app.missions.views.mission import EventView, Level
 from app.missions.views.soundings import ItemVerdict, Verdict
 from app.missions.views.telemetry import VehicleSample
+from app.storage import alarms as alarm_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
@@ -40,6 +41,8 @@ from app.storage.models import AlarmRow, EventRow
 from app.storage.uncancellable import to_the_end
 
 FLUSH_PERIOD_S = 0.1
+ENDS = "ends"
+"""What a line's data name the kinds of alarms by that it ends."""
 TRACK_SPACING_M = 1.0
 METRES_PER_DEGREE = 111_320.0
 
@@ -189,7 +192,7 @@ class Journal(WriteBehind[Noted]):
         await telemetry_queries.add(session, samples)
         # Rows of a transaction that failed cannot be written again.
         rows = [_copy(row) for row in _of(EventRow, noted)]
-        session.add_all(rows)
+        await add_lines(session, rows)
         for report in _of(WaypointReport, noted):
             await mission_queries.set_waypoint_status(
                 session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
@@ -299,7 +302,7 @@ class Journal(WriteBehind[Noted]):
     async def _add(self, *rows: EventRow) -> None:
         """Write lines and show them: whoever is cancelled meanwhile, what is stored is seen."""
         async with self._database.writing() as session:
-            session.add_all(rows)
+            await add_lines(session, rows)
         for row in rows:
             self.tell(row)
 
@@ -313,6 +316,8 @@ class Journal(WriteBehind[Noted]):
         line = self.alarm_line(AlarmKind.DATABASE_UNWRITABLE, message)
         if self._trouble is not None:
             self._trouble.message, line.alarm, self._trouble = message, self._trouble, None
+        if line.alarm is not None:
+            line.alarm.ended_at = line.time
         self.note_line(line)
 
     def line(self, level: Level, kind: str, message: str, **data: Any) -> EventRow:
@@ -333,6 +338,18 @@ class Journal(WriteBehind[Noted]):
         row.alarm = make_alarm(kind, self._mission_id, message, row.time, vehicle=data.get("vehicle"))
         return row
 
+    def end_line(self, kinds: Sequence[AlarmKind], message: str, *, event: str | None = None, **data: Any) -> EventRow:
+        """Return a line that ends alarms of some kinds, those of the vehicle that is named or of the mission.
+
+        They stay open until somebody acknowledges them; nobody else is called.
+        """
+        ends = {ENDS: [str(kind) for kind in kinds]}
+        return self.line(Level.INFO, event or ALARMS[kinds[0]].event, message, **data | ends)
+
+    async def end(self, kinds: Sequence[AlarmKind], message: str, *, event: str | None = None, **data: Any) -> None:
+        """Write the line of :meth:`end_line`."""
+        await self.log_all([self.end_line(kinds, message, event=event, **data)])
+
     def tell(self, row: EventRow) -> None:
         """Show a line that was written to everyone who watches."""
         metrics.EVENTS.labels(row.level).inc()
@@ -341,6 +358,8 @@ class Journal(WriteBehind[Noted]):
         self._broadcaster.publish(EventMessage(event=event_view(row)))
         if row.alarm is not None:
             self.alarms.stored(row.alarm)
+        if row.data.get(ENDS):
+            self.alarms.ended(row.data[ENDS], row.data.get("vehicle"), row.time)
 
     def tell_of_missing_level(self) -> None:
         """Write into the log again, once, when no water level is known for soundings."""
@@ -418,6 +437,16 @@ def event_view(row: EventRow) -> EventView:
 
 def _of(kind: type[T], noted: Sequence[Noted]) -> list[T]:
     return [item for item in noted if isinstance(item, kind)]
+
+
+async def add_lines(session: AsyncSession, rows: Sequence[EventRow]) -> None:
+    """Add lines with the alarms that they raise, and end those that they end."""
+    session.add_all(rows)
+    for row in rows:
+        if row.data.get(ENDS):
+            # After those that were raised before it.
+            await session.flush()
+            await alarm_queries.end(session, row.mission_id, row.data[ENDS], row.data.get("vehicle"), row.time)
 
 
 def _copy(row: EventRow) -> EventRow:

@@ -456,10 +456,12 @@ class LiveMission:
             may_leave=on_its_way_home,
         ):
             journal, words, data = self.journal, crossing.message, crossing.data
-            if crossing.alarm is None:
-                journal.note_line(journal.line(Level.WARNING, "boundary", words, **data))
-            else:
+            if crossing.begins:
                 journal.note_line(journal.alarm_line(crossing.alarm, words, **data))
+            elif crossing.ends:
+                journal.note_line(journal.end_line([crossing.alarm], words, **data))
+            else:
+                journal.note_line(journal.line(Level.INFO, "boundary", words, **data))
 
     def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
         if event.mission_id != self.id or member.order is None or event.step != member.order.step:

@@ -8,17 +8,18 @@ from typing import Any
 
 import structlog
 
-from app.missions.alarm_kinds import AlarmKind
+from app.missions.alarm_kinds import OF_A_MISSION, AlarmKind
 from app.missions.clock import now
 from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
 from app.missions.flight.runner import Runner
+from app.missions.live.journal import ENDS, add_lines
 from app.missions.live.mission import Ending, LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.final_maps import FinalMaps
-from app.missions.states import MissionState
+from app.missions.states import ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -303,7 +304,9 @@ class MissionSupervisor:
     ) -> None:
         changed_at = now()
         words = f"{state} by {actor}" + (f": {reason}" if reason else "")
-        facts = {"state": state, "actor": actor}
+        facts: dict[str, Any] = {"state": state, "actor": actor}
+        if state in ENDED:
+            facts[ENDS] = [str(kind) for kind in OF_A_MISSION]
         if alarm is None:
             line = live.journal.line(Level.INFO, "state", words, **facts)
         else:
@@ -312,7 +315,7 @@ class MissionSupervisor:
             if check is not None:
                 await check(session)
             await mission_queries.set_state(session, live.id, state, reason, changed_at)
-            session.add(line)
+            await add_lines(session, [line])
         live.enter(state, reason, changed_at)
         live.journal.tell(line)
 

@@ -23,6 +23,8 @@ class Notice(StrEnum):
     ESCALATED = "escalated"
     """Nobody acknowledged it in time."""
     ACKNOWLEDGED = "acknowledged"
+    ENDED = "ended"
+    """What raised it is over."""
 
 
 class DeliveryState(StrEnum):
@@ -46,6 +48,9 @@ class AlarmView(View):
     vehicle: str | None
     message: str
     raised_at: datetime
+    ended_at: datetime | None = Field(
+        description="When what raised it was over; it stays open until acknowledged. null: it goes on, or cannot end"
+    )
     state: AlarmState
     acknowledged_at: datetime | None
     acknowledged_by: str | None = Field(description="The name of the token, or of the user, that acknowledged it")

@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import ExitStack
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from standardwebhooks import Webhook
@@ -14,7 +14,7 @@ from app.missions.alarms import ways
 from app.missions.alarms.raised import copy_of, make_alarm
 from app.missions.errors import AlarmNotFoundError, InvalidRequestError
 from app.missions.views.alarms import AlarmState, DeliveryState
-from tests.support.alarms import SECRET, Clock, Watch, end_of_process, hook, told_by
+from tests.support.alarms import BEGAN, SECRET, Clock, Watch, end_of_process, hook, told_by
 from tests.support.waiting import until
 
 Keep = Callable[[AlarmSettings], Awaitable[Watch]]
@@ -114,6 +114,37 @@ async def test_an_alarm_that_nobody_acknowledges_goes_up_step_by_step(keep_watch
     for told in (bridge, captain):
         assert [said["type"] for said in told.said][-1] == "alarm.acknowledged"
         assert told.said[-1]["data"]["acknowledged_by"] == "Ana"
+
+
+async def test_whoever_was_told_hears_that_it_is_over_and_nobody_else_is_called(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b"], "after_s": 120}]
+    with hook() as bridge, hook() as shore:
+        watch = await keep_watch_on_either(told_by(bridge, shore, routes=ladder))
+        alarm = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(60)
+        await watch.end(alarm)
+        await watch.look()
+        clock.advance(600)
+        await watch.look()
+        report = await watch.desk.acknowledge(alarm.id, "Ana")
+        await watch.look()
+    assert report.ended_at == BEGAN + timedelta(seconds=60)
+    assert [said["type"] for said in bridge.said] == ["alarm.raised", "alarm.ended", "alarm.acknowledged"]
+    assert bridge.said[1]["data"]["ended_at"] is not None
+    assert shore.requests == []
+
+
+async def test_what_was_over_before_anybody_was_told_is_told_once(keep_watch: Keep) -> None:
+    with hook() as program:
+        watch = await keep_watch(told_by(program))
+        await watch.end(await watch.raise_alarm())
+        await watch.look()
+        await watch.look()
+    assert [said["type"] for said in program.said] == ["alarm.raised"]
+    assert program.said[0]["data"]["ended_at"] is not None
 
 
 async def test_who_was_not_told_yet_is_not_told_of_what_is_taken(keep_watch: Keep) -> None:

@@ -59,6 +59,39 @@ async def test_everyone_who_watches_sees_an_alarm_and_who_took_it(harbour: Harbo
     assert live.journal.alarms.open == []
 
 
+async def test_an_alarm_whose_cause_is_over_says_so_and_stays_until_somebody_takes_it(harbour: Harbour) -> None:
+    service = harbour.service
+    live = await service.get((await service.create(make_spec())).id)
+    await live.journal.alarm(AlarmKind.VEHICLE_LOST, "a is lost: silent", vehicle="a")
+    await live.journal.alarm(AlarmKind.VEHICLE_LOST, "b is lost: silent", vehicle="b")
+    async with watched(live) as page:
+        await anext(page)
+        # Lines that wait to be written end alarms as those do that are written at once.
+        live.journal.note_line(live.journal.end_line([AlarmKind.VEHICLE_LOST], "a is heard again", vehicle="a"))
+        said = await _alarm_of(page)
+        assert (said.alarm.vehicle, said.alarm.state) == ("a", AlarmState.OPEN)
+        assert said.alarm.ended_at is not None
+    ended = {alarm.vehicle: alarm.ended_at for alarm in await service.alarms.alarms(AlarmState.OPEN)}
+    assert ended == {"a": said.alarm.ended_at, "b": None}
+    again = await harbour.reopen()
+    board = (await again.get(live.id)).journal.alarms
+    await until(lambda: board.open, "they are shown")
+    assert [(alarm.vehicle, alarm.ended_at) for alarm in board.open] == sorted(ended.items())
+
+
+async def test_what_keeps_a_mission_from_going_on_is_over_with_it(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = await service.create(make_spec(vehicles=[{"name": "a", "kind": "rest"}]))
+    await act(service, mission.id, "start", actor="Ana")
+    live = await service.get(mission.id)
+    await until(lambda: live.journal.alarms.open, "nobody can be sent anywhere")
+    await live.journal.alarm(AlarmKind.NOT_COME_HOME, "a did not come home", vehicle="a")
+    await act(service, mission.id, "abort", actor="Ana")
+    over = {alarm.kind: alarm.ended_at is not None for alarm in await service.alarms.alarms(mission_id=mission.id)}
+    assert over[AlarmKind.NO_VEHICLE]
+    assert not over[AlarmKind.NOT_COME_HOME]
+
+
 async def test_what_another_process_acknowledges_the_owners_pages_see(
     make_settings: Callable[..., ServiceSettings],
 ) -> None:

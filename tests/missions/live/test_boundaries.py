@@ -28,7 +28,7 @@ ZONE = np.array([[40.0, 40], [60, 40], [60, 60], [40, 60]])
 
 def told(boundaries: Boundaries, places: list[tuple[float, float]]) -> list[tuple[AlarmKind | None, str]]:
     lines = [boundaries.judge("a", place, 2.0, at_s) for at_s, place in enumerate(places)]
-    return [(line.alarm, line.message) for found in lines for line in found]
+    return [(line.alarm if line.begins else None, line.message) for found in lines for line in found]
 
 
 def test_an_entry_into_a_zone_is_one_alarm_and_its_end_says_how_long_and_how_far() -> None:
@@ -36,6 +36,17 @@ def test_an_entry_into_a_zone_is_one_alarm_and_its_end_says_how_long_and_how_far
     assert told(Boundaries(AREA, [ZONE]), way) == [
         (AlarmKind.ZONE_ENTERED, "a is in keep-out zone 1, at 2.0 m depth: abort it if it goes on"),
         (None, "a is no longer in keep-out zone 1: it was for 5 s, by up to 4.0 m"),
+    ]
+
+
+def test_the_alarm_of_zones_ends_when_the_vehicle_is_in_none_of_them() -> None:
+    boundaries = Boundaries(AREA, [ZONE, ZONE + np.array([10.0, 0.0])])
+    lines = [line for east in (45.0, 55.0, 65.0, 75.0) for line in boundaries.judge("a", (east, 50.0), 2.0, east)]
+    assert [(line.data["zone"], line.begins, line.ends) for line in lines] == [
+        (1, True, False),
+        (2, True, False),
+        (1, False, False),
+        (2, False, True),
     ]
 
 

@@ -75,7 +75,7 @@ MissionState: TypeAlias = Annotated[Literal["draft", "ready", "running", "paused
 NodeState: TypeAlias = Annotated[Literal["heard", "announced", "active", "ready", "in_plan", "lost", "expected_offline"], Open]
 """How far the acquaintance with a node has come."""
 
-Notice: TypeAlias = Annotated[Literal["raised", "escalated", "acknowledged"], Open]
+Notice: TypeAlias = Annotated[Literal["raised", "escalated", "acknowledged", "ended"], Open]
 """Why somebody is told of an alarm."""
 
 Order: TypeAlias = Annotated[Literal["exclusive", "special", "1a", "1b", "2"], Open]
@@ -203,6 +203,8 @@ class AlarmReport(Model):
     vehicle: str | None
     message: str
     raised_at: datetime
+    ended_at: datetime | None
+    """When what raised it was over; it stays open until acknowledged. null: it goes on, or cannot end"""
     state: AlarmState
     acknowledged_at: datetime | None
     acknowledged_by: str | None
@@ -230,6 +232,8 @@ class AlarmView(Model):
     vehicle: str | None
     message: str
     raised_at: datetime
+    ended_at: datetime | None
+    """When what raised it was over; it stays open until acknowledged. null: it goes on, or cannot end"""
     state: AlarmState
     acknowledged_at: datetime | None
     acknowledged_by: str | None

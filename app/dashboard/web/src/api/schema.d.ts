@@ -1923,6 +1923,11 @@ export interface components {
              * Format: date-time
              */
             raised_at: string;
+            /**
+             * Ended At
+             * @description When what raised it was over; it stays open until acknowledged. null: it goes on, or cannot end
+             */
+            ended_at: string | null;
             state: components["schemas"]["AlarmState"];
             /** Acknowledged At */
             acknowledged_at: string | null;
@@ -1985,6 +1990,11 @@ export interface components {
              * Format: date-time
              */
             raised_at: string;
+            /**
+             * Ended At
+             * @description When what raised it was over; it stays open until acknowledged. null: it goes on, or cannot end
+             */
+            ended_at: string | null;
             state: components["schemas"]["AlarmState"];
             /** Acknowledged At */
             acknowledged_at: string | null;
@@ -3894,7 +3904,7 @@ export interface components {
          * @description Why somebody is told of an alarm.
          * @enum {string}
          */
-        Notice: "raised" | "escalated" | "acknowledged";
+        Notice: "raised" | "escalated" | "acknowledged" | "ended";
         /**
          * Order
          * @description An order of survey.
