@@ -12,7 +12,7 @@ from tests.support.paths import CAPTURES, TERRAINS
 share()
 # Nothing is said about how fast a machine is. Examples are the same in every run; others are looked for with
 # --hypothesis-profile=search.
-settings.register_profile("project", deadline=None, derandomize=True)
+settings.register_profile("project", deadline=None, derandomize=True, max_examples=50)
 settings.register_profile("search", deadline=None, max_examples=300)
 settings.load_profile("project")
 

@@ -98,6 +98,7 @@ def test_an_area_comes_from_a_kml_file(page: Page, service: Service) -> None:
     by_id(page, "area-file").set_input_files(file)
     expect(by_id(page, "area-note")).to_contain_text("basin.kml: area of 3 corners")
     expect(by_id(page, "estimate")).to_contain_text("At most")
+    by_id(page, "field-steps").fill("6")
     by_id(page, "ask-forecast").click()
     # It is flown over several floors.
     expect(by_id(page, "forecast-duration")).to_contain_text(re.compile(r"\d+ (s|min)"), timeout=FORECAST_MS)
