@@ -107,11 +107,8 @@ def krige_tiles(
             target = tiles[t, c]
             if target >= 0 and wanted[target]:
                 inside[m] = target
-                within[0, m], within[1, m], within[2, m] = (
-                    targets[target, 0],
-                    targets[target, 1],
-                    target_amplitude[target],
-                )
+                within[0, m], within[1, m] = targets[target, 0], targets[target, 1]
+                within[2, m] = target_amplitude[target]
                 for f in range(4):
                     within[3 + f, m] = target_metric[target, f]
                 m += 1
