@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,23 +27,38 @@ STRIP_CELLS = 60_000
 """A grid is predicted in strips of about this many cells: bounds the memory, and threads share the strips."""
 
 
+class Places(NamedTuple):
+    """Places with what the process is like there, m of them.
+
+    Attributes
+    ----------
+    points : (m, 2)
+        East and north, metres.
+    metric : (m, 4)
+        Squared-length matrix as in ``LocalScales``, metres.
+    amplitude : (m,)
+        Local standard deviation, metres.
+    basis : (m, p)
+        Values of the trend's functions.
+    """
+
+    points: FloatArray
+    metric: FloatArray
+    amplitude: FloatArray
+    basis: FloatArray
+
+
 @njit(cache=True, nogil=True)
 def krige_tiles(
     kind: int,
     uniform: bool,
-    points: FloatArray,
+    sounded: Places,
     residual: FloatArray,
     noise: FloatArray,
-    metric: FloatArray,
-    amplitude: FloatArray,
-    basis: FloatArray,
     trend_covariance: FloatArray,
     tiles: IntArray,
     neighbours: IntArray,
-    targets: FloatArray,
-    target_metric: FloatArray,
-    target_amplitude: FloatArray,
-    target_basis: FloatArray,
+    cells: Places,
     wanted: BoolArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Kriging of trend residuals, with the trend's own uncertainty in the variance.
@@ -52,17 +68,16 @@ def krige_tiles(
     kind
         Code of the correlation function.
     uniform
-        ``metric`` and ``amplitude`` are the same everywhere and no direction is preferred: quicker.
-    points : (n, 2), residual : (n,), noise : (n,), metric : (n, 4), amplitude : (n,), basis : (n, p)
-        Soundings: position, depth minus trend, noise variance, squared-length matrix as in ``LocalScales``,
-        local standard deviation and trend functions.
+        Metric and amplitude are the same everywhere and no direction is preferred: quicker.
+    sounded, residual, noise : (n,)
+        Soundings: places, depth minus trend, noise variance.
     trend_covariance : (p, p)
         Posterior covariance of the trend's coefficients.
     tiles : (n_tiles, m)
-        Rows of ``targets`` of each tile, -1 for none.
+        Rows of ``cells`` of each tile, -1 for none.
     neighbours : (n_tiles, k)
-        Rows of ``points`` that each tile is predicted from, then -1.
-    targets : (q, 2), target_metric : (q, 4), target_amplitude : (q,), target_basis : (q, p), wanted : (q,)
+        Rows of ``sounded`` that each tile is predicted from, then -1.
+    cells, wanted : (q,)
         Where to predict.
 
     Returns
@@ -70,6 +85,8 @@ def krige_tiles(
     mean, variance : (q,)
         NaN where not wanted.
     """
+    points, metric, amplitude, basis = sounded
+    targets, target_metric, target_amplitude, target_basis = cells
     q = targets.shape[0]
     p = basis.shape[1]
     mean = np.full(q, np.nan)
@@ -82,7 +99,7 @@ def krige_tiles(
     whitened = np.empty((p, widest))
     place = np.empty(7)
     near = np.empty((7, widest))
-    cells = np.empty((7, side))
+    within = np.empty((7, side))
     inside = np.empty(side, np.int64)
     for t in range(tiles.shape[0]):
         m = 0
@@ -90,9 +107,10 @@ def krige_tiles(
             target = tiles[t, c]
             if target >= 0 and wanted[target]:
                 inside[m] = target
-                cells[0, m], cells[1, m], cells[2, m] = targets[target, 0], targets[target, 1], target_amplitude[target]
+                within[0, m], within[1, m] = targets[target, 0], targets[target, 1]
+                within[2, m] = target_amplitude[target]
                 for f in range(4):
-                    cells[3 + f, m] = target_metric[target, f]
+                    within[3 + f, m] = target_metric[target, f]
                 m += 1
         if m == 0:
             continue
@@ -110,14 +128,14 @@ def krige_tiles(
                 place[f] = near[f, i]
             covariance_row(kind, uniform, place, near, i, a[i])
             a[i, i] = place[2] * place[2] * (1.0 + 1e-9) + noise[neighbours[t, i]]
-            covariance_row(kind, uniform, place, cells, m, v[i])
+            covariance_row(kind, uniform, place, within, m, v[i])
         if not cholesky_in_place(a, k):
             continue
         solve_lower_in_place(a, k, y)
         for f in range(p):
             solve_lower_in_place(a, k, whitened[f])
         solve_lower_columns_in_place(a, k, v, m)
-        _finish_tile(inside[:m], v, y[:k], whitened, trend_covariance, target_basis, cells[2], mean, variance)
+        _finish_tile(inside[:m], v, y[:k], whitened, trend_covariance, target_basis, within[2], mean, variance)
     return mean, variance
 
 
@@ -174,7 +192,9 @@ def krige_holes(
 
     Parameters
     ----------
-    points, residual, noise, metric, amplitude
+    points, metric, amplitude
+        As in ``Places``.
+    residual, noise
         As in ``krige_tiles``.
     rows : (h,)
         The soundings to predict.
@@ -307,9 +327,7 @@ class Conditioned:
         """
         points = self.levels.points
         residual = self.levels.soundings.depth_m - self.trend(points)
-        metric = self.scales.scaled_metric(self.length_m)
-        amplitude = self.amplitude_m * self.scales.amplitude
-        basis = self.trend.basis(points)
+        sounded = self._places(points, self.scales)
         depth = np.empty((grid.rows, grid.cols))
         variance = np.empty((grid.rows, grid.cols))
 
@@ -323,19 +341,13 @@ class Conditioned:
             mean, spread = krige_tiles(
                 KERNEL_CODES[self.kernel],
                 scales_over is None,
-                points,
+                sounded,
                 residual,
                 self.noise_variance,
-                metric,
-                amplitude,
-                basis,
                 self.trend.covariance,
                 tiles,
                 self.levels.neighbours(middle, *neighbours),
-                targets,
-                scales.scaled_metric(self.length_m),
-                self.amplitude_m * scales.amplitude,
-                self.trend.basis(targets),
+                self._places(targets, scales),
                 wanted[strip].ravel(),
             )
             depth[strip] = (mean + self.trend(targets)).reshape(part.rows, part.cols)
@@ -344,3 +356,9 @@ class Conditioned:
         height = side * max(1, STRIP_CELLS // (side * grid.cols))
         each(fill, [slice(r, min(r + height, grid.rows)) for r in range(0, grid.rows, height)])
         return depth, variance
+
+    def _places(self, points: FloatArray, scales: LocalScales) -> Places:
+        """Return places (m, 2) with what the process is like there, by their scales."""
+        return Places(
+            points, scales.scaled_metric(self.length_m), self.amplitude_m * scales.amplitude, self.trend.basis(points)
+        )

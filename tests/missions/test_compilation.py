@@ -20,7 +20,7 @@ from numba.core.dispatcher import Dispatcher
 import app.exploration
 from app.estimation import SingleBeam
 from app.exploration.planners import create_planner, warm_up_planner
-from app.missions.flight.decision import Place, decide, make_constraints
+from app.missions.flight.decision import Knowledge, Place, decide, make_constraints
 from app.missions.live.mission import builder_of
 from tests.support.missions.harbour import sim_spec
 
@@ -33,7 +33,8 @@ builder = builder_of(spec)
 planner = create_planner("cao", spec.planner.options)
 places = [Place("one", np.array([5.0, 5.0]), 0.0, 2.0), Place("two", np.array([15.0, 5.0]), float("nan"), 2.0)]
 for step in (1, 2):
-    decide(step, spec, make_constraints(spec), planner, places, builder.belief(), builder.sounded_at_m()[0])
+    known = Knowledge(builder.belief(), builder.sounded_at_m()[0])
+    decide(step, spec, make_constraints(spec), planner, places, known)
     east = np.linspace(1.0, 20.0, 60)
     builder.add(np.column_stack([east, np.full(60, 5.0), 10.0 + np.sin(east), np.full(60, 0.1)]))
     builder.build()

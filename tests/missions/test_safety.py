@@ -14,7 +14,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
 from app.missions import safety
-from app.missions.flight.decision import decide, make_constraints
+from app.missions.flight.decision import Knowledge, decide, make_constraints
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
 from tests.support.missions.specs import make_spec, rectangle
 
@@ -298,7 +298,7 @@ def test_no_decision_breaks_a_limit_wherever_the_vehicles_are(
         def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
             return Proposal(np.array(wishes[: len(situation.vehicles)]), 0.0)
 
-    decision = decide(1, spec, constraints, Team([]), places, belief_of(depth_m), np.zeros((0, 2)))
+    decision = decide(1, spec, constraints, Team([]), places, Knowledge(belief_of(depth_m), np.zeros((0, 2))))
     assert sorted(leg.vehicle for leg in decision.legs) == [p.vehicle for p in places]
     for leg in decision.legs:
         if leg.refusal:

@@ -1,12 +1,39 @@
 """How badly a section of track fits the bottom that others tell, shifted by this and by that."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import FloatArray
+from app.estimation.adjustment.surface import Shares, Surface
 
 WIDE = 3.0
 """Residuals beyond so many deviations count as if they grew linearly."""
+
+
+class SectionSoundings(NamedTuple):
+    """The soundings of a section of track, on the raster of the bottom around it.
+
+    Attributes
+    ----------
+    x, y : (n,)
+        Places in cells of the raster, from its first centre.
+    depth, variance : (n,)
+        Metres, and squares of such.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    depth: FloatArray
+    variance: FloatArray
+
+
+class Usual(NamedTuple):
+    """What is known of the depth where nothing else is: metres, and its variance."""
+
+    depth: float
+    variance: float
 
 
 @njit(cache=True, nogil=True)
@@ -25,17 +52,11 @@ def _at(raster: FloatArray, x: float, y: float) -> float:
 
 @njit(cache=True, nogil=True)
 def misfit(
-    x: FloatArray,
-    y: FloatArray,
-    depth: FloatArray,
-    variance: FloatArray,
-    value: FloatArray,
-    doubt: FloatArray,
-    nearest: FloatArray,
+    section: SectionSoundings,
+    bottom: Surface,
     shift_x: FloatArray,
     shift_y: FloatArray,
-    background: float,
-    background_variance: float,
+    usual: Usual,
     offset_variance: float,
     grain: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -43,15 +64,14 @@ def misfit(
 
     Parameters
     ----------
-    x, y : (n,)
-        Places in cells of the raster, from its first centre.
-    depth, variance : (n,)
-    value, doubt, nearest : (rows, cols)
-        Depth, its variance and the distance to the nearest sounding (m); NaN where nothing is known.
+    section
+        Of n soundings.
+    bottom
+        As others tell it.
     shift_x, shift_y : (k,)
         In cells: the section is looked at where it minus the shift is.
-    background, background_variance
-        What is known of the depth where nothing else is.
+    usual
+        Counts where the others tell less.
     offset_variance
         Of a depth that all of the section may be off by.
     grain
@@ -62,6 +82,9 @@ def misfit(
     The misfit, the share of the section that others tell of, and the mean square of its residuals over their variances,
     each (k,).
     """
+    x, y, depth, variance = section
+    value, doubt, nearest = bottom
+    background, background_variance = usual
     n, many = len(x), len(shift_x)
     total, seen, square = np.zeros(many), np.zeros(many), np.zeros(many)
     off, var, weight = np.empty(n), np.empty(n), np.empty(n)
@@ -98,34 +121,26 @@ def misfit(
 
 
 @njit(cache=True, nogil=True)
-def residuals(
-    x: FloatArray, y: FloatArray, depth: FloatArray, value: FloatArray, nearest: FloatArray, within: float
-) -> FloatArray:
-    """Return depths (n,) minus what others tell there; NaN where no sounding of theirs is near enough."""
+def residuals(section: SectionSoundings, bottom: Surface, within: float) -> FloatArray:
+    """Return depths (n,) minus what others tell there; NaN where none of theirs is ``within`` so many metres."""
+    x, y = section.x, section.y
     off = np.full(len(x), np.nan)
     for k in range(len(x)):
-        away = _at(nearest, x[k], y[k])
+        away = _at(bottom.nearest, x[k], y[k])
         if away <= within:
-            off[k] = depth[k] - _at(value, x[k], y[k])
+            off[k] = section.depth[k] - _at(bottom.value, x[k], y[k])
     return off
 
 
 @njit(cache=True, nogil=True)
-def influence(
-    x: FloatArray,
-    y: FloatArray,
-    variance: FloatArray,
-    value: FloatArray,
-    doubt: FloatArray,
-    who: IntArray,
-    share: FloatArray,
-    own: FloatArray,
-    others: FloatArray,
-) -> None:
+def influence(section: SectionSoundings, bottom: Surface, shares: Shares, own: FloatArray, others: FloatArray) -> None:
     """Add to each of the section's soundings (n,) and of the others' (m,) how much a tie depends on where it is.
 
     That is the squared slope of the bottom over the variance.
     """
+    x, y, variance = section.x, section.y, section.variance
+    value, doubt = bottom.value, bottom.doubt
+    who, share = shares
     rows, cols = value.shape
     for k in range(len(x)):
         j, i = int(np.floor(x[k] + 0.5)), int(np.floor(y[k] + 0.5))

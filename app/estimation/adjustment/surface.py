@@ -1,5 +1,7 @@
 """The bottom around a section of track as other soundings tell it: kriging on a small raster."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -15,11 +17,67 @@ LAGS_M = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0])
 LEAST_EXPONENT, LARGEST_EXPONENT = 0.4, 1.8
 
 
+class Soundings(NamedTuple):
+    """Soundings as compiled functions read them: places, depths and their standard deviations, metres, (n,) each."""
+
+    east: FloatArray
+    north: FloatArray
+    depth: FloatArray
+    sd: FloatArray
+
+
+class Raster(NamedTuple):
+    """Where a raster lies: its south-western corner and the side of its cells, metres."""
+
+    west: float
+    south: float
+    cell: float
+
+
+class PowerLaw(NamedTuple):
+    """Half the squared difference of depths (m^2) at a distance (m) is ``factor`` times distance to ``exponent``."""
+
+    factor: float
+    exponent: float
+
+
+class Surface(NamedTuple):
+    """The bottom as soundings tell it.
+
+    Attributes
+    ----------
+    value, doubt, nearest : (rows, cols)
+        Depth (m), its variance (m^2) and the distance to the nearest sounding (m); NaN where nothing is known.
+    """
+
+    value: FloatArray
+    doubt: FloatArray
+    nearest: FloatArray
+
+
+class Shares(NamedTuple):
+    """Which soundings each cell was predicted from, -1 for none, and their weights; (rows, cols, NEIGHBOURS) each."""
+
+    who: IntArray
+    share: FloatArray
+
+
+class _Bins(NamedTuple):
+    """Soundings by the cell that they lie in, of a raster widened by ``border`` cells on all sides, ``wide`` in a row.
+
+    ``member[start[b]:start[b + 1]]`` are those of cell b.
+    """
+
+    start: IntArray
+    member: IntArray
+    border: int
+    wide: int
+
+
 @njit(cache=True, nogil=True)
-def half_squares(
-    section: IntArray, east: FloatArray, north: FloatArray, depth: FloatArray, noise: FloatArray, lags: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def half_squares(section: IntArray, soundings: Soundings, lags: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return sums of half the squared differences of depth within sections, less their noise, and counts, by lag."""
+    east, north, depth, noise = soundings
     total, count = np.zeros(len(lags)), np.zeros(len(lags))
     for i in range(len(east)):
         for j in range(i + 1, min(i + 200, len(east))):
@@ -34,20 +92,18 @@ def half_squares(
     return total, count
 
 
-def variogram(
-    section: IntArray, east_m: FloatArray, north_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray
-) -> tuple[float, float]:
-    """Return the factor and exponent of the power law that half the squared differences of depth follow."""
-    total, count = half_squares(section, east_m, north_m, depth_m, sd_m, LAGS_M)
+def variogram(section: IntArray, soundings: Soundings) -> PowerLaw:
+    """Return the power law that half the squared differences of depth follow within sections (n,)."""
+    total, count = half_squares(section, soundings, LAGS_M)
     used = (count > 20) & (total > 0.0)
     if used.sum() < 3:
-        return 1e-6, 1.0
+        return PowerLaw(1e-6, 1.0)
     gamma = total[used] / count[used]
     middle = np.concatenate([[0.25], 0.5 * (LAGS_M[1:] + LAGS_M[:-1])])[used]
     slope, level = np.polyfit(np.log(middle), np.log(gamma), 1)
     exponent = float(np.clip(slope, LEAST_EXPONENT, LARGEST_EXPONENT))
     level = float(np.mean(np.log(gamma) - exponent * np.log(middle)))
-    return float(np.exp(level)), exponent
+    return PowerLaw(float(np.exp(level)), exponent)
 
 
 @njit(cache=True, nogil=True)
@@ -79,34 +135,16 @@ def _solve(a: FloatArray, b: FloatArray, n: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def surface(
-    east: FloatArray,
-    north: FloatArray,
-    depth: FloatArray,
-    sd: FloatArray,
-    west: float,
-    south: float,
-    cell: float,
-    wanted: BoolArray,
-    factor: float,
-    exponent: float,
-    reach: float,
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
-    """Predict the depth at the centres of a raster's cells from soundings (n,) by ordinary kriging.
-
-    Returns
-    -------
-    Depth, variance, and distance to the nearest sounding, (rows, cols), NaN where no sounding is within reach; which
-    soundings, -1 for none, and their weights, (rows, cols, NEIGHBOURS).
-    """
-    rows, cols = wanted.shape
-    border = int(np.ceil(reach / cell))
+def _binned(soundings: Soundings, raster: Raster, rows: int, cols: int, reach: float) -> _Bins:
+    """Sort soundings into cells, those within ``reach`` metres of a raster among them."""
+    east, north = soundings.east, soundings.north
+    border = int(np.ceil(reach / raster.cell))
     wide, high = cols + 2 * border, rows + 2 * border
     bins = np.full(len(east), -1, dtype=np.int64)
     start = np.zeros(wide * high + 1, dtype=np.int64)
     for i in range(len(east)):
-        c = int(np.floor((east[i] - west) / cell)) + border
-        r = int(np.floor((north[i] - south) / cell)) + border
+        c = int(np.floor((east[i] - raster.west) / raster.cell)) + border
+        r = int(np.floor((north[i] - raster.south) / raster.cell)) + border
         if 0 <= c < wide and 0 <= r < high:
             bins[i] = r * wide + c
             start[bins[i] + 1] += 1
@@ -118,6 +156,78 @@ def surface(
         if bins[i] >= 0:
             member[filled[bins[i]]] = i
             filled[bins[i]] += 1
+    return _Bins(start, member, border, wide)
+
+
+@njit(cache=True, nogil=True)
+def _nearest_by_quadrant(
+    soundings: Soundings, raster: Raster, bins: _Bins, r: int, c: int, reach: float, found: IntArray, away: FloatArray
+) -> None:
+    """Write the nearest soundings of a cell in each quadrant and how far they are, (4, PER_QUADRANT); -1 and inf: none.
+
+    Only those within ``reach`` metres count.
+    """
+    east, north = soundings.east, soundings.north
+    e0, n0 = raster.west + (c + 0.5) * raster.cell, raster.south + (r + 0.5) * raster.cell
+    away[:] = np.inf
+    found[:] = -1
+    for ring in range(bins.border + 1):
+        # A ring holds nothing nearer than this: quadrants that are filled with nearer ones are done.
+        closest = (ring - 0.5) * raster.cell
+        done = True
+        for q in range(4):
+            if away[q, PER_QUADRANT - 1] > closest:
+                done = False
+        if done:
+            break
+        for dr in range(-ring, ring + 1):
+            step = 1 if abs(dr) == ring else 2 * ring
+            for dc in range(-ring, ring + 1, max(step, 1)):
+                b = (r + bins.border + dr) * bins.wide + c + bins.border + dc
+                for k in range(bins.start[b], bins.start[b + 1]):
+                    i = bins.member[k]
+                    de, dn = east[i] - e0, north[i] - n0
+                    d = np.hypot(de, dn)
+                    if d > reach:
+                        continue
+                    q = (1 if de >= 0.0 else 0) + (2 if dn >= 0.0 else 0)
+                    if d < away[q, 0]:
+                        away[q, 1], found[q, 1] = away[q, 0], found[q, 0]
+                        away[q, 0], found[q, 0] = d, i
+                    elif d < away[q, 1]:
+                        away[q, 1], found[q, 1] = d, i
+
+
+@njit(cache=True, nogil=True)
+def _kriging_system(
+    soundings: Soundings, near: IntArray, e0: float, n0: float, relief: PowerLaw, a: FloatArray, x: FloatArray
+) -> None:
+    """Write ordinary kriging's matrix (m + 1, m + 1) and right side (m + 1,) at a place, for soundings ``near`` (m,)."""
+    east, north, sd = soundings.east, soundings.north, soundings.sd
+    factor, exponent = relief
+    m = len(near)
+    for i in range(m):
+        for j in range(i):
+            h = np.hypot(east[near[i]] - east[near[j]], north[near[i]] - north[near[j]])
+            a[i, j] = factor * h**exponent
+            a[j, i] = a[i, j]
+        a[i, i] = -(sd[near[i]] ** 2)
+        a[i, m], a[m, i] = 1.0, 1.0
+        x[i] = factor * np.hypot(east[near[i]] - e0, north[near[i]] - n0) ** exponent
+    a[m, m] = 0.0
+    x[m] = 1.0
+
+
+@njit(cache=True, nogil=True)
+def surface(
+    soundings: Soundings, raster: Raster, wanted: BoolArray, relief: PowerLaw, reach: float
+) -> tuple[Surface, Shares]:
+    """Predict the depth at the centres of a raster's cells by ordinary kriging, from soundings within ``reach`` metres.
+
+    Only cells that are ``wanted`` (rows, cols) are predicted.
+    """
+    rows, cols = wanted.shape
+    bins = _binned(soundings, raster, rows, cols, reach)
     value = np.full((rows, cols), np.nan)
     variance = np.full((rows, cols), np.nan)
     nearest = np.full((rows, cols), np.nan)
@@ -132,34 +242,7 @@ def surface(
         for c in range(cols):
             if not wanted[r, c]:
                 continue
-            e0, n0 = west + (c + 0.5) * cell, south + (r + 0.5) * cell
-            away[:] = np.inf
-            found[:] = -1
-            for ring in range(border + 1):
-                # A ring holds nothing nearer than this: quadrants that are filled with nearer ones are done.
-                closest = (ring - 0.5) * cell
-                done = True
-                for q in range(4):
-                    if away[q, PER_QUADRANT - 1] > closest:
-                        done = False
-                if done:
-                    break
-                for dr in range(-ring, ring + 1):
-                    step = 1 if abs(dr) == ring else 2 * ring
-                    for dc in range(-ring, ring + 1, max(step, 1)):
-                        b = (r + border + dr) * wide + c + border + dc
-                        for k in range(start[b], start[b + 1]):
-                            i = member[k]
-                            de, dn = east[i] - e0, north[i] - n0
-                            d = np.hypot(de, dn)
-                            if d > reach:
-                                continue
-                            q = (1 if de >= 0.0 else 0) + (2 if dn >= 0.0 else 0)
-                            if d < away[q, 0]:
-                                away[q, 1], found[q, 1] = away[q, 0], found[q, 0]
-                                away[q, 0], found[q, 0] = d, i
-                            elif d < away[q, 1]:
-                                away[q, 1], found[q, 1] = d, i
+            _nearest_by_quadrant(soundings, raster, bins, r, c, reach, found, away)
             m = 0
             least = np.inf
             for q in range(4):
@@ -170,33 +253,24 @@ def surface(
                         least = min(least, away[q, k])
             if m == 0:
                 continue
-            for i in range(m):
-                for j in range(i):
-                    h = np.hypot(east[near[i]] - east[near[j]], north[near[i]] - north[near[j]])
-                    a[i, j] = factor * h**exponent
-                    a[j, i] = a[i, j]
-                a[i, i] = -(sd[near[i]] ** 2)
-                a[i, m], a[m, i] = 1.0, 1.0
-                x[i] = factor * np.hypot(east[near[i]] - e0, north[near[i]] - n0) ** exponent
-            a[m, m] = 0.0
-            x[m] = 1.0
+            e0, n0 = raster.west + (c + 0.5) * raster.cell, raster.south + (r + 0.5) * raster.cell
+            _kriging_system(soundings, near[:m], e0, n0, relief, a, x)
             right = x[: m + 1].copy()
             if not _solve(a, x, m + 1):
                 continue
             z, v = 0.0, 0.0
             for i in range(m):
-                z += x[i] * depth[near[i]]
+                z += x[i] * soundings.depth[near[i]]
                 v += x[i] * right[i]
                 who[r, c, i], share[r, c, i] = near[i], x[i]
             value[r, c], variance[r, c], nearest[r, c] = z, max(v + x[m], 0.0), least
-    return value, variance, nearest, who, share
+    return Surface(value, variance, nearest), Shares(who, share)
 
 
 @njit(cache=True, nogil=True)
-def near_track(
-    east: FloatArray, north: FloatArray, west: float, south: float, cell: float, rows: int, cols: int, aside: float
-) -> BoolArray:
+def near_track(east: FloatArray, north: FloatArray, raster: Raster, rows: int, cols: int, aside: float) -> BoolArray:
     """Return which cells are within some distance east and north of a sounding, (rows, cols)."""
+    west, south, cell = raster
     wanted = np.zeros((rows, cols), dtype=np.bool_)
     k = int(np.ceil(aside / cell)) + 1
     # A square is widened along rows, then along columns.

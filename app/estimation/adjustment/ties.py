@@ -98,14 +98,14 @@ class Relief:
     @classmethod
     def of_sections(cls, soundings: TrackSoundings, sections: Sections) -> "Relief":
         """Learn it from soundings of the same sections, whose places to each other are known."""
-        columns = (soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m)
-        factor, exponent = surface.variogram(sections.of, *columns)
+        columns = surface.Soundings(soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m)
+        factor, exponent = surface.variogram(sections.of, columns)
         factors = np.full(len(sections), factor)
         middle = np.concatenate([[0.25], 0.5 * (surface.LAGS_M[1:] + surface.LAGS_M[:-1])])
         for k in range(len(sections)):
             rows = slice(sections.first[k], sections.first[k + 1])
-            east, north, depth, sd = (column[rows] for column in columns)
-            total, count = surface.half_squares(sections.of[rows], east, north, depth, sd, surface.LAGS_M)
+            own_columns = surface.Soundings(*(column[rows] for column in columns))
+            total, count = surface.half_squares(sections.of[rows], own_columns, surface.LAGS_M)
             near = slice(1, 6)
             if count[near].sum() >= 20:
                 usual = float((count[near] * factor * middle[near] ** exponent).sum())
@@ -156,14 +156,10 @@ class Around:
 
     who: IntArray
     """Rows of the soundings that were used."""
-    west_m: float
-    south_m: float
-    cell_m: float
-    value: FloatArray
-    doubt: FloatArray
-    nearest: FloatArray
-    near: IntArray
-    share: FloatArray
+    raster: surface.Raster
+    bottom: surface.Surface
+    shares: surface.Shares
+    """Of those rows."""
 
 
 @dataclass(frozen=True)
@@ -212,29 +208,19 @@ class Matcher:
         who = who[~(own & (found.time_s[who] < high_s))]
         if not len(who):
             return None
-        wanted = surface.near_track(east, north, west, south, self.cell_m, high, cols, aside_m)
-        value, doubt, nearest, members, share = surface.surface(
-            east_m[who],
-            north_m[who],
-            found.depth_m[who],
-            found.sd_m[who],
-            west,
-            south,
-            self.cell_m,
-            wanted,
-            float(self.relief.factor[section]),
-            self.relief.exponent,
-            self.reach_m,
-        )
-        return Around(who, west, south, self.cell_m, value, doubt, nearest, members, share)
+        raster = surface.Raster(west, south, self.cell_m)
+        wanted = surface.near_track(east, north, raster, high, cols, aside_m)
+        others = surface.Soundings(east_m[who], north_m[who], found.depth_m[who], found.sd_m[who])
+        relief = surface.PowerLaw(float(self.relief.factor[section]), self.relief.exponent)
+        return Around(who, raster, *surface.surface(others, raster, wanted, relief, self.reach_m))
 
     def residual_m(self, section: int, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
         """Return a section's depths less the others' where those are near, (j,)."""
         around = self.around(section, east_m, north_m, self.cell_m)
         if around is None:
             return np.zeros(0)
-        x, y, depth, _ = self._section(section, around, east_m, north_m)
-        off = misfit.residuals(x, y, depth, around.value, around.nearest, self._near_m)
+        own = self._section(section, around.raster, east_m, north_m)
+        off = misfit.residuals(own, around.bottom, self._near_m)
         return np.asarray(off[np.isfinite(off)])
 
     @property
@@ -242,12 +228,12 @@ class Matcher:
         return max(0.5 * self.reach_m, self.cell_m)
 
     def _section(
-        self, section: int, around: Around, east_m: FloatArray, north_m: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        self, section: int, raster: surface.Raster, east_m: FloatArray, north_m: FloatArray
+    ) -> misfit.SectionSoundings:
         rows = slice(self.sections.first[section], self.sections.first[section + 1])
-        x = (east_m[rows] - around.west_m) / around.cell_m - 0.5
-        y = (north_m[rows] - around.south_m) / around.cell_m - 0.5
-        return x, y, self.soundings.depth_m[rows], self.soundings.sd_m[rows] ** 2
+        x = (east_m[rows] - raster.west) / raster.cell - 0.5
+        y = (north_m[rows] - raster.south) / raster.cell - 0.5
+        return misfit.SectionSoundings(x, y, self.soundings.depth_m[rows], self.soundings.sd_m[rows] ** 2)
 
     def tie(self, section: int, east_m: FloatArray, north_m: FloatArray, known: Known, most_m: float) -> Tie:
         """Return how far a section is shifted against the others.
@@ -272,14 +258,16 @@ class Matcher:
         around = self.around(section, east_m, north_m, aside)
         if around is None:
             return unknown
-        x, y, depth, variance = self._section(section, around, east_m, north_m)
-        off = misfit.residuals(x, y, depth, around.value, around.nearest, self._near_m)
+        own = self._section(section, around.raster, east_m, north_m)
+        off = misfit.residuals(own, around.bottom, self._near_m)
         residual = rms(off[np.isfinite(off)])
-        background = max(float(depth.var()), self.relief.factor[section] * self.reach_m**self.relief.exponent, 1e-4)
+        background = max(float(own.depth.var()), self.relief.factor[section] * self.reach_m**self.relief.exponent, 1e-4)
         precision = np.linalg.inv(known.covariance)
         mean, covariance, fit, overlap = known.mean_m, known.covariance, 0.0, 0.0
         centre = known.mean_m
-        every = slice(None, None, max(1, len(x) // MOST_COMPARED))
+        every = slice(None, None, max(1, len(own.x) // MOST_COMPARED))
+        compared = misfit.SectionSoundings(*(np.ascontiguousarray(column[every]) for column in own))
+        usual = misfit.Usual(float(own.depth.mean()), background)
         grain_m = self.cell_m * float(np.sqrt(every.step))
         for _ in range(MOST_ZOOMS):
             at = np.linspace(-1.0, 1.0, GRID)
@@ -287,17 +275,11 @@ class Matcher:
                 -1, 2
             )
             cost, seen, square = misfit.misfit(
-                np.ascontiguousarray(x[every]),
-                np.ascontiguousarray(y[every]),
-                np.ascontiguousarray(depth[every]),
-                np.ascontiguousarray(variance[every]),
-                around.value,
-                around.doubt,
-                around.nearest,
+                compared,
+                around.bottom,
                 shift[:, 0] / self.cell_m,
                 shift[:, 1] / self.cell_m,
-                float(depth.mean()),
-                background,
+                usual,
                 self.offset_sd_m**2,
                 grain_m,
             )
@@ -322,17 +304,16 @@ class Matcher:
         shift_m, information = _told(mean, covariance, known)
         if not information.any():
             return Tie(np.zeros(2), np.zeros((2, 2)), *nothing, Outcome.FLAT, residual)
-        nodes, weights = self._compared(section, around, x - mean[0] / self.cell_m, y - mean[1] / self.cell_m, variance)
+        moved = own._replace(x=own.x - mean[0] / self.cell_m, y=own.y - mean[1] / self.cell_m)
+        nodes, weights = self._compared(section, around, moved)
         if not len(nodes):
             return unknown
         return Tie(shift_m, SHARED * information, nodes, weights, Outcome.USED, residual)
 
-    def _compared(
-        self, section: int, around: Around, x: FloatArray, y: FloatArray, variance: FloatArray
-    ) -> tuple[IntArray, FloatArray]:
+    def _compared(self, section: int, around: Around, moved: misfit.SectionSoundings) -> tuple[IntArray, FloatArray]:
         rows = np.arange(self.sections.first[section], self.sections.first[section + 1])
         own, others = np.zeros(len(rows)), np.zeros(len(around.who))
-        misfit.influence(x, y, variance, around.value, around.doubt, around.near, around.share, own, others)
+        misfit.influence(moved, around.bottom, around.shares, own, others)
         if own.sum() <= 0.0 or others.sum() <= 0.0:
             return np.zeros(0, np.int64), np.zeros(0)
         total = np.zeros(len(self.nodes))

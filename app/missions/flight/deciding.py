@@ -8,16 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.coverage import SwathTask
-from app.exploration.core.problem import Belief, Planner
+from app.exploration.core.problem import Planner
 from app.exploration.planners import COVERERS
 from app.exploration.site_search import SearchTask
 from app.missions import metrics
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
-from app.missions.flight.decision import Decision, Place, decide, swath_task, turn_radius_m
+from app.missions.flight.decision import Decision, Knowledge, Place, decide, swath_task, turn_radius_m
 from app.missions.flight.step_maps import StepMaps
 from app.missions.live.mission import LiveMission
 from app.missions.team import CommittedLeg, Member
@@ -78,37 +76,22 @@ class Decider:
         await live.journal.storage.done(live.ranges.flush)
         targets = live.ranges.tracking.told(live.ranges.times.now_s(), step_s)
 
-        swath: SwathTask | None = None
         sounders = [member.spec for member in live.team]
 
-        def decided(number: int, here: list[Place], belief: Belief, sounded: tuple[FloatArray, FloatArray]) -> Decision:
-            sounded_m, doubtful_m = sounded
-            return decide(
-                number,
-                live.spec,
-                self._constraints,
-                self.planner,
-                here,
-                belief,
-                sounded_m,
-                live.gate.corrections.water_level_m(now().timestamp()),
-                doubtful_m,
-                targets,
-                task,
-                self.attempt,
-                swath,
-            )
+        def decided(number: int, here: list[Place], known: Knowledge) -> Decision:
+            known = replace(known, water_level_m=live.gate.corrections.water_level_m(now().timestamp()))
+            return decide(number, live.spec, self._constraints, self.planner, here, known, self.attempt)
 
         def work() -> list[Decision]:
-            nonlocal swath
-            if live.spec.planner.name in COVERERS:
-                swath = swath_task(live.spec, sounders, live.builder.coverage())
-            belief, sounded = live.builder.belief(), live.builder.sounded_at_m()
-            decisions = [decided(number, places, belief, sounded)]
+            coverers = live.spec.planner.name in COVERERS
+            swath = swath_task(live.spec, sounders, live.builder.coverage()) if coverers else None
+            belief, (sounded_m, doubtful_m) = live.builder.belief(), live.builder.sounded_at_m()
+            known = Knowledge(belief, sounded_m, doubtful_en_m=doubtful_m, targets=targets, search=task, swath=swath)
+            decisions = [decided(number, places, known)]
             here = _who_gets_more(moved_on(places, decisions[0]), most, 1)
             while len(decisions) < legs and any(place.moving for place in here):
                 try:
-                    decisions.append(decided(number + len(decisions), here, belief, sounded))
+                    decisions.append(decided(number + len(decisions), here, known))
                 except Exception:
                     # It comes out when this leg is the first to be decided.
                     self.planner.restore(decisions[-1].memory)

@@ -121,6 +121,30 @@ class Decision:
     """Vehicles that would get a leg, and for which nothing is left to do as things stand."""
 
 
+@dataclass(frozen=True)
+class Knowledge:
+    """What a mission knows when a step is decided."""
+
+    belief: Belief
+    """Its map."""
+    soundings_en_m: FloatArray
+    """Where it sounded, (n, 2)."""
+    water_level_m: float = 0.0
+    """How high the water stands above the datum of the belief's depths.
+
+    Vehicles count their depth from the water level: below the datum it leaves them less room; above it the room to
+    spare is not used.
+    """
+    doubtful_en_m: FloatArray | None = None
+    """Where the map left soundings out as outliers, (k, 2); None: nowhere."""
+    targets: Targets | None = None
+    """The mission's, in the order of its description."""
+    search: SearchTask | None = None
+    """What a search knows of its site."""
+    swath: SwathTask | None = None
+    """What there is to ensonify, in a survey that plans by that."""
+
+
 def make_constraints(spec: MissionSpec) -> Constraints:
     """Return a mission's limits in its local frame."""
     limits = spec.limits
@@ -188,101 +212,33 @@ def decide(
     constraints: Constraints,
     planner: Planner,
     places: list[Place],
-    belief: Belief,
-    soundings_en_m: FloatArray,
-    water_level_m: float = 0.0,
-    doubtful_en_m: FloatArray | None = None,
-    targets: Targets | None = None,
-    search: SearchTask | None = None,
+    knowledge: Knowledge,
     attempt: int = 0,
-    swath: SwathTask | None = None,
 ) -> Decision:
     """Decide one step for the vehicles at ``places``; vehicles far outside the area are sent to its border.
 
-    ``water_level_m`` is how high the water stands above the datum of the belief's depths. Vehicles count their depth
-    from the water level: below the datum it leaves them less room; above it the room to spare is not used.
-    ``doubtful_en_m`` (k, 2) is where the map left soundings out as outliers.
-    ``targets`` are the mission's, in the order of its description. ``search`` is what a search knows of its site.
-    ``attempt``: how often the same legs were decided and not flown; chance then falls out otherwise. ``swath`` is what
-    there is to ensonify, in a survey that plans by that.
+    ``attempt``: how often the same legs were decided and not flown; chance then falls out otherwise.
     """
-    polygon = Polygon(constraints.area)
     where = {place.vehicle: place.en_m for place in places}
-    notes: list[str] = []
-    team: list[Place] = []
-    legs: list[Leg] = []
-    nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
-    for place in places:
-        outside_m = safety.distance_outside_m(polygon, place.en_m)
-        if outside_m > nearby_m and not place.moving:
-            continue
-        if outside_m > nearby_m and search is not None:
-            refusal = (
-                f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
-            )
-            notes.append(f"{place.vehicle}: {refusal}")
-            legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
-        elif outside_m > nearby_m:
-            others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
-            leg = _come_in(place, constraints, others)
-            what = leg.refusal or "it is sent to the border"
-            notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
-            legs.append(leg)
-        elif outside_m > 0:
-            border = safety.nearest_inside(polygon, place.en_m)
-            team.append(replace(place, en_m=border))
-        else:
-            team.append(place)
+    team, legs, notes = _planned_for(places, spec, constraints, knowledge.search is not None)
     if not team:
         return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
 
-    names = tuple(place.vehicle for place in team)
-    below_level_m = safety.below_surface_m(belief.depth_m, water_level_m)
-    bottom = Bottom.from_landmarks(belief.xy_m, below_level_m)
-    cautious = Bottom.from_landmarks(
-        belief.xy_m,
-        np.where(np.isfinite(belief.sd_m), below_level_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan),
-    )
-    origin = np.array([[*p.en_m, p.travel_depth_m(p.en_m, p.en_m, cautious, constraints)] for p in team])
-    moving = np.array([p.moving for p in team])
-    left_m = np.array([p.left_m for p in team])
+    floor = _Floor.of(knowledge)
+    origin = np.array([[*p.en_m, p.travel_depth_m(p.en_m, p.en_m, floor.cautious, constraints)] for p in team])
     up, fixes = surfacing(team, spec.surface_policy)
     for i, place in enumerate(team):
         if place.surfacing:
             origin[i, 2] = min(origin[i, 2], max(place.surfacing_depth_m, 0.0))
-    situation = Situation(
-        step=step,
-        steps_total=step - 1 + math.ceil((1 - RESERVE) * (spec.steps - step + 1)),
-        vehicles=names,
-        positions=origin,
-        headings_rad=np.array([p.heading_rad for p in team]),
-        belief=belief,
-        soundings_en_m=soundings_en_m,
-        constraints=constraints,
-        doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
-        targets=targets,
-        search=search,
-        moving=None if moving.all() else moving,
-        left_m=None if np.isnan(left_m).any() else left_m,
-        swath=swath,
-    )
+    situation = _situation(step, spec, constraints, team, origin, knowledge)
     proposal = planner.propose(situation, np.random.default_rng([spec.seed, step, *([attempt] if attempt else [])]))
+    moving = np.array([p.moving for p in team])
     proposed = np.where(moving[:, None], np.array(proposal.positions, dtype=float), origin)
     for i, place in enumerate(team):
-        if not place.moving or not np.isfinite(proposed[i]).all():
-            continue  # the check makes the vehicle hold
-        proposed[i, 2] = place.travel_depth_m(place.en_m, proposed[i, :2], cautious, constraints)
-        clear_m = bottom.deepest_end_m(origin[i], proposed[i, :2] - origin[i, :2], constraints.min_altitude_m)
-        proposed[i, 2] = min(proposed[i, 2], max(float(clear_m), 0.0))
-        if up[i]:
-            # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
-            proposed[i, 2] = min(proposed[i, 2], max(origin[i, 2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
-        proposed[i] = _within_step(origin[i], proposed[i], constraints.max_step_m)
-        length_m = float(np.linalg.norm(proposed[i, :2] - origin[i, :2]))
-        if length_m > place.left_m:
-            proposed[i, :2] = origin[i, :2] + place.left_m / length_m * (proposed[i, :2] - origin[i, :2])
-    if search is not None:
-        proposed, held = hold_before_hazards(search, names, origin, proposed)
+        if place.moving and np.isfinite(proposed[i]).all():  # else the check makes the vehicle hold
+            proposed[i] = _flyable(place, origin[i], proposed[i], up[i], floor, constraints)
+    if knowledge.search is not None:
+        proposed, held = hold_before_hazards(knowledge.search, situation.vehicles, origin, proposed)
         notes += held
     for i, place in enumerate(team):
         start = where[place.vehicle]
@@ -291,9 +247,9 @@ def decide(
         # It was planned for from the border, and comes from beyond it: no farther than there where both is too far.
         if np.linalg.norm(proposed[i, :2] - start) > constraints.max_step_m:
             proposed[i] = origin[i]
-        depth_m = place.travel_depth_m(start, proposed[i, :2], cautious, constraints)
+        depth_m = place.travel_depth_m(start, proposed[i, :2], floor.cautious, constraints)
         proposed[i, 2] = min(proposed[i, 2], depth_m)
-    checked = safety.check_step(names, origin, proposed, constraints, bottom)
+    checked = safety.check_step(situation.vehicles, origin, proposed, constraints, floor.likely)
     resting = {place.vehicle for place in team if not place.moving or place.vehicle in proposal.done}
     told = (checked.corrections | checked.refusals).items()
     notes += [f"{name}: {reason}" for name, reason in told if name not in resting]
@@ -313,11 +269,113 @@ def decide(
         planner.snapshot(),
         notes,
         fixes,
-        cautious,
+        floor.cautious,
         pursuits,
         where,
         frozenset(place.vehicle for place in team if place.moving and place.vehicle in proposal.done),
     )
+
+
+def _planned_for(
+    places: list[Place], spec: MissionSpec, constraints: Constraints, site_unknown: bool
+) -> tuple[list[Place], list[Leg], list[str]]:
+    """Return whom the planner plans for, the legs of those that come in from far outside, and what is to be said.
+
+    Who is a little outside is planned for from the border. Nobody is sent over what a search does not know.
+    """
+    polygon = Polygon(constraints.area)
+    notes: list[str] = []
+    team: list[Place] = []
+    legs: list[Leg] = []
+    nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
+    for place in places:
+        outside_m = safety.distance_outside_m(polygon, place.en_m)
+        if outside_m > nearby_m and not place.moving:
+            continue
+        if outside_m > nearby_m and site_unknown:
+            refusal = (
+                f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
+            )
+            notes.append(f"{place.vehicle}: {refusal}")
+            legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
+        elif outside_m > nearby_m:
+            others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
+            leg = _come_in(place, constraints, others)
+            what = leg.refusal or "it is sent to the border"
+            notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
+            legs.append(leg)
+        elif outside_m > 0:
+            border = safety.nearest_inside(polygon, place.en_m)
+            team.append(replace(place, en_m=border))
+        else:
+            team.append(place)
+    return team, legs, notes
+
+
+@dataclass(frozen=True)
+class _Floor:
+    """The sea floor below the surface as it is now."""
+
+    likely: Bottom
+    """As the map estimates it."""
+    cautious: Bottom
+    """Two deviations shallower."""
+
+    @classmethod
+    def of(cls, knowledge: Knowledge) -> "_Floor":
+        """Return the sea floor that a map tells of, at this level of the water."""
+        belief = knowledge.belief
+        depth_m = safety.below_surface_m(belief.depth_m, knowledge.water_level_m)
+        shallow_m = np.where(np.isfinite(belief.sd_m), depth_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan)
+        return cls(Bottom.from_landmarks(belief.xy_m, depth_m), Bottom.from_landmarks(belief.xy_m, shallow_m))
+
+
+def _situation(
+    step: int,
+    spec: MissionSpec,
+    constraints: Constraints,
+    team: list[Place],
+    origin: FloatArray,
+    knowledge: Knowledge,
+) -> Situation:
+    """Return what the planner is asked about vehicles that are at ``origin``, (n, 3)."""
+    moving = np.array([p.moving for p in team])
+    left_m = np.array([p.left_m for p in team])
+    doubtful_en_m = knowledge.doubtful_en_m
+    return Situation(
+        step=step,
+        steps_total=step - 1 + math.ceil((1 - RESERVE) * (spec.steps - step + 1)),
+        vehicles=tuple(place.vehicle for place in team),
+        positions=origin,
+        headings_rad=np.array([p.heading_rad for p in team]),
+        belief=knowledge.belief,
+        soundings_en_m=knowledge.soundings_en_m,
+        constraints=constraints,
+        doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
+        targets=knowledge.targets,
+        search=knowledge.search,
+        moving=None if moving.all() else moving,
+        left_m=None if np.isnan(left_m).any() else left_m,
+        swath=knowledge.swath,
+    )
+
+
+def _flyable(
+    place: Place, origin: FloatArray, proposed: FloatArray, rises: bool, floor: _Floor, constraints: Constraints
+) -> FloatArray:
+    """Return where a vehicle is sent instead of a proposed position (3,): in its depth, its step, and its way left."""
+    target = proposed.copy()
+    target[2] = place.travel_depth_m(place.en_m, target[:2], floor.cautious, constraints)
+    clear_m = floor.likely.deepest_end_m(origin, target[:2] - origin[:2], constraints.min_altitude_m)
+    target[2] = min(target[2], max(float(clear_m), 0.0))
+    if rises:
+        # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
+        target[2] = min(target[2], max(origin[2] - RISE_OF_STEP * constraints.max_step_m, 0.0))
+    target = _within_step(origin, target, constraints.max_step_m)
+    length_m = float(np.linalg.norm(target[:2] - origin[:2]))
+    if length_m > place.left_m:
+        target[:2] = origin[:2] + place.left_m / length_m * (target[:2] - origin[:2])
+    return target
 
 
 def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[bool], dict[str, str]]:

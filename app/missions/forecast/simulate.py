@@ -15,6 +15,7 @@ import numpy as np
 from app.arrays import BoolArray, FloatArray
 from app.missions.flight.commit import STILL_M
 from app.missions.flight.decision import (
+    Knowledge,
     Place,
     decide,
     make_constraints,
@@ -186,9 +187,8 @@ def fly(
     told = first_step - 1
     while (due := swarm.due(apart=apart)).any():
         number = int(swarm.legs[due].max()) + 1
-        decision = decide(
-            number, spec, constraints, planner, swarm.places(due), builder.belief(), builder.sounded_at_m()[0]
-        )
+        known = Knowledge(builder.belief(), builder.sounded_at_m()[0])
+        decision = decide(number, spec, constraints, planner, swarm.places(due), known)
         target = {leg.vehicle: leg.target_m for leg in decision.legs}
         for i in np.flatnonzero(due):
             member = members[i]

@@ -10,7 +10,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flown import Flown
 from app.missions.live.journal import Counts
-from app.missions.live.mission import RISES, LiveMission, builder_of
+from app.missions.live.mission import RISES, LiveMission, StoredMission, builder_of
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment
@@ -66,9 +66,8 @@ async def take_up(
     counts = Counts(stored.accepted, stored.rejected)
     # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
     builder = await asyncio.to_thread(builder_of, spec)
-    live = LiveMission(
-        database, hub, executor, row, spec, counts, ping_files, table, adjustment, time_scale, search, builder
-    )
+    mission = StoredMission(row, spec, counts, table, adjustment)
+    live = LiveMission(database, hub, executor, ping_files, time_scale, mission, search, builder)
     async with database.reading() as session:
         pinged = await live.pings.open(session)
     live.journal.counts = replace(counts, pings=pinged.pings, beams=pinged.beams, rejected_pings=pinged.rejected)

@@ -135,6 +135,21 @@ class Ending:
         return None if not stored else cls(MissionState(stored["state"]), stored["reason"], stored["actor"])
 
 
+@dataclass(frozen=True)
+class StoredMission:
+    """What the database has of a mission, read and checked before it is taken into memory."""
+
+    row: MissionRow
+    spec: MissionSpec
+    """What is in its row, checked."""
+    counts: Counts
+    """Of its soundings."""
+    tide_table: TideTable | None = None
+    """Measured water levels; None: there are none."""
+    adjustment: TrackAdjustment | None = None
+    """How far tracks are moved; None: they stay as they were reported."""
+
+
 class LiveMission:
     """One mission in memory. Made by ``take_up``; the flight, the service and the watchers share it."""
 
@@ -143,16 +158,14 @@ class LiveMission:
         database: Database,
         hub: FleetHub,
         executor: Executor,
-        row: MissionRow,
-        spec: MissionSpec,
-        counts: Counts,
         ping_files: PingFiles,
-        tide_table: TideTable | None = None,
-        adjustment: TrackAdjustment | None = None,
-        time_scale: float = 1.0,
-        search: Search | None = None,
-        builder: MapBuilder | None = None,
+        time_scale: float,
+        stored: StoredMission,
+        search: Search | None,
+        builder: MapBuilder,
     ) -> None:
+        """Make a mission of what is stored. One function because it is the list of what a mission in memory has."""
+        row, spec = stored.row, stored.spec
         self.id = row.id
         self.spec = spec
         self.header = MissionHeader(MissionState(row.state), row.reason, row.created_at, row.updated_at, row.elapsed_s)
@@ -162,10 +175,10 @@ class LiveMission:
         """All links, those to its vehicles among them."""
         self.team = Team(hub.capabilities, self._energy_of)
         self.broadcaster = Broadcaster()
-        self.builder = builder or builder_of(spec)
+        self.builder = builder
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
-        corrections = Corrections.of(spec, self.frame, tide_table, adjustment)
+        corrections = Corrections.of(spec, self.frame, stored.tide_table, stored.adjustment)
         self.gate = self._gate_with(corrections)
         self.reference_m: FloatArray | None = None
         """Depths of the grid that the map is compared with, at the map's cells."""
@@ -185,7 +198,7 @@ class LiveMission:
             database,
             row.id,
             self.gate,
-            counts,
+            stored.counts,
             self.broadcaster,
             self._take_soundings,
             self.pings,

@@ -10,7 +10,7 @@ from app.mapping.tides import TideTable
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flight.commit import LegCommit
-from app.missions.flight.decision import Place, decide, make_constraints
+from app.missions.flight.decision import Knowledge, Place, decide, make_constraints
 from app.missions.service import MissionService
 from app.missions.soundings.corrections import Corrections
 from tests.support.missions.harbour import sim_spec
@@ -53,7 +53,7 @@ async def test_the_guard_gets_the_bottom_below_the_surface(
     belief = Belief(landmarks, depth, np.zeros(count), np.ones(count, bool), np.ones(count), 5.0)
     places = [Place("a", np.array([10.0, 10.0]), 0.0, 2.0)]
     planner = create_planner("random", spec.planner.options)
-    decision = decide(1, spec, constraints, planner, places, belief, np.zeros((0, 2)), level)
+    decision = decide(1, spec, constraints, planner, places, Knowledge(belief, np.zeros((0, 2)), level))
     committing = LegCommit(live, constraints, leads=True)
     member = live.team.join(spec.vehicles[0], 0)
     lat, lon = live.frame.to_geographic(np.array(10.0), np.array(10.0))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from app.exploration.core.problem import Belief, Proposal, Situation
-from app.missions.flight.decision import Decision, Place, decide, make_constraints
+from app.missions.flight.decision import Decision, Knowledge, Place, decide, make_constraints
 from app.missions.spec.mission import MissionSpec
 from tests.support.missions.specs import make_spec
 
@@ -60,5 +60,6 @@ def decide_for(
     spec = make_spec(60.0, **({"limits": {"max_step_m": 12.0, "max_depth_m": 20.0}} | changes))
     planner = Wishes(wishes)
     belief = belief or belief_of()
-    decision = decide(1, spec, make_constraints(spec), planner, places, belief, np.zeros((0, 2)), water_level_m)
+    known = Knowledge(belief, np.zeros((0, 2)), water_level_m)
+    decision = decide(1, spec, make_constraints(spec), planner, places, known)
     return decision, planner, spec
