@@ -51,8 +51,9 @@ NEAR_M = 0.5
 FEW_LINES = 4.0
 """Shares are whole lines where there are fewer lines than so many for each vehicle."""
 
-FLOWN, LAST_PART = 0.5, 0.2
-"""A piece of a line counts as flown where this share of the cells under the last part of it is ensonified."""
+FLOWN, LAST_PART, END_CELLS = 0.5, 0.2, 3
+"""A piece of a line counts as flown where this share of the cells under the last part of it is ensonified, and one of
+those that are so many cells to either side of its end: what is behind the last ping is still to come."""
 
 
 @dataclass
@@ -448,7 +449,9 @@ class SwathSurvey:
                 last = int((1.0 - LAST_PART) * len(rows))
                 rows, cols = rows[last:], cols[last:]
                 inside = coverage.wanted[rows, cols]
-                if not inside.any() or coverage.done[rows, cols][inside].mean() >= FLOWN:
+                if not inside.any() or (
+                    coverage.done[rows, cols][inside].mean() >= FLOWN and _end_seen(sweep.expected[k], coverage)
+                ):
                     del sweep.expected[: k + 1]
                     break
 
@@ -550,6 +553,21 @@ def _under(path: FloatArray, coverage: Coverage) -> tuple[Any, Any]:
     rows = np.floor((np.interp(at, begins, path[:, 1]) - coverage.south_m) / coverage.cell_m).astype(np.int64)
     shape = coverage.wanted.shape
     return np.clip(rows, 0, shape[0] - 1), np.clip(cols, 0, shape[1] - 1)
+
+
+def _end_seen(path: FloatArray, coverage: Coverage) -> bool:
+    """Return whether any wanted cell beside the end of a path (k, 2) is ensonified; True where none is wanted."""
+    back = path[-2] - path[-1]
+    back = back / max(float(np.hypot(*back)), 1e-9)
+    aside_m = coverage.cell_m * np.arange(-END_CELLS, END_CELLS + 1)
+    places = path[-1] + 0.5 * coverage.cell_m * back + aside_m[:, None] * np.array([-back[1], back[0]])
+    cols = np.floor((places[:, 0] - coverage.west_m) / coverage.cell_m).astype(np.int64)
+    rows = np.floor((places[:, 1] - coverage.south_m) / coverage.cell_m).astype(np.int64)
+    shape = coverage.wanted.shape
+    inside = (rows >= 0) & (rows < shape[0]) & (cols >= 0) & (cols < shape[1])
+    rows, cols = rows[inside], cols[inside]
+    wanted = coverage.wanted[rows, cols]
+    return bool(not wanted.any() or coverage.done[rows, cols][wanted].any())
 
 
 def _simple(path: FloatArray, tolerance_m: float) -> FloatArray:
