@@ -13,10 +13,10 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
-from app.exploration.swath.lines import STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
+from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
 from app.exploration.swath.lines_ahead import best_direction, nearest_entry, path_m
 from app.exploration.swath.passes import passes
-from app.exploration.swath.raster import Flying, LineRaster, raster_of
+from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
 MOST_TRIES = 4
 """What so many lines were to see and did not is given up."""
@@ -40,8 +40,9 @@ DETOUR, BUSY = 1.5, 0.25
 """A line is left to another vehicle where the way there is longer than so many times the other's detour, and a part of
 what the other has still to fly of its own line."""
 
-SHOALING = 0.1
-"""Metres by which unknown ground is presumed to rise a metre away from known ground: lines rather begin too close."""
+SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
+"""Metres by which unknown ground is presumed to rise a metre away from known ground, least and most: so many times what
+the steepest known ground does. Lines rather begin too close."""
 
 BEYOND_M = 1e9
 """Farther across than any area."""
@@ -115,6 +116,8 @@ class SwathSurvey:
         self._raster_m, self._guess_m = raster_m, guess_m
         self._sweeps: dict[str, Assignment] = {}
         self._looks = 0
+        self._steepest: tuple[FloatArray, float] | None = None
+        """How much the bottom is presumed to rise, and the depths that this follows from."""
         self._tried = np.zeros((0, 0), dtype=np.int64)
 
     def next_leg(
@@ -385,6 +388,11 @@ class SwathSurvey:
         raster = self._raster(coverage, self._direction_rad)
         names = sorted(team, key=lambda name: (float(raster.axes.turned(team[name][:2])[1]), name))
         work = _work(raster, raster.open, flying).sum(axis=0)
+        whole = float(needed_lines(raster, raster.open, flying).max(initial=1.0))
+        for name in names:
+            self._sweeps[name].share = None
+        # Nobody is given less than a line: the way to it would be longer.
+        names = names[: max(1, int(whole + ALMOST))]
         if len(names) == 1:
             across = float(raster.axes.turned(team[names[0]][:2])[1])
             low, high = float(raster.across_m[0]), float(raster.across_m[-1])
@@ -392,7 +400,6 @@ class SwathSurvey:
             return
         upto = np.cumsum(work) / max(float(work.sum()), 1e-9)
         parts = np.arange(len(names) + 1) / len(names)
-        whole = float(needed_lines(raster, raster.open, flying).max(initial=1.0))
         if whole < FEW_LINES * len(names):
             # Few lines are shared as whole ones: parts of lines at every border would be lines more.
             parts = np.round(parts * np.ceil(whole)) / np.ceil(whole)
@@ -478,7 +485,9 @@ class SwathSurvey:
         self._tried[rows[inside], cols[inside]] += 1
 
     def _raster(self, coverage: Coverage, direction_rad: float) -> LineRaster:
-        return raster_of(coverage, direction_rad, self._raster_m, self._guess_m, SHOALING)
+        if self._steepest is None or self._steepest[0] is not coverage.depth_m:
+            self._steepest = coverage.depth_m, float(np.clip(SHOALING_OF_STEEP * steepness(coverage), *SHOALING))
+        return raster_of(coverage, direction_rad, self._raster_m, self._guess_m, self._steepest[1])
 
     def remember(self) -> dict[str, Any]:
         """Return all that the survey knows, for ``recall``."""
