@@ -26,6 +26,9 @@ so many turning circles' radii, and their length."""
 STRIP = 0.6
 """What is left open is swept in lines where it is wider than this part of a swath; the rest is filled in the end."""
 
+LARGE = 0.3
+"""So is what is so large a share of the area, though one swath sees it."""
+
 
 @dataclass(frozen=True)
 class Line:
@@ -184,7 +187,8 @@ def strips(raster: LineRaster, flying: Flying) -> tuple[BoolArray, BoolArray]:
     for k, where in enumerate(find_objects(number), start=1):
         inside = number[where] == k
         thickest = int(inside.sum(axis=1).max()) * raster.cell_m
-        swept[k] = thickest > STRIP * 2.0 * float(np.median(width_m[where][inside]))
+        wide = thickest > STRIP * 2.0 * float(np.median(width_m[where][inside]))
+        swept[k] = wide or float(inside.sum()) > LARGE * float(raster.wanted.sum())
     large = np.asarray(swept[number])
     return large, np.asarray(raster.open & ~large)
 

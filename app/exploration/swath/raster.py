@@ -9,6 +9,10 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.coverage import Coverage
 
+STEEP_BLOCK, STEEP, FEWEST_RISES = 0.25, 0.95, 4
+"""Steep is what so large a share of all ground is not, between blocks of this part of the depth; of fewer rises nothing
+is said."""
+
 
 @dataclass(frozen=True)
 class Flying:
@@ -181,6 +185,21 @@ def raster_of(
     total = np.bincount(flat, coverage.depth_m[known], minlength=int(shape.prod())).reshape(shape)
     depth = np.divide(total, count, out=np.full(shape, np.nan), where=count > 0)
     return LineRaster(axes, corner, cell_m, still_open, wanted, _filled(depth, guess_m, shoaling * cell_m))
+
+
+def steepness(coverage: Coverage) -> float:
+    """Return how much steep known ground rises, metres a metre, between blocks of cells.
+
+    Infinite where hardly any is known.
+    """
+    known_m = coverage.depth_m[np.isfinite(coverage.depth_m)]
+    if not known_m.size:
+        return np.inf
+    side_m = STEEP_BLOCK * float(np.median(known_m))
+    blocks = coverage.coarser(max(1, round(side_m / coverage.cell_m)))
+    rises = np.concatenate([np.abs(np.diff(blocks.depth_m, axis=axis)).ravel() for axis in (0, 1)])
+    rises = rises[np.isfinite(rises)]
+    return float(np.quantile(rises, STEEP)) / blocks.cell_m if len(rises) >= FEWEST_RISES else np.inf
 
 
 def _filled(depth_m: FloatArray, guess_m: float, rise_m: float) -> FloatArray:

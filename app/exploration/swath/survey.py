@@ -13,9 +13,10 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
-from app.exploration.swath.lines import STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
+from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
 from app.exploration.swath.lines_ahead import best_direction, nearest_entry, path_m
-from app.exploration.swath.raster import Flying, LineRaster, raster_of
+from app.exploration.swath.passes import passes
+from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
 MOST_TRIES = 4
 """What so many lines were to see and did not is given up."""
@@ -39,8 +40,9 @@ DETOUR, BUSY = 1.5, 0.25
 """A line is left to another vehicle where the way there is longer than so many times the other's detour, and a part of
 what the other has still to fly of its own line."""
 
-SHOALING = 0.1
-"""Metres by which unknown ground is presumed to rise a metre away from known ground: lines rather begin too close."""
+SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
+"""Metres by which unknown ground is presumed to rise a metre away from known ground, least and most: so many times what
+the steepest known ground does. Lines rather begin too close."""
 
 BEYOND_M = 1e9
 """Farther across than any area."""
@@ -52,7 +54,8 @@ FEW_LINES = 4.0
 """Shares are whole lines where there are fewer lines than so many for each vehicle."""
 
 FLOWN, LAST_PART = 0.5, 0.2
-"""A piece of a line counts as flown where this share of the cells under the last part of it is ensonified."""
+"""A piece of a line counts as flown where this share of the cells under the last part of it is ensonified, and of those
+beside its end that were open: what is behind the last ping is still to come."""
 
 
 @dataclass
@@ -82,6 +85,8 @@ class Assignment:
     share: Strip | None = None
     course: FlownLine | None = None
     expected: list[FloatArray] = field(default_factory=list)
+    ends: list[FloatArray] = field(default_factory=list)
+    """Of each piece the places (n, 2) beside its end that were open when it was sent."""
     refused: int = 0
     """How often in a row it was not sent where it was to go."""
     laid_on: Coverage | None = None
@@ -111,6 +116,8 @@ class SwathSurvey:
         self._raster_m, self._guess_m = raster_m, guess_m
         self._sweeps: dict[str, Assignment] = {}
         self._looks = 0
+        self._steepest: tuple[FloatArray, float] | None = None
+        """How much the bottom is presumed to rise, and the depths that this follows from."""
         self._tried = np.zeros((0, 0), dtype=np.int64)
 
     def next_leg(
@@ -173,7 +180,7 @@ class SwathSurvey:
         if np.hypot(*(pose[:2] - piece[-1])) <= max(NEAR_M, float(np.hypot(*(pose[:2] - piece[0])))):
             sweep.refused = 0
             return
-        del sweep.expected[-1]
+        del sweep.expected[-1], sweep.ends[-1]
         course = sweep.course
         sweep.refused += 1
         if course is None or not course.begun:
@@ -218,6 +225,7 @@ class SwathSurvey:
         end = np.array([np.interp(goes_m, ahead_m, vertices[:, k]) for k in (0, 1)])
         inner = (ahead_m > 0.0) & (ahead_m < goes_m - 1e-6)
         sweep.expected.append(np.vstack([pose[:2], vertices[inner], end]))
+        sweep.ends.append(_open_beside_end(sweep.expected[-1], flying, coverage))
         rest = vertices[ahead_m > goes_m + 1e-6]
         course.path = np.vstack([end, rest]) if len(rest) else np.zeros((0, 2))
         return end
@@ -289,8 +297,15 @@ class SwathSurvey:
         if not choice:
             again = small & self._tried_twice(coverage)
             overlap = STUBBORN_OVERLAP if again.any() else FILLING_OVERLAP
+            missed = again if again.any() else small
+            short, wide = passes(left, missed, closer(flying, overlap), pose)
+            for one in short:
+                if not self._closer(vehicle, pose, one.path, one.away_m, team):
+                    east, north = one.path[1] - one.path[0]
+                    sweep.course = FlownLine(float(np.arctan2(north, east)), 1, one.path, overlap)
+                    return True
             near_m = np.full(len(left.open), float(raster.axes.turned(pose[:2])[1]))
-            choice = lines(left, again if again.any() else small, sign, closer(flying, overlap), near_m)
+            choice = lines(left, wide, sign, closer(flying, overlap), near_m)
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             if own or not self._closer(vehicle, pose, path, away_m, team):
@@ -373,6 +388,11 @@ class SwathSurvey:
         raster = self._raster(coverage, self._direction_rad)
         names = sorted(team, key=lambda name: (float(raster.axes.turned(team[name][:2])[1]), name))
         work = _work(raster, raster.open, flying).sum(axis=0)
+        whole = float(needed_lines(raster, raster.open, flying).max(initial=1.0))
+        for name in names:
+            self._sweeps[name].share = None
+        # Nobody is given less than a line: the way to it would be longer.
+        names = names[: max(1, int(whole + ALMOST))]
         if len(names) == 1:
             across = float(raster.axes.turned(team[names[0]][:2])[1])
             low, high = float(raster.across_m[0]), float(raster.across_m[-1])
@@ -380,7 +400,6 @@ class SwathSurvey:
             return
         upto = np.cumsum(work) / max(float(work.sum()), 1e-9)
         parts = np.arange(len(names) + 1) / len(names)
-        whole = float(needed_lines(raster, raster.open, flying).max(initial=1.0))
         if whole < FEW_LINES * len(names):
             # Few lines are shared as whole ones: parts of lines at every border would be lines more.
             parts = np.round(parts * np.ceil(whole)) / np.ceil(whole)
@@ -448,8 +467,10 @@ class SwathSurvey:
                 last = int((1.0 - LAST_PART) * len(rows))
                 rows, cols = rows[last:], cols[last:]
                 inside = coverage.wanted[rows, cols]
-                if not inside.any() or coverage.done[rows, cols][inside].mean() >= FLOWN:
-                    del sweep.expected[: k + 1]
+                if not inside.any() or (
+                    coverage.done[rows, cols][inside].mean() >= FLOWN and _end_seen(sweep.ends[k], coverage)
+                ):
+                    del sweep.expected[: k + 1], sweep.ends[: k + 1]
                     break
 
     def _count(self, path: FloatArray, flying: Flying, coverage: Coverage) -> None:
@@ -464,7 +485,9 @@ class SwathSurvey:
         self._tried[rows[inside], cols[inside]] += 1
 
     def _raster(self, coverage: Coverage, direction_rad: float) -> LineRaster:
-        return raster_of(coverage, direction_rad, self._raster_m, self._guess_m, SHOALING)
+        if self._steepest is None or self._steepest[0] is not coverage.depth_m:
+            self._steepest = coverage.depth_m, float(np.clip(SHOALING_OF_STEEP * steepness(coverage), *SHOALING))
+        return raster_of(coverage, direction_rad, self._raster_m, self._guess_m, self._steepest[1])
 
     def remember(self) -> dict[str, Any]:
         """Return all that the survey knows, for ``recall``."""
@@ -486,6 +509,7 @@ class SwathSurvey:
                         "begun": s.course.begun,
                     },
                     "expected": [path.tolist() for path in s.expected],
+                    "ends": [places.tolist() for places in s.ends],
                     "refused": s.refused,
                 }
                 for name, s in self._sweeps.items()
@@ -514,6 +538,7 @@ class SwathSurvey:
                     bool(course["begun"]),
                 ),
                 [np.array(path, dtype=np.float64).reshape(-1, 2) for path in kept["expected"]],
+                [np.array(places, dtype=np.float64).reshape(-1, 2) for places in kept["ends"]],
                 int(kept.get("refused", 0)),
             )
 
@@ -550,6 +575,33 @@ def _under(path: FloatArray, coverage: Coverage) -> tuple[Any, Any]:
     rows = np.floor((np.interp(at, begins, path[:, 1]) - coverage.south_m) / coverage.cell_m).astype(np.int64)
     shape = coverage.wanted.shape
     return np.clip(rows, 0, shape[0] - 1), np.clip(cols, 0, shape[1] - 1)
+
+
+def _open_beside_end(path: FloatArray, flying: Flying, coverage: Coverage) -> FloatArray:
+    """Return the centres (n, 2) of open cells across the end of a path (k, 2), as far as the swath goes there."""
+    back = path[-2] - path[-1]
+    back = back / max(float(np.hypot(*back)), 1e-9)
+    end = path[-1] + 0.5 * coverage.cell_m * back
+    rows, cols = _under(np.stack([end, end]), coverage)
+    depth_m = coverage.depth_m[rows[:1], cols[:1]]
+    half_m = float(flying.half_width_m(depth_m)[0]) if np.isfinite(depth_m).all() else 0.0
+    aside_m = np.arange(-max(half_m, coverage.cell_m), max(half_m, coverage.cell_m) + 1e-9, coverage.cell_m)
+    places = end + aside_m[:, None] * np.array([-back[1], back[0]])
+    return np.asarray(places[_cells_at(places, coverage, coverage.left)])
+
+
+def _end_seen(places: FloatArray, coverage: Coverage) -> bool:
+    """Return whether most of the places (n, 2) that were open beside a piece's end are ensonified."""
+    return not len(places) or float(_cells_at(places, coverage, coverage.done).mean()) >= FLOWN
+
+
+def _cells_at(places: FloatArray, coverage: Coverage, cells: BoolArray) -> BoolArray:
+    """Return which places (n, 2) lie in some cells of the grid."""
+    cols = np.floor((places[:, 0] - coverage.west_m) / coverage.cell_m).astype(np.int64)
+    rows = np.floor((places[:, 1] - coverage.south_m) / coverage.cell_m).astype(np.int64)
+    shape = cells.shape
+    inside = (rows >= 0) & (rows < shape[0]) & (cols >= 0) & (cols < shape[1])
+    return np.asarray(inside & cells[np.where(inside, rows, 0), np.where(inside, cols, 0)])
 
 
 def _simple(path: FloatArray, tolerance_m: float) -> FloatArray:
