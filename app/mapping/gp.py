@@ -32,6 +32,7 @@ from app.mapping.reach import (
     FACTOR_STEP,
     LEAST_IN_STRIP,
     TESTS,
+    UNCHECKED_FACTOR,
     Reach,
     likely_factor,
     likely_square,
@@ -103,6 +104,8 @@ class GaussianProcessMap:
         Leave out soundings that ``flag_outliers`` rejects.
     hole_m
         Radius of the cross-validation holes; by default 8/100 of the extent of the soundings.
+    claims
+        False saves the checks that only ``claim_sd_m`` needs, which is infinite then; nothing else depends on them.
 
     Attributes
     ----------
@@ -130,6 +133,7 @@ class GaussianProcessMap:
         hole_m: float | None = None,
         reject_outliers: bool = True,
         calibrate: bool = True,
+        claims: bool = True,
     ) -> None:
         if kernel != "auto" and kernel not in KERNEL_CODES:
             raise ValueError(f"kernel is {kernel!r}; it must be auto or one of {', '.join(KERNEL_CODES)}")
@@ -142,6 +146,7 @@ class GaussianProcessMap:
         self.hole_m = hole_m
         self.reject_outliers = reject_outliers
         self.calibrate = calibrate
+        self.claims = claims
 
     def fit(self, soundings: Soundings, *, learn: bool = True) -> Self:
         """Take in all soundings so far.
@@ -283,7 +288,7 @@ class GaussianProcessMap:
                 self._rough or self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS, BEYOND_UNITS * self._unit_m
             )
             self.log_scale_beyond_ = max(self.log_scale_, checked_log_scale(self._calibration, beyond))
-            self._factor = self._checked_factor(self._calibration)
+            self._factor = self._checked_factor(self._calibration) if self.claims else UNCHECKED_FACTOR
 
     def _checked_factor(self, calibration: Calibration) -> float:
         """Hold soundings out over longer and longer distances: which factor on the deviation that leaves possible."""
@@ -334,8 +339,11 @@ class GaussianProcessMap:
             distance = nearest(self._levels.fine_tree, grid.centres_m, 1)[0].reshape(shape)
             depth, moved = self._reach.plausible(depth, distance, grid.cell_m)
             deviation = np.hypot(deviation, moved)
-            process_sd, bound = deviation, self._reach.bound(deviation, distance, grid.cell_m)
+            process_sd = deviation
+            bound = self._reach.bound(deviation, distance, grid.cell_m)
             deviation = self._reach.deviation(deviation, distance)
+        if not self.claims:
+            bound = np.full(shape, np.inf)
         count = count_per_cell(grid, self.soundings_)
         roughness = np.where(wanted, np.exp(self._log_ratio.over(grid)[0]), np.nan)
         kind = "nonstationary" if self.refinement_ > 0.0 else "stationary"

@@ -142,7 +142,7 @@ def radii(levels: TwoLevels, unit_m: float, step: float = RADIUS_STEP) -> list[f
 
 def _checked_m(levels: TwoLevels, unit_m: float) -> float:
     points = levels.points[: levels.n_fine]
-    return max((r for r in radii(levels, unit_m) if _checkable(points, r)), default=0.0)
+    return next((r for r in reversed(radii(levels, unit_m)) if _checkable(points, r)), 0.0)
 
 
 def _checkable(points: FloatArray, radius_m: float) -> bool:

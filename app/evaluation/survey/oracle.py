@@ -4,12 +4,15 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from app.arrays import FloatArray
-from app.evaluation.survey.world import Log, default_map, terrain_grid
+from app.evaluation.survey.world import Log, terrain_grid
+from app.mapping.gp import GaussianProcessMap
 from app.mapping.types import Soundings
 from simulator.terrain import Terrain
 
 FIRST_PART = 0.3
 ROUNDS = 10
+LEARNS = 3
+"""After so many rounds the map's hyperparameters are learned again."""
 LEAST_APART = 0.5
 """Distance between soundings of one round, as a part of that of an even spread."""
 
@@ -26,7 +29,7 @@ def oracle_soundings(log: Log, terrain: Terrain, count: int, depth_m: float) -> 
     known = np.isfinite(truth)
     first = max(min(count, 4), int(FIRST_PART * count))
     _sound(log, spread_points(first, terrain), depth_m)
-    left = count - first
+    left, process = count - first, GaussianProcessMap(claims=False)
     for k in range(ROUNDS):
         batch = left // (ROUNDS - k)
         left -= batch
@@ -34,7 +37,8 @@ def oracle_soundings(log: Log, terrain: Terrain, count: int, depth_m: float) -> 
             continue
         squared = known.astype(np.float64)
         if len(log.soundings):
-            squared = np.where(known, (default_map(log.soundings, grid).depth_m.ravel() - truth) ** 2, 0.0)
+            estimate = process.fit(log.soundings, learn=k % LEARNS == 0).predict(grid)
+            squared = np.where(known, (estimate.depth_m.ravel() - truth) ** 2, 0.0)
         apart = np.sqrt(known.sum() * grid.cell_m**2 / count)
         worth = gaussian_filter(squared.reshape(grid.rows, grid.cols), 0.5 * apart / grid.cell_m, mode="nearest")
         _sound(log, centres[_largest(worth.ravel() * known, centres, batch, LEAST_APART * apart)], depth_m)

@@ -200,12 +200,12 @@ def along(start: FloatArray, end: FloatArray, sampling: Sampling, since_m: float
 
 def default_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
     """Return the default map, its kernel chosen by the likelihood."""
-    return GaussianProcessMap().fit(soundings).predict(grid)
+    return GaussianProcessMap(claims=False).fit(soundings).predict(grid)
 
 
 def stationary_map(soundings: Soundings, grid: Grid) -> BathymetricMap:
     """Return what a Gaussian process with a Matern 3/2 kernel and learned hyperparameters makes of the soundings."""
-    return GaussianProcessMap("matern32", nonstationary=False).fit(soundings).predict(grid)
+    return GaussianProcessMap("matern32", nonstationary=False, claims=False).fit(soundings).predict(grid)
 
 
 def rmse_m(estimate: BathymetricMap, terrain: Terrain) -> tuple[float, float]:
@@ -242,7 +242,7 @@ class MapSoFar:
     def __init__(self, grid: Grid, known: Belief | None = None) -> None:
         self.belief = unknown_belief(grid) if known is None else known
         self._grid, self._fixed = grid, known is not None
-        self._gp = GaussianProcessMap()
+        self._gp = GaussianProcessMap(claims=False)
         self._verdict: OutlierReport | None = None
         self._maps = self._learned = 0
 
