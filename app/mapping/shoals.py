@@ -2,7 +2,7 @@
 
 import numpy as np
 from scipy.ndimage import uniform_filter
-from scipy.stats import t as student_t
+from scipy.special import stdtr
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.swath.density import LEAST_SOUNDINGS
@@ -48,7 +48,7 @@ def shoal_chance(bathymetry: BathymetricMap, shoal_depth_m: float, common_sd_m: 
     """
     depth = bathymetry.depth_m
     supported = np.isfinite(depth) & np.isfinite(bathymetry.claim_sd_m)
-    chance = student_t.sf(deviations_above(bathymetry, shoal_depth_m, common_sd_m), DEGREES_OF_FREEDOM)
+    chance = stdtr(DEGREES_OF_FREEDOM, -deviations_above(bathymetry, shoal_depth_m, common_sd_m))
     hidden = supported & (bathymetry.count < LEAST_SOUNDINGS)
     height = (depth - _rise_and_bend(depth)[0] - shoal_depth_m)[hidden]
     chance[hidden] = np.maximum(chance[hidden], rock_chance(height, rises_m(bathymetry)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
@@ -86,7 +86,7 @@ class HeldOut:
     @property
     def speaks_for_ties(self) -> bool:
         """Whether ties made them fit better, by more than chance and by enough to matter."""
-        needed = float(student_t.isf(BY_CHANCE, self.sections - 1))
+        needed = -float(stdtrit(self.sections - 1, BY_CHANCE))
         return self.significance >= needed and self.after_m <= WORTHWHILE * self.by_fixes_m
 
 
