@@ -50,7 +50,6 @@ from app.api.auth import console_log_in
 from app.api.bodies import BodyMiddleware
 from app.api.budget import Budget
 from app.api.connections import Sockets, is_shared_host, patient_http
-from app.api.direct import DirectRoutes
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.intake import Intakes
@@ -196,7 +195,6 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     mount_dashboard(app, charts=settings.charts)
     problems.install(app)
     openapi.install(app)
-    app.add_middleware(DirectRoutes, routers=routers)
     app.add_middleware(ForwardingMiddleware)
     app.add_middleware(
         BodyMiddleware,

@@ -15,7 +15,6 @@ from starlette.types import Scope
 
 from app.api.auth import RoleCheck
 from app.api.problems import ProblemError
-from app.api.route_index import RouteIndex
 from app.api.state import EdgeState
 from app.api.tokens import Principal
 
@@ -82,20 +81,23 @@ class Intakes:
     """Finds the route of a request that may change something."""
 
     def __init__(self, routers: Iterable[APIRouter]) -> None:
-        self._index = RouteIndex(
-            (route, Intake(route, _role(route), _kind(route)))
-            for router in routers
-            for route in router.routes
-            if isinstance(route, APIRoute)
-        )
+        self._by_method: dict[str, list[Intake]] = {}
+        for router in routers:
+            for route in router.routes:
+                if isinstance(route, APIRoute):
+                    intake = Intake(route, _role(route), _kind(route))
+                    for method in route.methods or ():
+                        self._by_method.setdefault(method, []).append(intake)
 
     def find(self, scope: Scope) -> Intake | None:
         """Return a request's intake, and note its route and mission with the request; None: there is none."""
-        found = self._index.find(scope["method"], scope["path"])
-        if found is None:
-            return None
-        scope["route"], scope["path_params"], intake = found
-        return intake
+        for intake in self._by_method.get(scope["method"], ()):
+            found = intake.route.path_regex.match(scope["path"])
+            if found:
+                scope["route"] = intake.route
+                scope["path_params"] = found.groupdict()
+                return intake
+        return None
 
 
 def has_body(headers: Headers) -> bool:
