@@ -8,6 +8,7 @@ covariance honest while a point is still uncertain across the beam.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -140,7 +141,8 @@ class Landmark3DEstimator:
         row = np.full(len(looks), -1, dtype=np.int64)
         row[spread] = np.arange(len(spread))
         blur = position_sd_m**2
-        single = _take(where, index, ranges, noise, blur, looks, row, mean, covariance, means, covariances, weights)
+        measured = _Measured(where, index, ranges, noise, blur)
+        single = _take(measured, looks, row, mean, covariance, _Bundles(means, covariances, weights))
         looks[index] += 1
 
         variance = covariance[index][:, range(3), range(3)] + np.array([blur, blur, 0.0])
@@ -179,22 +181,37 @@ def _start(position: FloatArray, ranges: FloatArray, noise: float) -> tuple[Floa
     return means, covariances, np.full((len(ranges), BUNDLE), 1.0 / BUNDLE)
 
 
+class _Measured(NamedTuple):
+    """What one vehicle measured at ``position`` (3,): ``ranges`` (k,) of landmarks ``index`` (k,).
+
+    ``noise`` is relative to a range, ``blur`` the variance of the vehicle's own place along east and along north, m^2.
+    """
+
+    position: FloatArray
+    index: IntArray
+    ranges: FloatArray
+    noise: float
+    blur: float
+
+
+class _Bundles(NamedTuple):
+    """The bundles' filters, as in ``Landmarks3D``."""
+
+    means: FloatArray
+    covariances: FloatArray
+    weights: FloatArray
+
+
 @njit(cache=True, nogil=True)
 def _take(
-    position: FloatArray,
-    index: IntArray,
-    ranges: FloatArray,
-    noise: float,
-    blur: float,
-    looks: IntArray,
-    row: IntArray,
-    mean: FloatArray,
-    covariance: FloatArray,
-    means: FloatArray,
-    covariances: FloatArray,
-    weights: FloatArray,
+    measured: _Measured, looks: IntArray, row: IntArray, mean: FloatArray, covariance: FloatArray, bundles: _Bundles
 ) -> BoolArray:
-    """Update everything in place; return which bundles have become a single filter."""
+    """Update everything in place; return which bundles have become a single filter.
+
+    ``looks``, ``mean``, ``covariance`` are of all landmarks; ``row`` is the bundle of each, -1 for a single filter.
+    """
+    position, index, ranges, noise, blur = measured
+    means, covariances, weights = bundles
     single = np.zeros(len(means), dtype=np.bool_)
     for k in range(len(index)):
         m = index[k]

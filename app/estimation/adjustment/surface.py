@@ -202,7 +202,7 @@ def _nearest_by_quadrant(
 def _kriging_system(
     soundings: Soundings, near: IntArray, e0: float, n0: float, relief: PowerLaw, a: FloatArray, x: FloatArray
 ) -> None:
-    """Write ordinary kriging's matrix (m + 1, m + 1) and right side (m + 1,) at a place, for soundings ``near`` (m,)."""
+    """Write the matrix (m + 1, m + 1) and right side (m + 1,) of ordinary kriging from soundings ``near`` (m,)."""
     east, north, sd = soundings.east, soundings.north, soundings.sd
     factor, exponent = relief
     m = len(near)

@@ -4,6 +4,8 @@ They judge by AURO15's objective (eq. 8-15, read as in :mod:`app.exploration.cor
 does ([20, algorithm 1]). A try is flown, pinged with and judged; its measurements are dropped.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -81,14 +83,26 @@ def _credits(known: KnownLandmarks, n: int) -> FloatArray:
     return credited
 
 
+class _World(NamedTuple):
+    """The sea floor (rows, cols), the simulation's constants, and where the landmarks are in truth, (m, 3)."""
+
+    raster: FloatArray
+    physics: Physics
+    landmarks: FloatArray
+
+
+class _Team(NamedTuple):
+    """Where n vehicles are, (n, 3), their headings, (n,), and the directions of their last moves, (n, 2)."""
+
+    positions: FloatArray
+    headings: FloatArray
+    moves: FloatArray
+
+
 @njit(cache=True, nogil=True)
 def _try(
-    raster: FloatArray,
-    p: Physics,
-    truth: FloatArray,
-    positions: FloatArray,
-    headings: FloatArray,
-    moves: FloatArray,
+    world: _World,
+    team: _Team,
     way: FloatArray,
     known: KnownLandmarks,
     history: FloatArray,
@@ -96,8 +110,9 @@ def _try(
     rng: np.random.Generator,
 ) -> float:
     """Return what going ``way`` (n, 3) turns out to be worth; ``history`` (2, 3, n) holds the progress at t-2, t-1."""
-    n = len(positions)
-    there, heading, going = positions.copy(), headings.copy(), moves.copy()
+    raster, p, truth = world
+    n = len(team.positions)
+    there, heading, going = team.positions.copy(), team.headings.copy(), team.moves.copy()
     move(raster, p, there, heading, going, way)
     after = KnownLandmarks(
         known.depth.copy(), known.variance.copy(), known.looks.copy(), known.accurate.copy(), known.credited.copy()
@@ -147,6 +162,7 @@ def fly_tried(
     """Fly a mission with SE(``candidates``), SPSA or FDSA; returns as :func:`app.evaluation.pcao.kernel.fly` does."""
     n, m = len(start), len(truth)
     positions, headings, moves = start.copy(), headings.copy(), np.zeros((n, 2))
+    world, team = _World(raster, p, truth), _Team(positions, headings, moves)
     known, visible, trial = unknown(m), np.zeros((n, m), dtype=np.bool_), np.zeros((n, m), dtype=np.bool_)
     remaining, error = np.zeros(steps, dtype=np.int64), np.zeros(steps)
     history = np.full((2, 3, n), np.nan)
@@ -165,7 +181,7 @@ def fly_tried(
                 top = -np.inf
                 for _ in range(candidates):
                     _draw(p, positions, rng, way)
-                    value = _try(raster, p, truth, positions, headings, moves, way, known, history, trial, rng)
+                    value = _try(world, team, way, known, history, trial, rng)
                     if value > top:
                         top = value
                         best[:] = way
@@ -180,8 +196,8 @@ def fly_tried(
                             along[v, k] = 1.0 if rng.random() < 0.5 else -1.0
                         elif d == 3 * v + k:
                             along[v, k] = 1.0
-                up = _try(raster, p, truth, positions, headings, moves, size * along, known, history, trial, rng)
-                down = _try(raster, p, truth, positions, headings, moves, -size * along, known, history, trial, rng)
+                up = _try(world, team, size * along, known, history, trial, rng)
+                down = _try(world, team, -size * along, known, history, trial, rng)
                 slope += (up - down) / (2.0 * size) * along
             steepest = np.abs(slope).max()
             if steepest > 0.0:

@@ -46,7 +46,7 @@ def passes(raster: LineRaster, missed: BoolArray, flying: Flying, pose: FloatArr
     number, _ = label(missed, np.ones((3, 3)))
     pieces = []
     for k, where in enumerate(find_objects(number), start=1):
-        cells = np.argwhere(number[where] == k) + [where[0].start, where[1].start]
+        cells = np.argwhere(number[where] == k) + np.array([where[0].start, where[1].start])
         places = raster.axes.to_en(raster.corner_m + (cells + 0.5) * raster.cell_m)
         pieces.append((float(np.hypot(*(places - pose[:2]).T).min()), cells, places))
     pieces.sort(key=lambda piece: piece[0])
@@ -62,9 +62,7 @@ def passes(raster: LineRaster, missed: BoolArray, flying: Flying, pose: FloatArr
     return sorted(found, key=lambda one: one.way_m), wide
 
 
-def _shortest(
-    raster: LineRaster, places: FloatArray, reach_m: float, radius_m: float, pose: FloatArray
-) -> Pass | None:
+def _shortest(raster: LineRaster, places: FloatArray, reach_m: float, radius_m: float, pose: FloatArray) -> Pass | None:
     """Return the shortest pass that has all places (n, 2) within its reach; None where they lie too far apart."""
     headings = np.arange(HEADINGS) * 2.0 * np.pi / HEADINGS
     towards = np.column_stack([np.sin(headings), np.cos(headings)])

@@ -8,6 +8,7 @@ vehicles, landmarks and candidates.
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -77,18 +78,36 @@ def within_reach(
     return starts, index[:filled].copy()
 
 
+class Listed(NamedTuple):
+    """Landmarks as they are listed for the vehicles, k entries in all.
+
+    Attributes
+    ----------
+    points : (k, 3)
+        Where they are.
+    index : (k,), starts : (2 * n_vehicles + 1,)
+        As returned by :func:`within_reach`.
+    needed : (n,)
+        Information (inverse variance) that each landmark lacks, one entry for each landmark that there is.
+    direction : (k, 3) or None
+        Along which each is to be known; None: all of them are depths.
+    """
+
+    points: FloatArray
+    index: IntArray
+    starts: NDArray[np.int64]
+    needed: FloatArray
+    direction: FloatArray | None = None
+
+
 def predict(
     positions: FloatArray,
     candidates: FloatArray,
-    near: FloatArray,
-    index: IntArray,
-    starts: NDArray[np.int64],
-    needed: FloatArray,
+    listed: Listed,
     goals: FloatArray,
     visibility: float,
     noise: float,
     step: float,
-    direction: FloatArray | None = None,
 ) -> FloatArray:
     """Return, for each configuration, expected progress, newly accurate landmarks, and minus the distance left, (c, 3).
 
@@ -98,21 +117,16 @@ def predict(
         Where the vehicles are.
     candidates : (c, n_vehicles, 3)
         Configurations close to it.
-    near : (k, 3)
-        The landmarks of the lists.
-    index, starts
-        As returned by :func:`within_reach`.
-    needed : (n,)
-        Information (inverse variance) that each landmark lacks.
+    listed
+        The landmarks around each vehicle.
     goals : (g, 3)
         Where the vehicles are drawn: a single common goal, or all landmarks, of which each vehicle takes the closest.
     visibility, noise : float
         Of the range sensor.
     step : float
         Unit of distance.
-    direction : (k, 3) or None
-        Along which each is to be known; None: all of them are depths.
     """
+    near, index, starts, needed, direction = listed
     members, slot = np.unique(index, return_inverse=True)
     unit = 1.0 / (noise * noise * needed[members])
     owner = np.repeat(np.arange(len(positions)), np.diff(starts[::2]))

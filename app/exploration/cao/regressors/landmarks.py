@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
-from app.exploration.cao.regressors.landmark_predictions import predict, within_reach
+from app.exploration.cao.regressors.landmark_predictions import Listed, predict, within_reach
 from app.exploration.cao.regressors.moves import team_moves
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.information_need import lacking
@@ -85,18 +85,15 @@ class LandmarkRegressors:
         configurations = np.ascontiguousarray(candidates)
         reach = np.linalg.norm(configurations - self._team.positions, axis=2).max(axis=0, initial=0.0)
         starts, index = within_reach(self._team.positions, self._points, reach, self._sensor.visibility_m)
+        direction = None if self._direction is None else self._direction[index]
         return predict(
             self._team.positions,
             configurations,
-            self._points[index],
-            index,
-            starts,
-            self._needed,
+            Listed(self._points[index], index, starts, self._needed, direction),
             self._goals,
             self._sensor.visibility_m,
             self._sensor.relative_noise,
             self._team.constraints.max_step_m,
-            None if self._direction is None else self._direction[index],
         )
 
     def chosen(self, positions: FloatArray) -> None:

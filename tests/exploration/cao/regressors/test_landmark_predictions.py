@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from app.arrays import FloatArray
 from app.exploration.cao.regressors import landmark_predictions
-from app.exploration.cao.regressors.landmark_predictions import predict, within_reach
+from app.exploration.cao.regressors.landmark_predictions import Listed, predict, within_reach
 
 VISIBILITY, NOISE, STEP = 0.4, 0.1, 0.05
 
@@ -39,8 +39,9 @@ def test_short_lists_change_nothing(seed: int, vehicles: Any, landmarks: FloatAr
     needed = rng.uniform(100.0, 3000.0, landmarks)
     reach = np.linalg.norm(candidates - now, axis=2).max(axis=0)
     starts, index = within_reach(now, points, reach, VISIBILITY)
+    listed = Listed(points[index], index, starts, needed)
     for goals in (points, points[:1]):
-        result = predict(now, candidates, points[index], index, starts, needed, goals, VISIBILITY, NOISE, STEP)
+        result = predict(now, candidates, listed, goals, VISIBILITY, NOISE, STEP)
         np.testing.assert_allclose(result, slow(candidates, points, needed, goals), rtol=1e-4, atol=1e-4)
 
 
@@ -50,7 +51,7 @@ def test_threads_that_share_the_candidates_return_the_same(monkeypatch: pytest.M
     now = np.array([[0.0, 0.0, 0.2], [0.2, 0.0, 0.2]])
     candidates = now + rng.uniform(-0.03, 0.03, (101, 2, 3))
     starts, index = within_reach(now, points, np.full(2, 0.06), VISIBILITY)
-    arguments = (candidates, points[index], index, starts, np.full(500, 900.0), points, VISIBILITY, NOISE, STEP)
+    arguments = (candidates, Listed(points[index], index, starts, np.full(500, 900.0)), points, VISIBILITY, NOISE, STEP)
     alone = predict(now, *arguments)
     monkeypatch.setattr(landmark_predictions, "WORTH_SHARING", 0)
     np.testing.assert_array_equal(predict(now, *arguments), alone)
