@@ -6,6 +6,7 @@ import math
 import numpy as np
 import structlog
 
+from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit
@@ -159,6 +160,18 @@ class Dispatch:
         if member.order is not None:
             report = WaypointReport(member.name, member.order.mission_id, member.order.step, status, reason)
             self._live.receive(report)
+
+    def give_up_legs(self, member: Member, reason: str) -> list[FloatArray]:
+        """End the leg that a vehicle flies, and those after it; returns where they were to end, each (2,)."""
+        ends = [member.target_m] if member.ordered and member.target_m is not None else []
+        misses = member.misses
+        self.settle(member, WaypointStatus.MISSED, reason)
+        member.misses = misses  # it would have got there
+        legs, member.ahead[:] = list(member.ahead), []
+        for leg in legs:
+            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            self._live.journal.waypoint(report)
+        return [*ends, *(leg.target_m for leg in legs)]
 
     async def drop_ahead(self, member: Member, reason: str) -> None:
         """Give up the legs that a vehicle has not begun."""
