@@ -1,4 +1,4 @@
-"""Orders to a vehicle that surveys: carried out once, within every limit, through restarts, or refused with the reason."""
+"""Orders to vehicles that survey: carried out once, within every limit, through restarts, or refused with reasons."""
 
 import asyncio
 from typing import Any
@@ -73,8 +73,11 @@ async def test_a_vehicle_goes_where_it_is_sent_and_then_goes_on(service: Mission
     assert shown is not None
     assert shown.asked_by == "Ana"
     await until_over(live, order.id)
-    legs = await legs_of(database, live, "a")
-    assert ends_at(legs, 70.0, 70.0) == ["reached"]
+
+    async def reached() -> bool:
+        return ends_at(await legs_of(database, live, "a"), 70.0, 70.0) == ["reached"]
+
+    await until(reached, "that is written down, once")
     number = live.team.members["a"].legs
     await until(lambda: live.team.members["a"].legs > number + 2, "a goes on with its lines")
     await act(service, live.id, "abort")
@@ -97,12 +100,12 @@ async def test_what_cannot_be_flown_is_refused_with_what_would_be_right(service:
         await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(40.0, 40.0)), "Ana")
     with pytest.raises(VehicleNotFoundError, match="takes no part"):
         await vehicle_orders.go(live, "nobody", GoOrder(position=lon_lat(10.0, 10.0)), "Ana")
+    large = DenserOrder.model_validate({"area": rectangle(5.0, 5.0, 75.0, 28.0), "line_spacing_m": 2.0})
+    away = DenserOrder.model_validate({"area": rectangle(300.0, 5.0, 310.0, 28.0), "line_spacing_m": 2.0})
     with pytest.raises(ConflictError, match="m are left of its way"):
-        denser = DenserOrder.model_validate({"area": rectangle(5.0, 5.0, 75.0, 28.0), "line_spacing_m": 2.0})
-        await vehicle_orders.survey_denser(live, denser, "Ana")
+        await vehicle_orders.survey_denser(live, large, "Ana")
     with pytest.raises(InvalidRequestError, match="inside the area"):
-        denser = DenserOrder.model_validate({"area": rectangle(300.0, 5.0, 310.0, 28.0), "line_spacing_m": 2.0})
-        await vehicle_orders.survey_denser(live, denser, "Ana")
+        await vehicle_orders.survey_denser(live, away, "Ana")
     assert await orders_of(live) == []
     await act(service, live.id, "pause")
     with pytest.raises(ConflictError, match="paused"):
@@ -189,17 +192,16 @@ async def test_a_restart_neither_loses_nor_repeats_an_order(
 ) -> None:
     service = harbour.service
     live = await flying(service, survey("a", side_m=120.0))
+    if after == "accepted":
+        # What comes after it was accepted is never written.
+        monkeypatch.setattr(LegCommit, "commit", _never)
     order = await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(100.0, 100.0)), "Ana")
     if after == "legs":
         await until(lambda: (m := live.team.members["a"].asked) is None or m.state is OrderState.FLYING, "it is taken")
         number = live.team.members["a"].legs
         await until(lambda: live.team.members["a"].legs > number + 1, "some of its legs are committed")
-    else:
-        # What comes after it was accepted is never written.
-        monkeypatch.setattr(LegCommit, "commit", _never)
-    await service.shutdown()
+    await harbour.close()
     monkeypatch.undo()
-    harbour._open = False
     service = await harbour.open()
     live = await service.get(live.id)
     await until_over(live, order.id)

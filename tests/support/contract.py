@@ -87,6 +87,7 @@ CONTRACT = {
     "GET /session": "getSession",
     "POST /session": "signIn",
     "DELETE /session": "signOut",
+    "PUT /missions/{mission_id}": "describeMission",
     "DELETE /missions/{mission_id}": "deleteMission",
     "POST /missions/{mission_id}/vehicles/{name}/rejoin": "rejoinVehicle",
     "POST /missions/{mission_id}/vehicles/{name}/return": "returnVehicle",

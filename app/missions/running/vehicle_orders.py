@@ -57,8 +57,7 @@ async def skip_line(live: LiveMission, name: str, actor: str) -> OrderView:
             raise ConflictError(f"planner {live.spec.planner.name!r} flies no lines", "send the vehicle elsewhere: go")
         if member.asked is not None:
             raise ConflictError(
-                f"vehicle {name!r} does what {member.asked.asked_by} ordered ({member.asked.kind}), which is no line of "
-                "its part",
+                f"vehicle {name!r} does what {member.asked.asked_by} ordered ({member.asked.kind}), not its own lines",
                 "resume it first: that ends the order",
             )
         if not member.legs:
