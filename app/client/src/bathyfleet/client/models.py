@@ -216,6 +216,8 @@ class AlarmReport(Model):
     acknowledged_by: str | None
     """The name of the token, or of the user, that acknowledged it"""
     deliveries: list[DeliveryView]
+    action: str
+    """What whoever is on watch does about it."""
 
 
 class AlarmTrial(Model):
@@ -244,6 +246,8 @@ class AlarmView(Model):
     acknowledged_at: datetime | None
     acknowledged_by: str | None
     """The name of the token, or of the user, that acknowledged it"""
+    action: str
+    """What whoever is on watch does about it."""
 
 
 class AllowedView(Model):

@@ -2044,6 +2044,11 @@ export interface components {
             acknowledged_by: string | null;
             /** Deliveries */
             deliveries: components["schemas"]["DeliveryView"][];
+            /**
+             * Action
+             * @description What whoever is on watch does about it.
+             */
+            readonly action: string;
         };
         /**
          * AlarmSeverity
@@ -2109,6 +2114,11 @@ export interface components {
              * @description The name of the token, or of the user, that acknowledged it
              */
             acknowledged_by: string | null;
+            /**
+             * Action
+             * @description What whoever is on watch does about it.
+             */
+            readonly action: string;
         };
         /**
          * AllowedView
