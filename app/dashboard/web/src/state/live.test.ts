@@ -40,6 +40,7 @@ const vehicle = (
   flown_m: 0,
   on_plan_m: 0,
   idle_s: 0,
+  order: null,
   withdrawn: "",
   energy_left_pct: null,
   energy_left_s: null,
@@ -201,6 +202,7 @@ describe("alarms", () => {
   const alarm = (id: string, raised_at: string, by: string | null = null): AlarmView => ({
     id,
     mission_id: "m",
+    action: "wait for it to be heard again",
     kind: "vehicle_lost",
     severity: "major",
     vehicle: "a",

@@ -1,11 +1,9 @@
-/** Orders to vehicles that survey: what was ordered, in words, and sending more. */
+/** Orders to vehicles that survey: asked for on cards and map, and sent. */
 
 import { signal } from "@preact/signals";
 import { api } from "../api/client";
-import type { LngLat, OrderView, VehicleView } from "../api/types";
+import type { LngLat } from "../api/types";
 import { polygonOf } from "../map/area";
-import { wayBetween } from "../map/geo";
-import { distance } from "./format";
 import { send } from "./session";
 import { drawing, mission, picking, selectedId } from "./store";
 
@@ -15,41 +13,6 @@ export const mapMenu = signal<{ at: LngLat; x: number; y: number } | null>(null)
 export const denserRing = signal<readonly LngLat[] | null>(null);
 /** The vehicle for which a position is typed. */
 export const typingFor = signal<string | null>(null);
-
-/** How long a way through places is. */
-export const lengthOf = (way: readonly LngLat[]): number =>
-  way.slice(1).reduce((sum, to, i) => sum + wayBetween(way[i] as LngLat, to).metres, 0);
-
-/** What a vehicle was ordered, as one line. */
-export function orderWords({ kind, state, way, asked_by }: OrderView): string {
-  const what = {
-    go: "Goes where it was sent",
-    "skip-line": "Leaves out the rest of its line",
-    "repeat-line": `Flies a line again, ${distance(lengthOf(way))}`,
-    denser: `Surveys a part denser, ${Math.ceil(way.length / 2)} lines, ${distance(lengthOf(way))}`,
-  }[kind];
-  return `${what}${state === "accepted" ? ", next" : ""}: ordered by ${asked_by}`;
-}
-
-interface Led {
-  state: string;
-  ending: string | null;
-}
-
-/** Whether a vehicle can be sent elsewhere now. */
-export const takesOrders = (stage: Led, v: Pick<VehicleView, "active" | "withdrawn">): boolean =>
-  stage.state === "running" && stage.ending === null && v.active && v.withdrawn === "";
-
-/** Who can be sent to a place, the nearest first, each with how far it is. */
-export function nearestTo(at: LngLat, stage: Led, vehicles: readonly VehicleView[]) {
-  return vehicles
-    .filter((v) => takesOrders(stage, v) && v.lon_deg !== null && v.lat_deg !== null)
-    .map((v) => ({
-      name: v.name,
-      away_m: wayBetween([v.lon_deg as number, v.lat_deg as number], at).metres,
-    }))
-    .sort((a, b) => a.away_m - b.away_m);
-}
 
 /** Lets the next click on the map say where a vehicle goes. */
 export function pickPlaceFor(name: string): void {

@@ -32,7 +32,7 @@ export function lineWords({ label, values }: Column, unit: string): string {
   const [first, last] = [known[0] as number, known.at(-1) as number];
   const [least, most] = [known.reduce((a, b) => Math.min(a, b)), known.reduce((a, b) => Math.max(a, b))];
   const n = (value: number) => `${digits(value)}${unit ? ` ${unit}` : ""}`;
-  return `${label}: now ${n(last)}, at first ${n(first)}, between ${n(least)} and ${n(most)}`;
+  return `${label} ${n(last)} now, ${n(first)} at first, between ${n(least)} and ${n(most)}`;
 }
 
 export const digits = (value: number): string =>

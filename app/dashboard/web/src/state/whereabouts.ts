@@ -1,8 +1,9 @@
 /** Where a vehicle was when something happened, shown on the map. */
 
 import { api } from "../api/client";
-import type { EventView, LngLat, StepView } from "../api/types";
-import { endsOf, placeAt, type Way, waysOf } from "./history";
+import type { EventView, LngLat } from "../api/types";
+import { waysOf } from "./history";
+import { placeThen, vehicleOf } from "./placeThen";
 import { fetchSteps, noteFault } from "./session";
 import { destination, marked, mission, selectedId, steps } from "./store";
 
@@ -10,31 +11,6 @@ import { destination, marked, mission, selectedId, steps } from "./store";
 const ABOUT_DEG = 0.0006;
 /** What happened so lately happened where its vehicle is now. */
 const LATELY_MS = 15_000;
-
-/** Which step was flown at a moment: the last one that was committed by then; -1 before the first. */
-export function stepAt(known: readonly StepView[], at: number): number {
-  let found = -1;
-  for (const [i, step] of known.entries()) if (Date.parse(step.committed_at) <= at) found = i;
-  return found;
-}
-
-/** The vehicle that a line of the log is about; null where it is about none. */
-export function vehicleOf({ data }: Pick<EventView, "data">): string | null {
-  return typeof data.vehicle === "string" ? data.vehicle : null;
-}
-
-/** Where a vehicle was at a moment, as its way and the steps tell; null where nobody knows. */
-export function placeThen(
-  vehicle: string,
-  way: Way | undefined,
-  known: readonly StepView[],
-  at: number,
-): LngLat | null {
-  const index = stepAt(known, at);
-  const step = known[index];
-  if (!step) return way?.places[0] ?? null;
-  return placeAt(vehicle, way, way ? endsOf(vehicle, way, known) : [], index, step)?.place ?? null;
-}
 
 function show(place: LngLat | null): void {
   if (!place) return;

@@ -35,47 +35,50 @@ export function Attention() {
     }
   };
   return (
-    <section
-      class={`attention ${shown[0]?.tone}`}
-      aria-label="Needs attention"
-      data-testid="attention"
-      {...(alarms.length > 0 ? { role: "alert" } : {})}
-    >
-      <ul data-testid={alarms.length > 0 ? "alarms" : undefined}>
-        {shown.map((matter) => (
-          <Line key={matter.key} matter={matter} onTake={(id) => void take([id])} />
-        ))}
-      </ul>
-      {fault.value ? <p class="fault">{fault.value}</p> : null}
-      <div class="attention-does">
-        {rest > 0 || open.value ? (
-          <Button id="attention-more" kind="link-button" aria-expanded={open.value} onClick={flips(open)}>
-            {open.value ? "Less" : `${rest} more`}
-          </Button>
-        ) : null}
-        {alarms.length > 0 ? (
-          <>
-            <Button
-              id="alarm-sound"
-              kind="link-button"
-              aria-pressed={alarmSound.value}
-              title="On this device only"
-              onClick={flips(alarmSound)}
-            >
-              {alarmSound.value ? "Mute" : "Sound on"}
+    <>
+      <section
+        class={`attention ${shown[0]?.tone}`}
+        aria-label="Needs attention"
+        data-testid="attention"
+        {...(alarms.length > 0 ? { role: "alert" } : {})}
+      >
+        <ul data-testid={alarms.length > 0 ? "alarms" : undefined}>
+          {shown.map((matter) => (
+            <Line key={matter.key} matter={matter} onTake={(id) => void take([id])} />
+          ))}
+        </ul>
+        {fault.value ? <p class="fault">{fault.value}</p> : null}
+        <div class="attention-does">
+          {rest > 0 || open.value ? (
+            <Button id="attention-more" kind="link-button" aria-expanded={open.value} onClick={flips(open)}>
+              {open.value ? "Less" : `${rest} more`}
             </Button>
-            <Button
-              id="take-alarms"
-              commands
-              title="Say that you see to it: nobody else is called for these alarms"
-              onClick={() => void take(alarms.map(({ id }) => id))}
-            >
-              {alarms.length > 1 ? `Take all ${alarms.length}` : "Taken"}
-            </Button>
-          </>
-        ) : null}
-      </div>
-    </section>
+          ) : null}
+          {alarms.length > 0 ? (
+            <>
+              <Button
+                id="alarm-sound"
+                kind="link-button"
+                aria-pressed={alarmSound.value}
+                title="On this device only"
+                onClick={flips(alarmSound)}
+              >
+                {alarmSound.value ? "Mute" : "Sound on"}
+              </Button>
+              <Button
+                id="take-alarms"
+                commands
+                title="Say that you see to it: nobody else is called for these alarms"
+                onClick={() => void take(alarms.map(({ id }) => id))}
+              >
+                {alarms.length > 1 ? `Take all ${alarms.length}` : "Taken"}
+              </Button>
+            </>
+          ) : null}
+        </div>
+      </section>
+      {alarms.length === 0 ? <Taken /> : null}
+    </>
   );
 }
 

@@ -4,9 +4,10 @@ import { api } from "../api/client";
 import type { EventView, Level } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
+import { vehicleOf } from "../state/placeThen";
 import { said } from "../state/session";
 import { selectedId, view } from "../state/store";
-import { showEvent, vehicleOf } from "../state/whereabouts";
+import { showEvent } from "../state/whereabouts";
 import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };

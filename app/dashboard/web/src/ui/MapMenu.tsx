@@ -2,7 +2,8 @@ import "./MapMenu.css";
 import { useEffect, useRef } from "preact/hooks";
 import { whyNotCommand } from "../state/access";
 import { distance, place } from "../state/format";
-import { drawDenser, goVehicle, mapMenu, nearestTo, repeatLine } from "../state/orders";
+import { drawDenser, goVehicle, mapMenu, repeatLine } from "../state/orders";
+import { nearestTo } from "../state/orderWords";
 import { coordinateFormat, marked, measured, mission } from "../state/store";
 
 const WIDTH_PX = 250;

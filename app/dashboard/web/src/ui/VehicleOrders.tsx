@@ -1,21 +1,19 @@
 import "./VehicleOrders.css";
-import { useSignal } from "@preact/signals";
+import { useSignal, useSignalEffect } from "@preact/signals";
 import type { VehicleView } from "../api/types";
 import {
   denserRing,
   goVehicle,
-  lengthOf,
-  orderWords,
   pickPlaceFor,
   repeatLine,
   skipLine,
   surveyDenser,
-  takesOrders,
   typingFor,
 } from "../state/orders";
+import { lengthOf, orderWords, takesOrders } from "../state/orderWords";
 import { PLACE_SAMPLE, placeOf } from "../state/place";
 import { resumeVehicle } from "../state/session";
-import { mission, picking, vehicles } from "../state/store";
+import { describing, drawing, drawingReady, mission, picking, vehicles } from "../state/store";
 import { Button, Choice, into, sets, Typed, useEscape } from "./Controls";
 
 /** What a vehicle was ordered, with the way back to its part. */
@@ -84,8 +82,10 @@ function TypedPlace({ name }: { name: string }) {
   const fault = useSignal("");
   useEscape(typingFor);
   useEscape(picking);
-  // The click on the map came.
-  if (!picking.value && text.value === "") typingFor.value = null;
+  useSignalEffect(() => {
+    // The click on the map came.
+    if (!picking.value) typingFor.value = null;
+  });
   const go = async (event: SubmitEvent) => {
     event.preventDefault();
     const at = placeOf(text.value);
@@ -122,7 +122,15 @@ export function DenserQuestion() {
   const who = useSignal("");
   const fault = useSignal("");
   useEscape(denserRing);
+  useEscape(drawing);
   const present = mission.value;
+  if (drawing.value && drawingReady.value && !describing.value && present)
+    return (
+      <p class="notice" role="status" data-testid="draws-denser">
+        Click corner after corner of the part to survey denser, the first one again at the end. Escape leaves
+        it.
+      </p>
+    );
   if (!ring || !present) return null;
   const able = vehicles.value.map(({ view }) => view).filter((v) => takesOrders(present, v));
   const send = async (event: SubmitEvent) => {
