@@ -1,11 +1,15 @@
 """Watching a mission: orders from the map and the cards, what needs a person, log and charts, in Chromium."""
 
+import math
 import re
+import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, show
 
@@ -116,3 +120,35 @@ def test_one_glance_tells_what_needs_a_person(page: Page, service: Service) -> N
     with page.expect_download() as waited:
         plot.get_by_role("button", name="PNG").click()
     assert waited.value.path().read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_killed_service_carries_an_accepted_order_out_once(service: Service) -> None:
+    mission = service.create(name="Killed", area=AREA, vehicles=PAIR[:1], steps=2000, planner={"name": "lawnmower"})
+    service.act(mission, "start")
+    wait_until(lambda: service.get(f"/missions/{mission}")["progress"]["step"] > 2)
+    place = [-8.7046, 41.1853]
+    answer = service.post(f"/missions/{mission}/vehicles/north/go", {"position": place})
+    service.kill()
+    service.start()
+
+    def ends() -> list[dict[str, Any]]:
+        steps = service.get(f"/missions/{mission}/steps?limit=1000")
+        legs = [leg for step in steps for leg in step["waypoints"]]
+        return [leg for leg in legs if math.dist((leg["lon_deg"], leg["lat_deg"]), place) < 1e-7]
+
+    wait_until(lambda: service.get(f"/missions/{mission}/orders")[0]["state"] == "done")
+    service.kill()
+    service.start()
+    step = service.get(f"/missions/{mission}")["progress"]["step"]
+    wait_until(lambda: service.get(f"/missions/{mission}")["progress"]["step"] > step + 1)
+    assert [(order["id"], order["state"]) for order in service.get(f"/missions/{mission}/orders")] == [
+        (answer["id"], "done")
+    ]
+    assert len(ends()) == 1
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE_MS / 1000
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.1)

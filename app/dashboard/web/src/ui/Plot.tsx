@@ -3,6 +3,7 @@ import "uplot/dist/uPlot.min.css";
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
+import { clock } from "../state/format";
 import { csvOf, digits, fileNameOf, lineWords } from "../state/plotFile";
 import { Button, flips } from "./Controls";
 import { save } from "./saving";
@@ -13,6 +14,10 @@ export interface Line {
   dash?: number[];
   values: readonly (number | null)[];
 }
+
+/** UTC as everywhere on the page; seconds where a tick is not a whole minute. */
+const clockWords = (at_s: number): string =>
+  clock(new Date(at_s * 1000), "utc").slice(0, at_s % 60 === 0 ? 5 : 8);
 
 interface PlotProps {
   title: string;
@@ -78,7 +83,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
           y: { ...(range ? { range } : {}), dir: down ? -1 : 1 },
         },
         axes: [
-          { ...axis, space: 60 },
+          { ...axis, space: 70, ...(time ? { values: (_, ticks) => ticks.map(clockWords) } : {}) },
           { ...axis, size: 46, values: (_, ticks) => ticks.map((v) => `${v}${unit === "%" ? " %" : ""}`) },
         ],
         series: [
