@@ -25,11 +25,15 @@ function sound(audio: AudioContext): void {
   });
 }
 
-/** Sounds for as long as an alarm is open; returns what ends that. */
+/** Sounds for as long as an alarm is open whose cause goes on; returns what ends that. */
 export function followAlarms(makeAudio = () => new AudioContext()): () => void {
   let audio: AudioContext | null = null;
   return effect(() => {
-    if (!alarmSound.value || !openAlarms.value.some(({ severity }) => severity !== "minor")) return;
+    if (
+      !alarmSound.value ||
+      !openAlarms.value.some(({ severity, ended_at }) => severity !== "minor" && ended_at === null)
+    )
+      return;
     const again = () => {
       audio ??= makeAudio();
       if (audio.state === "suspended") void audio.resume();

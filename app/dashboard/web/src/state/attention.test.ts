@@ -26,7 +26,15 @@ const mission = (vehicles: VehicleView[], changes: Partial<MissionView> = {}) =>
   }) as unknown as MissionView;
 
 const alarm = (id: string, severity: AlarmView["severity"], raised_at: string) =>
-  ({ id, severity, raised_at, vehicle: "a", message: `alarm ${id}`, action: "look for it" }) as AlarmView;
+  ({
+    id,
+    severity,
+    raised_at,
+    vehicle: "a",
+    message: `alarm ${id}`,
+    action: "look for it",
+    ended_at: null,
+  }) as AlarmView;
 
 describe("what needs a person", () => {
   test("alarms come first, the newest of them at the top, each with what to do", () => {
@@ -46,6 +54,12 @@ describe("what needs a person", () => {
       since: Date.parse("2026-06-01T10:10:00Z"),
       tone: "alarm",
     });
+  });
+
+  test("an alarm whose cause is over stays, no louder than a warning", () => {
+    const over = { ...alarm("over", "critical", "2026-06-01T10:00:00Z"), ended_at: "2026-06-01T10:07:00Z" };
+    expect(mattersOf(null, [over])[0]).toMatchObject({ tone: "warning", alarm: over });
+    expect(mattersOf(null, [over])[0]?.todo).toContain("over since 10:07");
   });
 
   test("vehicles that are out with nobody to lead them, and those that are home, are told of", () => {

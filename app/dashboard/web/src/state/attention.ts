@@ -32,9 +32,13 @@ export function mattersOf(mission: MissionView | null, alarms: readonly AlarmVie
 
 const ofAlarm = (alarm: AlarmView): Matter => ({
   key: `alarm ${alarm.id}`,
-  tone: alarm.severity === "minor" ? "warning" : "alarm",
+  // What is over needs nobody any more but one who has seen it.
+  tone: alarm.severity === "minor" || alarm.ended_at !== null ? "warning" : "alarm",
   what: alarm.message,
-  todo: alarm.action,
+  todo:
+    alarm.ended_at === null
+      ? alarm.action
+      : `it is over since ${clock(new Date(alarm.ended_at), "utc").slice(0, 5)}; take note of it`,
   since: Date.parse(alarm.raised_at),
   vehicle: alarm.vehicle,
   alarm,
@@ -101,7 +105,8 @@ export function toldWords({ deliveries }: Pick<AlarmReport, "deliveries">): stri
   return [...deliveries]
     .sort((a, b) => b.created_at.localeCompare(a.created_at))
     .map(({ recipient, notice, state, done_at, error }) => {
-      const after = notice === "escalated" ? ", as nobody took it" : "";
+      const after =
+        notice === "escalated" ? ", as nobody took it" : notice === "ended" ? " that it is over" : "";
       const at = done_at ? ` at ${clock(new Date(done_at), "utc").slice(0, 5)}` : "";
       if (state === "delivered") return `${recipient} was told${at}${after}`;
       if (state === "failed") return `${recipient} could not be told: ${error}`;
