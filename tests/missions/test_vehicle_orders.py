@@ -143,11 +143,14 @@ async def test_a_line_is_left_out_flown_again_and_a_part_looked_at_closer(
     with pytest.raises(ConflictError, match="Bo ordered"):
         await vehicle_orders.skip_line(live, "a", "Ana")
     await until_over(live, closer.id)
-    legs = await legs_of(database, live, "a")
-    for lon, lat in closer.way:
-        east, north = FRAME.to_local(np.array(lat), np.array(lon))
-        assert "reached" in ends_at(legs, float(east), float(north))
-    assert len(closer.way) == 6
+    corners = [FRAME.to_local(np.array(lat), np.array(lon)) for lon, lat in closer.way]
+    assert len(corners) == 6
+
+    async def flown() -> bool:
+        legs = await legs_of(database, live, "a")
+        return all("reached" in ends_at(legs, float(east), float(north)) for east, north in corners)
+
+    await until(flown, "every corner is written down as reached")
     await act(service, live.id, "abort")
 
 

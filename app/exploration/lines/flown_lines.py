@@ -87,7 +87,7 @@ def _last_straight(here_m: FloatArray, route: FloatArray, first: int) -> int:
 
 def _straight(a: FloatArray, b: FloatArray) -> bool:
     turn = abs(float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)))
-    return turn <= STRAIGHT_RAD
+    return bool(turn <= STRAIGHT_RAD)
 
 
 def _distance_m(line: FloatArray, place_m: FloatArray) -> float:

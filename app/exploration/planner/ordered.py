@@ -5,7 +5,7 @@ planner's memory: it is written down with the legs, so that an order is neither 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,13 +29,38 @@ MOST_TRIES = 3
 """So many legs in a row that come to nothing end an order."""
 
 
+MOST_LOST = 6
+"""So often legs of an order are given up before the order is."""
+
+
 @dataclass
 class OrderedWay:
-    """What is left of a vehicle's ordered way: corners (k, 2); ``tries`` are legs in a row that led nowhere."""
+    """What is left of a vehicle's ordered way: corners (k, 2), and those (j, 2) to which legs were decided.
+
+    ``tries`` are legs in a row that led nowhere, ``lost`` is how often legs were given up.
+    """
 
     order: int
     corners_m: FloatArray
     tries: int = 0
+    passed_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    lost: int = 0
+
+    def remember(self) -> dict[str, Any]:
+        """Return what is stored."""
+        return {
+            "order": self.order,
+            "corners": self.corners_m,
+            "tries": self.tries,
+            "passed": self.passed_m,
+            "lost": self.lost,
+        }
+
+    @classmethod
+    def recall(cls, stored: dict[str, Any]) -> "OrderedWay":
+        """Return what was stored."""
+        corners, passed = (np.array(stored[key], dtype=np.float64).reshape(-1, 2) for key in ("corners", "passed"))
+        return cls(int(stored["order"]), corners, int(stored["tries"]), passed, int(stored["lost"]))
 
 
 class OrderedPlanner:
@@ -44,7 +69,7 @@ class OrderedPlanner:
     Attributes
     ----------
     ways
-        By vehicle, what is left of its ordered way.
+        By vehicle, its ordered way; one without corners left is decided to its end.
     taken
         By vehicle, the last order that was taken up.
     refused
@@ -72,7 +97,8 @@ class OrderedPlanner:
 
         The planner goes on from ``resume_at_m`` (2,) when the way was flown.
         """
-        going_on = vehicle in self.ways
+        before = self.ways.get(vehicle)
+        going_on = before is not None and len(before.corners_m) > 0
         self.ways[vehicle] = OrderedWay(order, np.asarray(corners_m, dtype=np.float64).reshape(-1, 2))
         self.taken[vehicle] = order
         if not going_on:
@@ -93,6 +119,22 @@ class OrderedPlanner:
         self._since[vehicle] = 0
         self.planner.put_back(vehicle, ends_m, None)
         return self.planner.skip_line(vehicle, begin_m, here_m)
+
+    def lose(self, vehicle: str, ends_m: FloatArray) -> None:
+        """Lead a vehicle once more to corners of its way whose legs, ending at ``ends_m`` (n, 2), are not flown."""
+        way = self.ways.get(vehicle)
+        if way is None or not len(way.passed_m) or not len(ends_m):
+            return
+        away = np.hypot(*(way.passed_m[:, None] - ends_m[None]).transpose(2, 0, 1)).min(axis=1)
+        again = np.flatnonzero(away <= NEAR_M)
+        if not len(again):
+            return
+        # Legs are given up from one of them to the last.
+        way.corners_m = np.vstack([way.passed_m[again[0] :], way.corners_m])
+        way.passed_m = way.passed_m[: again[0]]
+        way.lost += 1
+        if way.lost > MOST_LOST:
+            self._refuse(vehicle, way, "its legs there came to nothing again and again")
 
     def drop(self, vehicle: str) -> None:
         """End a vehicle's ordered way."""
@@ -125,15 +167,16 @@ class OrderedPlanner:
         if way is None:
             return False
         while len(way.corners_m) and np.hypot(*(way.corners_m[0] - place_m[:2])) <= NEAR_M:
+            way.passed_m = np.vstack([way.passed_m, way.corners_m[:1]])
             way.corners_m, way.tries = way.corners_m[1:], 0
-        if len(way.corners_m) and way.tries < MOST_TRIES:
-            return True
+        if way.tries >= MOST_TRIES:
+            self._refuse(vehicle, way, self.refused.get(vehicle, (0, "no leg there is allowed"))[1])
+            return False
+        return len(way.corners_m) > 0
+
+    def _refuse(self, vehicle: str, way: OrderedWay, why: str) -> None:
+        self.refused[vehicle] = (way.order, why)
         del self.ways[vehicle]
-        if len(way.corners_m):
-            self.refused[vehicle] = (way.order, self.refused.get(vehicle, (0, "no leg there is allowed"))[1])
-        else:
-            self.refused.pop(vehicle, None)
-        return False
 
     def _leg(self, situation: Situation, row: int, positions: FloatArray, bottom: Bottom) -> FloatArray:
         """Return the end (3,) of a vehicle's next leg along its way."""
@@ -178,7 +221,7 @@ class OrderedPlanner:
         memory = self.planner.snapshot()
         if not self.taken:
             return memory
-        ways = {name: [way.order, way.corners_m, way.tries] for name, way in self.ways.items()}
+        ways = {name: way.remember() for name, way in self.ways.items()}
         state: dict[str, Any] = {"ways": ways, "taken": self.taken, "refused": self.refused, "since": self._since}
         return pack(KIND, {**state, "planner": memory.decode()})
 
@@ -191,10 +234,7 @@ class OrderedPlanner:
         state = unpack(KIND, memory)
         try:
             inner = str(state["planner"]).encode()
-            ways = {
-                str(name): OrderedWay(int(order), np.array(at, dtype=np.float64).reshape(-1, 2), int(tries))
-                for name, (order, at, tries) in state["ways"].items()
-            }
+            ways = {str(name): OrderedWay.recall(way) for name, way in state["ways"].items()}
             taken = {str(name): int(order) for name, order in state["taken"].items()}
             refused = {str(name): (int(order), str(why)) for name, (order, why) in state["refused"].items()}
             since = {str(name): int(count) for name, count in state["since"].items()}

@@ -232,6 +232,11 @@ class OrderBook:
         self._flight = None
 
     @property
+    def _given_up_now(self) -> dict[str, list[FloatArray]]:
+        """Legs given up that were not looked at yet."""
+        return {} if self._flight is None else self._flight.dispatch.given_up
+
+    @property
     def led_apart(self) -> bool:
         """Whether vehicles have legs of their own now."""
         return self._flight is not None and self._flight.apart
@@ -243,7 +248,8 @@ class OrderBook:
         if flight is None:
             return False
         return any(
-            (m.asked is None and m.name in flight.planner.ways)
+            m.name in flight.dispatch.given_up
+            or (m.asked is None and m.name in flight.planner.ways)
             or (m.asked is not None and m.asked.state is OrderState.ACCEPTED and m.surveys)
             for m in self._live.team
         )
@@ -256,7 +262,9 @@ class OrderBook:
         flight, taken = self._flight, []
         if flight is None or not flight.apart:
             return []
-        planner = flight.planner
+        planner, given_up = flight.planner, flight.dispatch.given_up
+        for name in list(given_up):
+            planner.lose(name, np.array(given_up.pop(name)).reshape(-1, 2))
         for member in [*self._live.team, *self._live.team.left.values()]:
             order = member.asked
             if order is None:
@@ -285,6 +293,7 @@ class OrderBook:
             line = line_now(lines)
             begin_m = here_m if line is None else line[0]
             ends = flight.dispatch.give_up_legs(member, f"its line is left out: ordered by {order.asked_by}")
+            flight.dispatch.given_up.pop(name, None)
             if not planner.skip(name, order.id, np.array(ends).reshape(-1, 2), begin_m, here_m):
                 why = f"planner {self._live.spec.planner.name!r} knows of no line that it flies now"
                 await self._over(member, order, OrderState.FAILED, why)
@@ -294,6 +303,7 @@ class OrderBook:
             planner.lead(name, order.id, order.corners_m, np.zeros((0, 2)), member.last_end_m(self._live.frame))
         else:
             ends = flight.dispatch.give_up_legs(member, f"ordered elsewhere by {order.asked_by}")
+            flight.dispatch.given_up.pop(name, None)
             planner.lead(name, order.id, order.corners_m, np.array(ends).reshape(-1, 2), here_m)
         if member.asked is order:
             member.asked = replace(order, state=OrderState.FLYING)
@@ -306,17 +316,18 @@ class OrderBook:
             if member.legs > self._skipped_at.get(member.name, -1):
                 await self._over(member, order, OrderState.DONE)
             return
-        way = planner.ways.get(member.name)
-        if way is not None and way.order == order.id:
-            return
         refused = planner.refused.get(member.name)
-        if refused is not None and refused[0] == order.id:
+        if refused is not None and refused[0] == order.id and member.name not in planner.ways:
             await self._over(member, order, OrderState.FAILED, refused[1])
+            return
+        way = planner.ways.get(member.name)
+        if way is not None and (way.order != order.id or len(way.corners_m)):
             return
         ends = [member.target_m] if member.ordered and member.target_m is not None else []
         ends += [leg.target_m for leg in member.ahead]
         last_m = order.corners_m[-1]
-        if not any(np.hypot(*(end - last_m)) <= THERE_M for end in ends):
+        if member.name not in self._given_up_now and not any(np.hypot(*(end - last_m)) <= THERE_M for end in ends):
+            planner.drop(member.name)
             await self._over(member, order, OrderState.DONE)
 
     async def _over(self, member: Member, order: OperatorOrder, state: OrderState, why: str = "") -> None:

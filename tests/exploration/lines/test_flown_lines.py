@@ -59,6 +59,7 @@ def test_denser_lines_lie_in_the_part_and_clear_of_zones_and_no_place_is_far_fro
 ) -> None:
     rng = np.random.default_rng(seed)
     part = Polygon(rng.uniform(0.0, 60.0, (6, 2))).convex_hull
+    assert isinstance(part, Polygon)
     free = Polygon([(0, 0), (50, 0), (50, 60), (0, 60)]).difference(Polygon(rng.uniform(10, 40, (4, 2))).convex_hull)
     ends = dense_lines(part, free, spacing_m, np.zeros(2))
     lines = [LineString(pair) for pair in ends.reshape(-1, 2, 2)]

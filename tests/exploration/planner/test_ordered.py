@@ -39,23 +39,22 @@ def fly(planner: OrderedPlanner, situation: Situation, legs: int) -> list[np.nda
     return places
 
 
-@pytest.mark.parametrize("name", ["lawnmower", "random"])
 @given(goal=st.tuples(st.floats(1.0, 99.0), st.floats(1.0, 99.0)), after=st.integers(0, 12))
 @settings(max_examples=8)
 def test_a_vehicle_gets_where_it_is_ordered_round_zones_and_inside_the_area(
-    name: str, goal: tuple[float, float], after: int
+    goal: tuple[float, float], after: int
 ) -> None:
     constraints = Constraints(HOLLOW, (ZONE,), max_step_m=12.0, max_depth_m=20.0, min_separation_m=2.0)
     space = FreeSpace(constraints, 0.0)
     corner = space.nearest(np.array(goal))
-    planner, situation = planner_of(name), make_situation(constraints=constraints, belief=make_belief(known=False))
+    situation = make_situation(constraints=constraints, belief=make_belief(known=False))
+    planner = planner_of("lawnmower")
     here = fly(planner, situation, after)[-1]
     planner.lead("a", 1, corner[None], np.zeros((0, 2)), here[0, :2])
     places = fly(planner, replace(situation, positions=here), 35)
     away = [float(np.hypot(*(place[0, :2] - corner))) for place in places]
     assert min(away) <= 0.5, "it came there"
-    assert "a" not in planner.ways
-    assert planner.refused == {}
+    assert not len(planner.ways["a"].corners_m)
     for a, b in pairwise(places):
         for i in (0, 1):
             leg = LineString([a[i, :2], b[i, :2] + 1e-9])
@@ -137,3 +136,21 @@ def test_ordered_legs_are_not_taken_back() -> None:
     memory: Any = planner.snapshot()
     assert planner.take_back({"a": 1, "b": 1})
     assert planner.snapshot() != memory
+
+
+def test_legs_that_are_given_up_are_decided_again() -> None:
+    planner, situation = planner_of("lawnmower"), make_situation(steps=200, vehicles=("a",))
+    here = fly(planner, situation, 2)[-1]
+    goal = here[0, :2] + np.array([25.0, 0.0])
+    planner.lead("a", 1, goal[None], np.zeros((0, 2)), here[0, :2])
+    legs = fly(planner, replace(situation, positions=here), 5)
+    assert not len(planner.ways["a"].corners_m), "its last leg is decided"
+    planner.lose("a", np.array([leg[0, :2] for leg in legs[2:4]]))
+    assert planner.ways["a"].corners_m.tolist() == [goal.tolist()]
+    again = fly(planner, replace(situation, positions=legs[1]), 3)
+    assert np.allclose(again[-1][0, :2], goal) or np.allclose(again[-2][0, :2], goal)
+    for _ in range(10):
+        fly(planner, replace(situation, positions=again[0]), 4)
+        planner.lose("a", goal[None])
+    assert planner.refused["a"][0] == 1
+    assert "a" not in planner.ways
