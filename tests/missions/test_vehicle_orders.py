@@ -75,7 +75,8 @@ async def test_a_vehicle_goes_where_it_is_sent_and_then_goes_on(service: Mission
     await until_over(live, order.id)
 
     async def reached() -> bool:
-        return ends_at(await legs_of(database, live, "a"), 70.0, 70.0) == ["reached"]
+        # Legs that a zone bars from where the vehicle has come to are given up, and decided again.
+        return ends_at(await legs_of(database, live, "a"), 70.0, 70.0).count("reached") == 1
 
     await until(reached, "that is written down, once")
     number = live.team.members["a"].legs
@@ -217,7 +218,7 @@ async def test_a_restart_neither_loses_nor_repeats_an_order(
     await until(lambda: live.team.members["a"].legs > number + 3, "it goes on after that, too")
     assert len([one for one in await orders_of(live) if one.state is OrderState.DONE]) == 1
     legs = await legs_of(database, live, "a")
-    assert len(ends_at(legs, 100.0, 100.0)) == 1
+    assert ends_at(legs, 100.0, 100.0).count("reached") == 1
     await act(service, live.id, "abort")
 
 
