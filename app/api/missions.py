@@ -92,6 +92,29 @@ async def get_mission(reader: Reader, mission: Mission) -> MissionView:
     return mission_view(mission)
 
 
+@router.put(
+    "/{mission_id}",
+    operation_id="describeMission",
+    summary="Describe a mission anew that has not started",
+    responses=problems(
+        "malformed-body",
+        "mission-not-found",
+        "conflict",
+        "body-too-large",
+        "unsupported-media-type",
+        "invalid-request",
+    ),
+)
+async def describe_mission(
+    spec: Annotated[MissionSpec, Body()], service: Service, operator: Operator, mission: Mission
+) -> MissionView:
+    """Replace what a mission in draft or ready is to do, its vehicles included; it keeps its id and its log.
+
+    One that started is refused, and one that was given depths or tides for its area.
+    """
+    return await service.describe_anew(mission, spec, actor=operator.name)
+
+
 @router.delete(
     "/{mission_id}",
     operation_id="deleteMission",

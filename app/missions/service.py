@@ -34,6 +34,7 @@ from app.missions.operations.uploads import Uploads
 from app.missions.operations.web_tiles import WebTiles
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
+from app.missions.running.descriptions import describe_anew
 from app.missions.running.failover import Failover
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.homecoming import returns, send_on
@@ -306,6 +307,17 @@ class MissionService:
     async def send_on(self, live: LiveMission, name: str, actor: str) -> None:
         """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
         await send_on(live, self._supervisor, name, actor)
+
+    async def describe_anew(self, live: LiveMission, spec: MissionSpec, *, actor: str = "operator") -> MissionView:
+        """Describe a mission anew that has not started. Raises InvalidRequestError, ConflictError."""
+        check_spec(spec, self.hub.kinds)
+        await self.sites.check(spec)
+        async with self._supervisor.acting(live.id):
+            await describe_anew(live, spec, actor)
+            await self._registry.forget(live, "the mission was described anew")
+        live = await self.get(live.id)
+        await self.sites.begin(live)
+        return mission_view(live)
 
     async def delete(self, live: LiveMission) -> None:
         """Remove a mission in which nothing was measured. Raises ConflictError."""

@@ -25,6 +25,7 @@ from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import Active
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import Limits, MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec.orders import OrderKind, OrderState
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
@@ -40,6 +41,18 @@ class CommittedLeg:
     """Where it ends in the mission's frame, (2,): east, north."""
     surfacing: bool = False
     """Whether it brings its vehicle up for a fix."""
+
+
+@dataclass
+class OperatorOrder:
+    """What an operator ordered a vehicle to do, as long as that is not over; ``corners_m`` (k, 2) is its way."""
+
+    id: int
+    kind: OrderKind
+    state: OrderState
+    corners_m: NDArray[np.float64]
+    asked_by: str
+    asked_at: datetime
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +155,8 @@ class Member:
     """The corners of its way home from about where it is, (n, 2); None: it has none, or it is not known yet."""
     failsafes: list[Active] = field(default_factory=list)
     """What is in force for it, the strongest response first."""
+    asked: OperatorOrder | None = None
+    """What its operator ordered; None: it does its part."""
     leg_start_m: NDArray[np.float64] | None = None
     """Where the leg of its order begins, (2,)."""
     leg_began_s: float = 0.0

@@ -141,6 +141,25 @@ class WaypointRow(Base):
     changed_at: Mapped[datetime]
 
 
+class VehicleOrderRow(Base):
+    """What an operator ordered one vehicle to do in the middle of a mission, and what became of it."""
+
+    __tablename__ = "vehicle_orders"
+    __table_args__ = (Index("ix_vehicle_orders_mission", "mission_id", "id"),)
+
+    id: Mapped[int] = mapped_column(_BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    kind: Mapped[str] = mapped_column(String(16))
+    state: Mapped[str] = mapped_column(String(16))
+    way: Mapped[dict[str, Any]]
+    """``corners``: where it leads along, a list of [longitude, latitude]."""
+    asked_by: Mapped[str] = mapped_column(String(120))
+    asked_at: Mapped[datetime]
+    changed_at: Mapped[datetime]
+    reason: Mapped[str] = mapped_column(Text, default="")
+
+
 class SoundingRow(Base):
     """A measurement of the sea floor: raw values as they came, the corrected depth beside them."""
 

@@ -38,6 +38,8 @@ BEYOND_THE_SCHEMA = {
     "changeSite",
     "createMission",
     "createSite",
+    "describeMission",
+    "surveyDenser",
     "addVehicle",
     "forecastDescription",
     "forecastMission",

@@ -131,3 +131,32 @@ async def test_in_a_search_all_fly_at_the_missions_speed(client: httpx.AsyncClie
     search = search_json(vehicles=[{"name": "boat", "kind": "rest", "speed_mps": 0.5}])
     refused = await client.post("/missions", json=search)
     assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, "vehicles.0.speed_mps")
+
+
+async def test_a_mission_that_has_not_started_is_described_anew_and_keeps_its_id(client: httpx.AsyncClient) -> None:
+    created = (await client.post("/missions", json=mission_spec())).json()
+    path = f"/missions/{created['id']}"
+    changed = mission_spec(name="Quay, north side", vehicles=[], steps=7)
+    answer = await client.put(path, json=changed)
+    assert answer.status_code == 200, answer.text
+    seen = answer.json()
+    assert (seen["id"], seen["name"], seen["state"]) == (created["id"], "Quay, north side", "draft")
+    assert (seen["spec"]["steps"], seen["vehicles"]) == (7, [])
+    assert (await client.get(path)).json()["spec"] == seen["spec"]
+    assert [one["name"] for one in (await client.get("/missions")).json()] == ["Quay, north side"]
+    lines = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+    assert [line["message"].split(" by ")[0] for line in lines] == ["created", "described anew"]
+    back = await client.put(path, json=mission_spec())
+    assert (back.status_code, back.json()["state"]) == (200, "ready")
+    assert back.json()["created_at"] == created["created_at"]
+
+    wrong = await client.put(path, json=mission_spec(limits={"max_step_m": -1}))
+    assert (wrong.status_code, wrong.json()["errors"][0]["field"]) == (422, "limits.max_step_m")
+    assert (await client.get(path)).json()["spec"] == back.json()["spec"]
+    assert (await client.put("/missions/none", json=mission_spec())).status_code == 404
+
+    await client.post(f"{path}/start")
+    late = await client.put(path, json=mission_spec())
+    assert late.status_code == 409
+    assert "copy it" in late.json()["remedy"]
+    await client.post(f"{path}/abort")

@@ -11,17 +11,20 @@ import pytest
 from sqlalchemy import select
 
 from app.missions.errors import InvalidRequestError
+from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
 from app.missions.operations.mission_maps import export
 from app.missions.preflight.survey import preflight
+from app.missions.running import vehicle_orders
 from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec, Tide
+from app.missions.spec.orders import GoOrder, OrderState
 from app.missions.states import ENDED, MissionState
 from app.missions.views.mission import CheckStatus
 from app.storage.models import TelemetryRow
 from tests.support.missions.harbour import Harbour, act, until_state, view_of
 from tests.support.missions.pings import ping
-from tests.support.missions.specs import spec_json
+from tests.support.missions.specs import lon_lat, spec_json
 from tests.support.waiting import until
 
 SIDE_M = 50.0
@@ -78,6 +81,15 @@ async def test_a_mission_sees_all_of_its_area_and_ends_by_itself(harbour: Harbou
     assert progress.minutes_left is not None
     assert progress.minutes_left > 30.0, "it did not wait for its time to be up"
     assert progress.beams > 10_000
+
+
+async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Harbour) -> None:
+    live = await started(harbour)
+    await ensonified(live, 15.0)
+    await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(45.0, 45.0)), "Ana")
+    await until_state(harbour.service, live.id, MissionState.FINISHED)
+    assert [order.state for order in await orders_of(live)] == [OrderState.DONE]
+    assert (live.progress().ensonified_pct or 0.0) > 99.0
 
 
 async def test_cells_by_depth_leave_the_same_after_the_service_started_again(harbour: Harbour) -> None:

@@ -34,6 +34,7 @@ from app.storage.models import (
     TelemetryRow,
     TideTableRow,
     TokenRow,
+    VehicleOrderRow,
     WaypointRow,
 )
 from app.storage.ping_files import file_name
@@ -242,6 +243,17 @@ def one_of_each() -> list[list[Any]]:
             PositionRow(**position()),
             TargetRangeRow(**target_range()),
             ScanRow(**scan()),
+            VehicleOrderRow(
+                mission_id="m1",
+                vehicle="a",
+                kind="go",
+                state="flying",
+                way={"corners": [[-8.7, 41.18]]},
+                asked_by="Ana",
+                asked_at=TIME,
+                changed_at=TIME,
+                reason="",
+            ),
             PingBlockRow(**ping_block()),
             ping_chunk(),
             TelemetryRow(

@@ -77,7 +77,8 @@ class CaoPlanner(PlannerBase):
         self._history: list[Any] = []
         self._last: list[list[float]] = []
         self._by_vehicle = options.contribution == "vehicle" and not self._surveys
-        self.plans_for_all = self.decides_apart = isinstance(self._model, SurveyRegressors)
+        surveys = isinstance(self._model, SurveyRegressors)
+        self.plans_for_all = self.decides_apart = self.flies_lines = surveys
         self._size = MoveSize(options.alpha, options.alpha_decay, options.alpha_floor)
 
     def _regressors(self) -> Regressors:
@@ -131,6 +132,15 @@ class CaoPlanner(PlannerBase):
     def take_back(self, legs: Mapping[str, int]) -> bool:
         """See :meth:`app.exploration.planner.base.PlannerBase.take_back`; in surveys only."""
         return isinstance(self._model, SurveyRegressors) and self._model.take_back(legs)
+
+    def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
+        """See :meth:`app.exploration.planner.base.PlannerBase.put_back`; in surveys only."""
+        if isinstance(self._model, SurveyRegressors):
+            self._model.put_back(vehicle, ends_m, resume_at_m)
+
+    def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`; in surveys only."""
+        return isinstance(self._model, SurveyRegressors) and self._model.skip_line(vehicle, begin_m, here_m)
 
     def _remember(self) -> dict[str, Any]:
         return {

@@ -9,6 +9,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint
+from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, longer_axis_rad, route_length
 from app.exploration.planner.base import PlannerBase, settle
@@ -44,11 +45,26 @@ class LawnmowerPlanner(PlannerBase):
 
     name: ClassVar[str] = "lawnmower"
     plans_for_all = True
+    flies_lines = True
     decides_apart = True
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._routes: dict[str, FloatArray] = {}
+
+    def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
+        """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
+        if vehicle in self._routes:
+            begin = np.zeros((0, 2)) if resume_at_m is None else resume_at_m[None]
+            self._routes[vehicle] = np.vstack([begin, ends_m.reshape(-1, 2), self._routes[vehicle]])
+
+    def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
+        rest = after_line(begin_m, here_m, self._routes.get(vehicle, np.zeros((0, 2))))
+        if rest is None:
+            return False
+        self._routes[vehicle] = rest
+        return True
 
     def _remember(self) -> dict[str, Any]:
         return {"routes": self._routes}

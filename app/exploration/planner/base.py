@@ -35,6 +35,9 @@ class PlannerBase(ABC):
     decides_apart: bool = False
     """Whether legs may be decided for some of the vehicles while the others fly on."""
 
+    flies_lines: bool = False
+    """Whether vehicles fly lines, the rest of which can be left out."""
+
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         self.options = options
         self.sensor = sensor
@@ -123,6 +126,23 @@ class PlannerBase(ABC):
         Returns False, and nothing is changed, where the planner does not know any more what it planned before them.
         """
         return not any(legs.values())
+
+    def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
+        """Learn that a vehicle does not fly its last legs, which were to end at ``ends_m`` (n, 2).
+
+        Where it comes back it goes on from ``resume_at_m`` (2,); None: from wherever it is then.
+        """
+        return
+
+    def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
+        """Leave out the rest of the line that a vehicle is on; returns False where it flies none.
+
+        Parameters
+        ----------
+        begin_m, here_m : (2,)
+            Where the line began, and where the vehicle is.
+        """
+        return False
 
     def snapshot(self) -> bytes:
         """Return the planner's memory."""

@@ -31,6 +31,7 @@ class SwathPlanner(PlannerBase):
     name: ClassVar[str] = "swath"
     runs_errands: ClassVar[bool] = False
     plans_for_all = True
+    flies_lines = True
     decides_apart = True
 
     def __init__(self, options: Any, sensor: Any) -> None:
@@ -73,6 +74,15 @@ class SwathPlanner(PlannerBase):
         positions, _ = settle(team, bottom, self._at_cruise(team, bottom, wish)[None])
         left_pct = 100.0 * float(task.coverage.left.sum()) / max(int(task.coverage.wanted.sum()), 1)
         return Proposal(positions, 0.0, {"left_pct": left_pct}, done=frozenset(done))
+
+    def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
+        """See :meth:`app.exploration.planner.base.PlannerBase.put_back`; lines are found anew in what is left."""
+        if self._survey is not None:
+            self._survey.put_back(vehicle, ends_m, keeps_line=resume_at_m is None)
+
+    def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
+        return self._survey is not None and self._survey.skip_line(vehicle, here_m)
 
     def _begun(self, team: Situation, task: SwathTask) -> SwathSurvey:
         if self._survey is None:

@@ -91,6 +91,8 @@ class Assignment:
     """How often in a row it was not sent where it was to go."""
     laid_on: Coverage | None = None
     """What its line was laid by last."""
+    skipped: FloatArray | None = None
+    """A line (k, 2) that its operator wants left out, until that is noted."""
 
 
 class SwathSurvey:
@@ -155,6 +157,10 @@ class SwathSurvey:
         for name in team:
             self._sweeps.setdefault(name, Assignment())
         sweep = self._sweeps[vehicle]
+        if sweep.skipped is not None:
+            self._count(sweep.skipped, flying, left, tries=MOST_TRIES)
+            left = replace(left, done=coverage.done | (self._tried >= MOST_TRIES))
+            sweep.skipped = None
         self._take_back(sweep, pose, flying, left)
         self._forget_flown(coverage)
         if sweep.laid_on is not coverage:
@@ -167,6 +173,40 @@ class SwathSurvey:
         if sweep.course is None:
             return None
         return self._along(sweep, pose, flying, left, leg_m, reach_m)
+
+    def put_back(self, vehicle: str, ends_m: FloatArray, *, keeps_line: bool) -> None:
+        """Expect nothing of pieces of lines that end at places (n, 2) and are not flown.
+
+        ``keeps_line``: they are put back before what is left of the line; else lines are found anew.
+        """
+        sweep = self._sweeps.get(vehicle)
+        if sweep is None:
+            return
+        for end in ends_m[::-1]:
+            if not sweep.expected or np.hypot(*(sweep.expected[-1][-1] - end)) > NEAR_M:
+                continue
+            piece = sweep.expected.pop()
+            if sweep.course is not None and sweep.course.begun:
+                sweep.course.path = np.vstack([piece, sweep.course.path[1:]])
+        sweep.refused = 0
+        if not keeps_line:
+            if sweep.course is not None and sweep.course.sign == 0 and self._across is not None:
+                self._across.append(sweep.course.path)
+            sweep.course = None
+
+    def skip_line(self, vehicle: str, here_m: FloatArray) -> bool:
+        """Leave out what is left of a vehicle's line, from where it is (2,); returns False where it has none."""
+        sweep = self._sweeps.get(vehicle)
+        if sweep is None or sweep.course is None or not len(sweep.course.path):
+            return False
+        rest = sweep.course.path
+        # What lies behind on a piece that was put back was flown.
+        first = int(np.argmin(np.hypot(*(rest - here_m).T)))
+        rest = rest[first:] if len(rest) - first > 1 else np.vstack([here_m, rest[-1]])
+        if sweep.course.sign != 0:
+            sweep.skipped = rest
+        sweep.course = None
+        return True
 
     def lines_m(self) -> dict[str, FloatArray]:
         """Return what is left of each vehicle's line, (k, 2) east and north."""
@@ -473,7 +513,7 @@ class SwathSurvey:
                     del sweep.expected[: k + 1], sweep.ends[: k + 1]
                     break
 
-    def _count(self, path: FloatArray, flying: Flying, coverage: Coverage) -> None:
+    def _count(self, path: FloatArray, flying: Flying, coverage: Coverage, tries: int = 1) -> None:
         """Note what a line that is begun is to see, what it leads over in any case."""
         raster = self._raster(coverage, self._direction_rad)
         seen = raster.under(path, flying)
@@ -482,7 +522,7 @@ class SwathSurvey:
         places = raster.axes.turned(coverage.places_m(coverage.left))
         inside = seen[raster.columns_of(places[:, 0]), raster.rows_of(places[:, 1])]
         rows, cols = np.nonzero(coverage.left)
-        self._tried[rows[inside], cols[inside]] += 1
+        self._tried[rows[inside], cols[inside]] += tries
 
     def _raster(self, coverage: Coverage, direction_rad: float) -> LineRaster:
         if self._steepest is None or self._steepest[0] is not coverage.depth_m:
@@ -511,6 +551,7 @@ class SwathSurvey:
                     "expected": [path.tolist() for path in s.expected],
                     "ends": [places.tolist() for places in s.ends],
                     "refused": s.refused,
+                    "skipped": None if s.skipped is None else s.skipped.tolist(),
                 }
                 for name, s in self._sweeps.items()
             },
@@ -540,6 +581,9 @@ class SwathSurvey:
                 [np.array(path, dtype=np.float64).reshape(-1, 2) for path in kept["expected"]],
                 [np.array(places, dtype=np.float64).reshape(-1, 2) for places in kept["ends"]],
                 int(kept.get("refused", 0)),
+                skipped=None
+                if kept.get("skipped") is None
+                else np.array(kept["skipped"], dtype=np.float64).reshape(-1, 2),
             )
 
 

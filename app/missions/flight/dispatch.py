@@ -6,6 +6,7 @@ import math
 import numpy as np
 import structlog
 
+from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit
@@ -54,6 +55,8 @@ class Dispatch:
         self._time_scale = time_scale
         self._idle_since_s: dict[str, float] = {}
         """Since when vehicles have had nothing to fly, the event loop's time; inf once they hold."""
+        self.given_up: dict[str, list[FloatArray]] = {}
+        """Where legs were to end that vehicles did not fly, each (2,), until somebody takes note of it."""
         self.turned_down: dict[str, int] = {}
         """How often vehicles refused the order that they have."""
 
@@ -160,9 +163,27 @@ class Dispatch:
             report = WaypointReport(member.name, member.order.mission_id, member.order.step, status, reason)
             self._live.receive(report)
 
+    def give_up_legs(self, member: Member, reason: str) -> list[FloatArray]:
+        """End the leg that a vehicle flies, and those after it; returns where they were to end, each (2,)."""
+        ends = [member.target_m] if member.ordered and member.target_m is not None else []
+        misses = member.misses
+        self.settle(member, WaypointStatus.MISSED, reason)
+        member.misses = misses  # it would have got there
+        legs, member.ahead[:] = list(member.ahead), []
+        for leg in legs:
+            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            self._live.journal.waypoint(report)
+        return self._note_given_up(member, [*ends, *(leg.target_m for leg in legs)])
+
+    def _note_given_up(self, member: Member, ends_m: list[FloatArray]) -> list[FloatArray]:
+        if member.asked is not None:
+            self.given_up.setdefault(member.name, []).extend(ends_m)
+        return ends_m
+
     async def drop_ahead(self, member: Member, reason: str) -> None:
         """Give up the legs that a vehicle has not begun."""
         legs, member.ahead[:] = list(member.ahead), []
+        self._note_given_up(member, [leg.target_m for leg in legs])
         for leg in legs:
             report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
             self._live.journal.waypoint(report)
@@ -191,6 +212,8 @@ class Dispatch:
     async def _tell_of_late(self, late: list[Member]) -> None:
         for member in late:
             number = member.order.step if member.order is not None else member.legs
+            if member.target_m is not None:
+                self._note_given_up(member, [member.target_m])
             self.settle(member, WaypointStatus.MISSED, f"not reached within {member.leg_allowed_s:.0f} s")
             await self._live.journal.log(
                 Level.WARNING,

@@ -80,7 +80,13 @@ class LegExchange:
 
     def _open_legs(self, member: Member) -> list[CommittedLeg]:
         """Return the legs of a vehicle that will not be begun before others are decided."""
-        if member.withdrawal is not None or not member.busy or member.target_m is None or member.pursuing is not None:
+        if (
+            member.asked is not None
+            or member.withdrawal is not None
+            or not member.busy
+            or member.target_m is None
+            or member.pursuing is not None
+        ):
             return []
         left_m = float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
         left_s = left_m / (self._live.spec.speed_of(member.spec) * self._time_scale)

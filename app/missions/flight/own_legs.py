@@ -18,6 +18,7 @@ from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, plac
 from app.missions.flight.decision import Decision, Leg, Place, planned_way_m
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.exchange import LegExchange
+from app.missions.flight.orders import OrderBook
 from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.separation import too_close, ways_aside
 from app.missions.flight.step_maps import StepMaps
@@ -74,8 +75,10 @@ class OwnLegs:
         constraints: Constraints,
         time_scale: float,
         range_left: RangeLeft,
+        orders: OrderBook,
     ) -> None:
         self._range = range_left
+        self._orders = orders
         self._constraints = constraints
         self._live = live
         self._spec = live.spec
@@ -109,6 +112,8 @@ class OwnLegs:
         sending = asyncio.create_task(self._dispatch.keep())
         try:
             while not self._over():
+                for name in await self._orders.look():
+                    self._again_at_s.pop(name, None)
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
@@ -136,7 +141,13 @@ class OwnLegs:
         # The map is made while vehicles fly, decided for or not.
         self._maps.begin()
         await self._waiting.until(
-            lambda: bool(self._who_gets_legs()) or self._over() or self._nobody_to_lead or sending.done(),
+            lambda: (
+                bool(self._who_gets_legs())
+                or self._orders.waiting
+                or self._over()
+                or self._nobody_to_lead
+                or sending.done()
+            ),
             soon_s if later_s is None else min(max(later_s, now_s), soon_s),
         )
 
@@ -322,9 +333,13 @@ class OwnLegs:
     def _over(self) -> bool:
         """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody."""
         team = self._live.team.surveying
-        left = [m for m in team if (self._wants_legs(m) and m.name not in self._done) or m.ordered or m.ahead]
+        left = [
+            m
+            for m in team
+            if (self._wants_legs(m) and (m.name not in self._done or m.asked is not None)) or m.ordered or m.ahead
+        ]
         if not left:
-            return bool(list(self._live.team))
+            return bool(list(self._live.team)) and not self._held
         somebody_is_done = any(m.present for m in team if m not in left)
         if any(m.present and not (somebody_is_done and m.misses) for m in left):
             return False
@@ -341,9 +356,21 @@ class OwnLegs:
             return 0.0
         return now_s - self._absent_since_s.setdefault(member.name, now_s)
 
+    @property
+    def _held(self) -> bool:
+        """Whether a person holds a vehicle that has some of its way left: nobody ends that but a person."""
+        return any(
+            member.withdrawal is not None
+            and member.withdrawal.asked
+            and member.withdrawal.response is Response.HOLD
+            and self._has_way(member)
+            for member in self._live.team
+        )
+
     def _wants_legs(self, member: Member) -> bool:
-        if member.withdrawal is not None:
-            return False
+        return member.withdrawal is None and self._has_way(member)
+
+    def _has_way(self, member: Member) -> bool:
         if self._spec.budget.steps is not None:
             return self._next_number(member) <= self._spec.steps
         return member.way_left_m(self._spec) > LEAST_WAY_M

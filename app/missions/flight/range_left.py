@@ -133,6 +133,18 @@ class RangeLeft:
         needs_s = with_reserve_s(self._needs_from_s(member, target_m, home_m))
         return self._until_end_s(member) + leg_s + needs_s <= left.safe_s
 
+    def lasts_for(self, member: Member, start_m: FloatArray, way_m: FloatArray) -> bool:
+        """Whether a vehicle's energy lasts for a way (k, 2) from a place (2,), and home from each of its corners."""
+        home_m, left = home_of(member, self._live.spec), member.energy.left
+        if home_m is None or left is None or member.report is None:
+            return True
+        speed_mps = self._live.spec.speed_of(member.spec)
+        after_s = np.cumsum(np.hypot(*np.diff(np.vstack([start_m, way_m]), axis=0).T)) / speed_mps
+        return all(
+            float(passed_s) + with_reserve_s(self._needs_from_s(member, corner, home_m)) <= left.safe_s
+            for corner, passed_s in zip(way_m, after_s, strict=True)
+        )
+
     def _until_end_s(self, member: Member) -> float:
         return member.way_ahead_m(self._live.frame) / self._live.spec.speed_of(member.spec)
 

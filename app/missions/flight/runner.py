@@ -11,6 +11,7 @@ from concurrent.futures import Executor
 import numpy as np
 
 from app.arrays import FloatArray
+from app.exploration.planner.ordered import OrderedPlanner
 from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
@@ -22,6 +23,7 @@ from app.missions.flight.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.engagement import Engagement
 from app.missions.flight.failsafe_watch import FailsafeWatch
 from app.missions.flight.onboard_way import OnboardWays
+from app.missions.flight.orders import Flight, OrderBook
 from app.missions.flight.own_legs import OwnLegs
 from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.search_hooks import SearchHooks
@@ -53,7 +55,7 @@ class Runner:
         self._live = live
         self._time_scale = time_scale
         self._constraints = constraints = make_constraints(live.spec)
-        planner = make_planner(live.spec, live.planning_sensor)
+        planner = OrderedPlanner(make_planner(live.spec, live.planning_sensor))
         linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
         self._apart = live.search is None and not linked and planner.decides_apart
         self._maps = StepMaps(live, executor, time_scale)
@@ -66,6 +68,8 @@ class Runner:
         self._range = RangeLeft(live, constraints, self._committing)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
         self._onboard = OnboardWays(live, hub, self._range)
+        self._orders = live.part(OrderBook)
+        self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)
         self._withdrawals = Withdrawals(live, hub, self._committing, self._dispatch, self._range, time_scale)
 
     async def run(self) -> str:
@@ -84,12 +88,14 @@ class Runner:
         ]
         try:
             resumed = await self._recover()
+            await self._orders.begin(self._ordered)
             reason = await self._flight().fly(resumed=resumed)
             self._call_home(reason)
             await self._withdrawals.finished()
             await self._onboard.drop()
             return reason
         finally:
+            self._orders.end()
             metrics.RUNNING.dec()
             for keeper in keepers:
                 keeper.cancel()
@@ -104,7 +110,7 @@ class Runner:
     def _flight(self) -> OwnLegs | TeamSteps:
         shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)
         if self._apart:
-            return OwnLegs(*shared, self._constraints, self._time_scale, self._range)
+            return OwnLegs(*shared, self._constraints, self._time_scale, self._range, self._orders)
         return TeamSteps(*shared, self._lookout, self._time_scale)
 
     def _call_home(self, why: str) -> None:

@@ -8,7 +8,7 @@ import structlog
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import WaypointReport, WaypointStatus
+from app.missions.fleet.interface import WaypointStatus
 from app.missions.flight.commit import LegCommit, home_of, point_of
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.range_left import RangeLeft
@@ -142,11 +142,7 @@ class Withdrawals:
         """Write a withdrawal down and give up the vehicle's legs."""
         withdrawal.led = True
         await self._keep(member, withdrawal)
-        self._dispatch.settle(member, WaypointStatus.MISSED, withdrawal.why)
-        legs, member.ahead[:] = list(member.ahead), []
-        for leg in legs:
-            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, withdrawal.why)
-            self._live.journal.waypoint(report)
+        self._dispatch.give_up_legs(member, withdrawal.why)
         does = {
             Response.HOLD: "holds",
             Response.RETURN: "goes home",

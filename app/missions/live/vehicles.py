@@ -11,8 +11,10 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.spec.mission import MissionSpec, SurfacePolicy
+from app.missions.spec.orders import OrderKind
 from app.missions.team import Member, Swath, Team
 from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView
+from app.missions.views.orders import OrderView
 
 SWATH_KEPT_S = 5.0
 """By its vehicle's clock, how long a ping is shown."""
@@ -82,6 +84,7 @@ class VehicleViews:
             flown_m=round(member.flown.flown_m, 1),
             on_plan_m=round(member.flown.on_plan_m, 1),
             idle_s=round(member.flown.idle_s, 1),
+            order=self._order(member),
             **self._recovery(member),
         )
         if report is None:
@@ -104,6 +107,24 @@ class VehicleViews:
                 "swath_m": _swath_m(member.swath, report),
                 "localization": _position_quality(report.position_sd_m, self._spec.surface_policy),
             }
+        )
+
+    def _order(self, member: Member) -> OrderView | None:
+        """Return what its operator ordered a vehicle to do."""
+        order = member.asked
+        if order is None:
+            return None
+        lat, lon = self._frame.to_geographic(order.corners_m[:, 0], order.corners_m[:, 1])
+        skips = order.kind is OrderKind.SKIP_LINE
+        return OrderView(
+            id=order.id,
+            vehicle=member.name,
+            kind=order.kind,
+            state=order.state,
+            way=[] if skips else [(round(float(x), 8), round(float(y), 8)) for x, y in zip(lon, lat, strict=True)],
+            asked_by=order.asked_by,
+            asked_at=order.asked_at,
+            changed_at=order.asked_at,
         )
 
     def _recovery(self, member: Member) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Whether vehicles go home before a mission ends, and single ones in the middle of it."""
 
 from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
 from app.missions.running.supervisor import MissionSupervisor
 from app.missions.spec.failsafes import Response
@@ -48,7 +49,7 @@ async def hold(live: LiveMission, name: str, actor: str) -> None:
     member = _member(live, name)
     if live.header.state is not MissionState.RUNNING or live.ending is not None:
         raise ConflictError(f"the mission is {_what(live)}: nobody is held", "see to the mission first")
-    if member.withdrawal is None and live.team.surveying == [member]:
+    if member.withdrawal is None and live.team.surveying == [member] and not live.part(OrderBook).led_apart:
         raise ConflictError(f"nobody but {name!r} surveys", "pause the mission: that holds it, too")
     if not live.withdraw(member, Response.HOLD, f"held by {actor}", asked=True):
         raise ConflictError(f"vehicle {name!r} surveys no more: {_why(member)}", "send it on first")
@@ -58,6 +59,8 @@ async def hold(live: LiveMission, name: str, actor: str) -> None:
 async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, actor: str) -> None:
     """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
     member = _member(live, name)
+    if member.withdrawal is None and await live.part(OrderBook).cancel(member, actor):
+        return
     if member.withdrawal is None:
         raise ConflictError(f"vehicle {name!r} is surveying", "nothing has to be done")
     if live.ending is not None:

@@ -172,6 +172,13 @@ class MissionRegistry:
         if self._ownership is not None:
             await self._ownership.release([live.id])
 
+    async def forget(self, live: LiveMission, why: str) -> None:
+        """Put a mission away that is stored otherwise now; who watches it is told to ask again."""
+        self._maps.forget(live.id)
+        if self._live.pop(live.id, None) is not None:
+            live.broadcaster.end(why)
+            await live.close()
+
     async def close(self) -> None:
         """Write down what is left."""
         for live in self:

@@ -3,9 +3,9 @@
 from datetime import datetime
 from enum import StrEnum
 
-from pydantic import Field
+from pydantic import Field, computed_field
 
-from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
+from app.missions.alarm_kinds import ALARMS, AlarmKind, AlarmSeverity
 from app.missions.views.base import View
 
 
@@ -54,6 +54,12 @@ class AlarmView(View):
     state: AlarmState
     acknowledged_at: datetime | None
     acknowledged_by: str | None = Field(description="The name of the token, or of the user, that acknowledged it")
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def action(self) -> str:
+        """What whoever is on watch does about it."""
+        return ALARMS[self.kind].action
 
 
 class DeliveryView(View):

@@ -14,6 +14,7 @@ from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.mission import MissionSpec, Sensor, VehicleKind
 from app.missions.states import Action, MissionState, allowed_actions
 from app.missions.views.base import View
+from app.missions.views.orders import OrderView
 from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
 
@@ -104,6 +105,7 @@ class VehicleView(View):
     flown_m: float = Field(default=0.0, description="What it has flown in this mission, along its track")
     on_plan_m: float = Field(default=0.0, description="Of those, metres along planned legs")
     idle_s: float = Field(default=0.0, description="Vehicle time in which it waited for a decision")
+    order: OrderView | None = Field(default=None, description="What its operator ordered; null: it does its part")
     withdrawn: str = Field(default="", description="Why it surveys no more; empty while it does")
     energy_left_pct: float | None = Field(
         default=None, description="What is left of its energy, by its battery or else by endurance_min; null: not known"

@@ -226,3 +226,29 @@ def test_a_damaged_memory_is_refused() -> None:
     planner = create_planner("swath", PlannerOptions())
     with pytest.raises(ValueError, match="memory"):
         planner.restore(b"nonsense")
+
+
+@pytest.mark.parametrize("skips", [True, False])
+def test_what_is_left_out_of_a_line_is_not_seen_and_all_else_is(skips: bool) -> None:
+    sea = Sea(np.full((120, 200), 8.0))
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    pose = np.array([2.0, 2.0, np.nan])
+    for turn in range(400):
+        if skips and turn == 5:
+            survey.put_back("a", pose[None, :2], keeps_line=True)
+            assert survey.skip_line("a", pose[:2])
+            kept = json.loads(json.dumps(survey.remember()))
+            survey = SwathSurvey(1.0, 1.0, 8.0)
+            survey.recall(kept)
+        end = survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+        if end is None:
+            break
+        sea.fly(pose[:2], end)
+        pose = np.array([*end, math.atan2(*(end - pose[:2]))])
+    else:
+        raise AssertionError("it does not end")
+    missing = int((~sea.seen).sum())
+    # Neighbours see a part of it: lines bend to where the last one ended.
+    assert (missing > 200) is skips
+    assert missing < 0.1 * sea.seen.size
+    assert not survey.skip_line("a", pose[:2]), "it is on no line any more"

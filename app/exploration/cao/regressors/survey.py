@@ -12,6 +12,7 @@ objective measured after a step is the improvement of the predicted final map th
 """
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.core.routes import CORNER_TOLERANCE, Turns, Vehicles, metres_left, next_waypoint
+from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
@@ -53,6 +55,9 @@ takes the luckiest."""
 SILENT_WITHIN, SILENT = 0.5, 0.05
 """Within so many spacings of a place that gave no echo ground counts only this part: there is nothing to be heard."""
 JITTER = 0.7
+SKIPPED_M = 5.0
+"""Ground along a line that is left out is marked at places so far apart."""
+SAME_M = 1e-3
 MOST_GIVEN = 24
 """How many of a vehicle's last legs can be taken back."""
 CORNER_LOSS = 0.4
@@ -240,6 +245,46 @@ class SurveyRegressors:
                 same = np.abs(self._silent[:, None] - unflown).sum(axis=2).min(axis=1, initial=np.inf) < 1e-6
                 self._silent = self._silent[~same]
         self._planned_m = min(self._planned_m, self._flown_m)
+        return True
+
+    def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
+        """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
+        if vehicle not in self._plan or vehicle not in self._backbone:
+            return
+        given = self._given.get(vehicle, [])
+        last = np.array([leg.end_m for leg in given[-len(ends_m) :]]).reshape(-1, 2)
+        known = len(ends_m) > 0 and last.shape == ends_m.shape and bool(np.allclose(last, ends_m, atol=SAME_M))
+        if not (known and self.take_back({vehicle: len(ends_m)})):
+            self._begin_with(vehicle, ends_m.reshape(-1, 2))
+        if resume_at_m is not None:
+            self._begin_with(vehicle, resume_at_m[None])
+        # What came before was flown elsewhere: it cannot be taken back any more.
+        self._given[vehicle] = []
+
+    def _begin_with(self, vehicle: str, vias: FloatArray) -> None:
+        for routes in (self._plan, self._backbone):
+            routes[vehicle] = np.vstack([vias, routes[vehicle]])
+        if self._coarse.get(vehicle, 0):
+            self._coarse[vehicle] += len(vias)
+
+    def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
+        followed, other = (self._plan, self._backbone) if self._free else (self._backbone, self._plan)
+        route = followed.get(vehicle, np.zeros((0, 2)))
+        rest = after_line(begin_m, here_m, route)
+        if rest is None:
+            return False
+        skipped = route[: len(route) - len(rest)]
+        followed[vehicle] = rest
+        beside = other[vehicle]
+        while len(beside) and np.hypot(*(skipped - beside[0]).T).min() <= SAME_M:
+            beside = beside[1:]
+        other[vehicle] = beside
+        self._coarse[vehicle] = max(0, self._coarse.get(vehicle, 0) - len(skipped))
+        # A plan that is made anew would go there first: nobody knows what is there.
+        way = np.vstack([here_m, skipped])
+        parts = [np.linspace(a, b, 1 + int(np.hypot(*(b - a)) / SKIPPED_M)) for a, b in pairwise(way)]
+        self._silent = np.vstack([self._silent, *parts, way])
         return True
 
     def remember(self) -> dict[str, Any]:

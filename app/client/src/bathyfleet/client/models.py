@@ -81,6 +81,12 @@ Notice: TypeAlias = Annotated[Literal["raised", "escalated", "acknowledged", "en
 Order: TypeAlias = Annotated[Literal["exclusive", "special", "1a", "1b", "2"], Open]
 """An order of survey."""
 
+OrderKind: TypeAlias = Annotated[Literal["go", "skip-line", "repeat-line", "denser"], Open]
+"""What a vehicle that surveys can be ordered to do."""
+
+OrderState: TypeAlias = Annotated[Literal["accepted", "flying", "done", "replaced", "cancelled", "failed"], Open]
+"""How far an order has come."""
+
 OverlayLayer: TypeAlias = Annotated[Literal["depth", "uncertainty", "count", "density", "slope", "tvu_fraction", "difference", "tvu", "thu", "shoal_pct", "live"], Open]
 """A layer that can be seen as a picture."""
 
@@ -210,6 +216,8 @@ class AlarmReport(Model):
     acknowledged_by: str | None
     """The name of the token, or of the user, that acknowledged it"""
     deliveries: list[DeliveryView]
+    action: str
+    """What whoever is on watch does about it."""
 
 
 class AlarmTrial(Model):
@@ -238,6 +246,8 @@ class AlarmView(Model):
     acknowledged_at: datetime | None
     acknowledged_by: str | None
     """The name of the token, or of the user, that acknowledged it"""
+    action: str
+    """What whoever is on watch does about it."""
 
 
 class AllowedView(Model):
@@ -543,6 +553,16 @@ class DeliveryView(Model):
     """Why the last attempt failed; empty when none did"""
 
 
+class DenserOrder(Model):
+    """A part of the area to be surveyed on closer lines."""
+
+    area: PolygonGeometry
+    line_spacing_m: float | None = None
+    """Distance between lines, metres; null: half of the survey's own"""
+    vehicle: str | None = None
+    """Who flies it; null: who has the shortest way"""
+
+
 class DifferenceView(Model):
     """Map minus reference grid over the cells that both know."""
 
@@ -693,6 +713,13 @@ class ForecastView(Model):
     """Over how many floors of different roughness it was flown"""
     assumptions: list[str]
     """What was taken to be so, in words"""
+
+
+class GoOrder(Model):
+    """Where a vehicle is to go now."""
+
+    position: tuple[float, float]
+    """[longitude, latitude], inside the area, in no keep-out zone"""
 
 
 class HeldOutView(Model):
@@ -1062,6 +1089,22 @@ class NoteRequest(Model):
     """Kept in the mission's log"""
 
 
+class OrderView(Model):
+    """An order to one vehicle."""
+
+    id: int
+    vehicle: str
+    kind: OrderKind
+    state: OrderState
+    way: list[tuple[float, float]]
+    """Where it leads along, [longitude, latitude]; empty where a line is left out"""
+    asked_by: str
+    asked_at: datetime
+    changed_at: datetime
+    reason: str
+    """Why it is over, where it was not carried out"""
+
+
 class PcaoModel(Model):
     """A controller that ``bathyfleet train`` wrote."""
 
@@ -1347,6 +1390,13 @@ class ReferenceView(Model):
     cells: int
     """Cells of the map's grid that it knows"""
     notes: list[str]
+
+
+class RepeatOrder(Model):
+    """Which line a vehicle is to fly again."""
+
+    near: tuple[float, float] | None = None
+    """The line that passes this place closest, [longitude, latitude]; null: the newest"""
 
 
 class Scan(Model):
@@ -2316,6 +2366,8 @@ class VehicleView(Model):
     """Of those, metres along planned legs"""
     idle_s: float
     """Vehicle time in which it waited for a decision"""
+    order: OrderView | None
+    """What its operator ordered; null: it does its part"""
     withdrawn: str
     """Why it surveys no more; empty while it does"""
     energy_left_pct: float | None

@@ -34,6 +34,15 @@ class Operations(ABC):
         """See a mission: ``GET /missions/{mission_id}``."""
         return self._call(Call[models.MissionView]("GET", f"/missions/{part(mission_id)}", models.MissionView))
 
+    def describe_mission(self, mission_id: str, body: models.MissionSpec | Mapping[str, Any]) -> models.MissionView:
+        """Describe a mission anew that has not started: ``PUT /missions/{mission_id}``."""
+        return self._call(Call[models.MissionView](
+            "PUT",
+            f"/missions/{part(mission_id)}",
+            models.MissionView,
+            body=body,
+        ))
+
     def delete_mission(self, mission_id: str) -> None:
         """Delete a mission that was not flown: ``DELETE /missions/{mission_id}``."""
         return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}", None))
@@ -863,6 +872,54 @@ class Operations(ABC):
         """List the planners: ``GET /planners``."""
         return self._call(Call[list[models.PlannerView]]("GET", "/planners", list[models.PlannerView]))
 
+    def list_orders(self, mission_id: str) -> list[models.OrderView]:
+        """See what vehicles were ordered: ``GET /missions/{mission_id}/orders``."""
+        return self._call(Call[list[models.OrderView]](
+            "GET",
+            f"/missions/{part(mission_id)}/orders",
+            list[models.OrderView],
+        ))
+
+    def go_vehicle(self, mission_id: str, name: str, body: models.GoOrder | Mapping[str, Any]) -> models.OrderView:
+        """Send one vehicle to a place now: ``POST /missions/{mission_id}/vehicles/{name}/go``."""
+        return self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/go",
+            models.OrderView,
+            body=body,
+        ))
+
+    def skip_line(self, mission_id: str, name: str) -> models.OrderView:
+        """Leave out the rest of a vehicle's line: ``POST /missions/{mission_id}/vehicles/{name}/skip-line``."""
+        return self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/skip-line",
+            models.OrderView,
+        ))
+
+    def repeat_line(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.RepeatOrder | Mapping[str, Any] | None = None,
+    ) -> models.OrderView:
+        """Let a vehicle fly a line again: ``POST /missions/{mission_id}/vehicles/{name}/repeat-line``."""
+        return self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/repeat-line",
+            models.OrderView,
+            body=body,
+        ))
+
+    def survey_denser(self, mission_id: str, body: models.DenserOrder | Mapping[str, Any]) -> models.OrderView:
+        """Survey a part of the area denser: ``POST /missions/{mission_id}/denser``."""
+        return self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/denser",
+            models.OrderView,
+            body=body,
+        ))
+
     def list_alarms(
         self,
         *,
@@ -954,6 +1011,19 @@ class AsyncOperations(ABC):
     async def get_mission(self, mission_id: str) -> models.MissionView:
         """See a mission: ``GET /missions/{mission_id}``."""
         return await self._call(Call[models.MissionView]("GET", f"/missions/{part(mission_id)}", models.MissionView))
+
+    async def describe_mission(
+        self,
+        mission_id: str,
+        body: models.MissionSpec | Mapping[str, Any],
+    ) -> models.MissionView:
+        """Describe a mission anew that has not started: ``PUT /missions/{mission_id}``."""
+        return await self._call(Call[models.MissionView](
+            "PUT",
+            f"/missions/{part(mission_id)}",
+            models.MissionView,
+            body=body,
+        ))
 
     async def delete_mission(self, mission_id: str) -> None:
         """Delete a mission that was not flown: ``DELETE /missions/{mission_id}``."""
@@ -1804,6 +1874,59 @@ class AsyncOperations(ABC):
     async def list_planners(self) -> list[models.PlannerView]:
         """List the planners: ``GET /planners``."""
         return await self._call(Call[list[models.PlannerView]]("GET", "/planners", list[models.PlannerView]))
+
+    async def list_orders(self, mission_id: str) -> list[models.OrderView]:
+        """See what vehicles were ordered: ``GET /missions/{mission_id}/orders``."""
+        return await self._call(Call[list[models.OrderView]](
+            "GET",
+            f"/missions/{part(mission_id)}/orders",
+            list[models.OrderView],
+        ))
+
+    async def go_vehicle(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.GoOrder | Mapping[str, Any],
+    ) -> models.OrderView:
+        """Send one vehicle to a place now: ``POST /missions/{mission_id}/vehicles/{name}/go``."""
+        return await self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/go",
+            models.OrderView,
+            body=body,
+        ))
+
+    async def skip_line(self, mission_id: str, name: str) -> models.OrderView:
+        """Leave out the rest of a vehicle's line: ``POST /missions/{mission_id}/vehicles/{name}/skip-line``."""
+        return await self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/skip-line",
+            models.OrderView,
+        ))
+
+    async def repeat_line(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.RepeatOrder | Mapping[str, Any] | None = None,
+    ) -> models.OrderView:
+        """Let a vehicle fly a line again: ``POST /missions/{mission_id}/vehicles/{name}/repeat-line``."""
+        return await self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/vehicles/{part(name)}/repeat-line",
+            models.OrderView,
+            body=body,
+        ))
+
+    async def survey_denser(self, mission_id: str, body: models.DenserOrder | Mapping[str, Any]) -> models.OrderView:
+        """Survey a part of the area denser: ``POST /missions/{mission_id}/denser``."""
+        return await self._call(Call[models.OrderView](
+            "POST",
+            f"/missions/{part(mission_id)}/denser",
+            models.OrderView,
+            body=body,
+        ))
 
     async def list_alarms(
         self,

@@ -1,5 +1,6 @@
 import type {
   ActionView,
+  AlarmReport,
   AlarmView,
   ChangesView,
   CrossoversView,
@@ -9,12 +10,15 @@ import type {
   ForecastView,
   Holidays,
   LayerView,
+  LngLat,
   MissionAction,
   MissionSummary,
   MissionView,
   NewMission,
   NewSite,
+  OrderView,
   PlannerView,
+  PolygonGeometry,
   PreflightView,
   Problem,
   ProductView,
@@ -139,6 +143,13 @@ export const api = {
   layers: () => request<LayerView[]>("/layers"),
   planners: () => request<PlannerView[]>("/planners"),
   create: (mission: NewMission) => post<MissionView>("/missions", mission),
+  /** Replaces what a mission is to do that has not started. */
+  describe: (id: string, mission: NewMission) =>
+    request<MissionView>(missionPath(id), {
+      method: "PUT",
+      body: JSON.stringify(mission),
+      headers: { "Content-Type": "application/json" },
+    }),
   /** `home`: whether vehicles go home before the mission ends; undefined: as the service does it. */
   act: (id: string, action: MissionAction, home?: boolean) =>
     post<ActionView>(`${missionPath(id)}/${action}`, home === undefined ? undefined : { return: home }),
@@ -160,12 +171,21 @@ export const api = {
   telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),
   tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
   acknowledge: (alarm: string) => post<AlarmView>(`/alarms/${encodeURIComponent(alarm)}/acknowledge`),
+  /** With who was told of it. */
+  alarm: (alarm: string) => request<AlarmReport>(`/alarms/${encodeURIComponent(alarm)}`),
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
   abortVehicle: (id: string, name: string) => post<ActionView>(`${vehiclePath(id, name)}/abort`),
   rejoin: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/rejoin`),
   returnVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/return`),
   holdVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/hold`),
   resumeVehicle: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/resume`),
+  goVehicle: (id: string, name: string, position: LngLat) =>
+    post<OrderView>(`${vehiclePath(id, name)}/go`, { position }),
+  skipLine: (id: string, name: string) => post<OrderView>(`${vehiclePath(id, name)}/skip-line`),
+  repeatLine: (id: string, name: string, near: LngLat | null) =>
+    post<OrderView>(`${vehiclePath(id, name)}/repeat-line`, { near }),
+  denser: (id: string, area: PolygonGeometry, line_spacing_m: number | null, vehicle: string | null) =>
+    post<OrderView>(`${missionPath(id)}/denser`, { area, line_spacing_m, vehicle }),
   soundings: (id: string, after: number, state?: SoundingState) =>
     request<SoundingPage>(
       `${missionPath(id)}/soundings?limit=200&after=${after}${state ? `&state=${state}` : ""}`,

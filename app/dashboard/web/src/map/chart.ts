@@ -61,6 +61,8 @@ export interface PaintedFloor {
 export interface ChartHooks {
   onCursor: (place: LngLat | null) => void;
   onClick: (place: LngLat) => void;
+  /** The right button, or a long touch: a place, and where on the page that is. */
+  onMenu: (place: LngLat, x: number, y: number) => void;
   onSpot: (id: number) => void;
   onCentre: (place: LngLat) => void;
   onFrame: (frame: GridFrame) => void;
@@ -135,6 +137,10 @@ export class Chart {
       const spot = this.#spotAt(e.point.x, e.point.y);
       if (spot) hooks.onSpot(spot.id);
       else hooks.onClick([e.lngLat.lng, e.lngLat.lat]);
+    });
+    map.on("contextmenu", (e) => {
+      e.preventDefault();
+      hooks.onMenu([e.lngLat.lng, e.lngLat.lat], e.originalEvent.clientX, e.originalEvent.clientY);
     });
     map.on("move", this.#tellFrame);
     map.on("move", this.#wantCoasts);

@@ -47,7 +47,7 @@ it("figures over the steps have gaps where a step has none", () => {
   expect(figures.coverage).toEqual([10, 20]);
   expect(figures.deviation).toEqual([null, null]);
   expect(figures.objective).toEqual([1, null]);
-  expect(figures.terms).toEqual([{ label: "feasible", values: [null, 2] }]);
+  expect(figures.terms).toEqual([{ label: "choices that break no limit", values: [null, 2] }]);
 });
 
 describe("positions are written", () => {

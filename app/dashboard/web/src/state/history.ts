@@ -22,9 +22,26 @@ export function figuresOf(steps: readonly StepView[]) {
   };
 }
 
+const TERMS: Readonly<Record<string, string>> = {
+  feasible: "choices that break no limit",
+  finish: "step at which all is done",
+  left_m: "metres of lines left",
+  left_pct: "% left to see",
+  waypoints: "waypoints planned",
+  errands: "vehicles on errands",
+};
+
+/** A planner's figure in words. */
+export function termWords(name: string): string {
+  const theta = /^theta_(\d+)$/.exec(name);
+  return theta ? `trust in prediction ${Number(theta[1]) + 1}` : (TERMS[name] ?? name.replaceAll("_", " "));
+}
+
 function termsOf(steps: readonly StepView[]): Series[] {
   const names = [...new Set(steps.flatMap((s) => Object.keys(s.terms)))];
-  return names.slice(0, 8).map((label) => ({ label, values: steps.map((s) => s.terms[label] ?? null) }));
+  return names
+    .slice(0, 8)
+    .map((name) => ({ label: termWords(name), values: steps.map((s) => s.terms[name] ?? null) }));
 }
 
 /** A vehicle's whole way with its depths. */

@@ -342,7 +342,15 @@ export async function deleteMission(id: string): Promise<void> {
   await refresh();
 }
 
-async function send<T>(what: string, answer: Promise<T>): Promise<T | null> {
+/** Takes a vehicle back that left and sends it home: nobody else leads it there. */
+export async function bringHome(name: string): Promise<void> {
+  const id = selectedId.value;
+  if (!id || !(await send(`taking ${name} back`, api.rejoin(id, name)))) return;
+  await send(`return of ${name}`, api.returnVehicle(id, name));
+}
+
+/** Awaits an answer; null where the service refused, which is shown. */
+export async function send<T>(what: string, answer: Promise<T>): Promise<T | null> {
   try {
     const found = await answer;
     refusal.value = null;
@@ -360,4 +368,11 @@ export async function createMission(mission: NewMission): Promise<string> {
   await refresh();
   selectMission(created.id);
   return created.id;
+}
+
+/** Replaces what a mission is to do that has not started; it stays where it is in the list. */
+export async function describeMission(id: string, mission: NewMission): Promise<void> {
+  await api.describe(id, mission);
+  await refresh();
+  selectMission(id);
 }

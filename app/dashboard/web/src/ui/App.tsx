@@ -4,13 +4,14 @@ import { signedOut } from "../state/access";
 import { dialogOpen, in3d, mission, panelOpen, stripHeight } from "../state/store";
 import { AbortDialog } from "./AbortDialog";
 import { AccountDialog } from "./Account";
+import { Attention } from "./Attention";
 import { BottomStrip } from "./BottomStrip";
 import { ChartPane } from "./ChartPane";
-import { Alarms } from "./EventLog";
 import { FinishDialog } from "./FinishDialog";
 import { FleetDialog } from "./FleetDialog";
 import { Legend } from "./Legend";
 import { LinksDialog } from "./LinksDialog";
+import { MapMenu } from "./MapMenu";
 import { MissionPanel } from "./MissionPanel";
 import { Notices } from "./Notices";
 import { PreflightDialog } from "./PreflightDialog";
@@ -19,6 +20,7 @@ import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom
 import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
 import { VehicleCards } from "./VehicleCards";
+import { DenserQuestion } from "./VehicleOrders";
 
 /** Before the strip's height was measured. */
 const LEAST_STRIP_PX = 106;
@@ -67,8 +69,9 @@ export function App() {
         {in3d.value ? <SpaceView /> : <Readout />}
         <Legend />
         <div class="over-map">
-          <Alarms />
+          <Attention />
           <Notices />
+          <DenserQuestion />
         </div>
       </main>
       <div class="around" inert={covered}>
@@ -76,6 +79,7 @@ export function App() {
         <VehicleCards />
         <BottomStrip />
       </div>
+      <MapMenu />
       <PreflightDialog />
       <AbortDialog />
       <LinksDialog />

@@ -3,7 +3,19 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Chart, GridFrame } from "../map/chart";
 import { latitude, longitude } from "../state/format";
-import { chosenSounding, cursor, in3d, isDark, mapCentre, measured, picking, theme } from "../state/store";
+import { mapMenu } from "../state/orders";
+import {
+  chosenSounding,
+  cursor,
+  drawing,
+  editing,
+  in3d,
+  isDark,
+  mapCentre,
+  measured,
+  picking,
+  theme,
+} from "../state/store";
 import { follow } from "./follow";
 import { MapTools } from "./MapTools";
 import { overlaid } from "./room";
@@ -36,6 +48,11 @@ export function ChartPane() {
             picking.value = null;
             if (wanted) wanted.onPicked(place);
             else if (measured.value) measured.value = [...measured.value, place];
+          },
+          onMenu: (at, x, y) => {
+            // Who draws, measures or points something out ends that first.
+            const busy = drawing.value || editing.value || measured.value || picking.value;
+            mapMenu.value = busy ? null : { at, x, y };
           },
           onSpot: (id) => {
             chosenSounding.value = id;

@@ -50,7 +50,7 @@ export function Charts() {
       ) : (
         <>
           <Plot
-            title="Coverage and remaining landmarks"
+            title="Known, and left to be known"
             xs={f.numbers}
             unit="%"
             range={[0, 100]}
@@ -66,14 +66,14 @@ export function Charts() {
             lines={[{ label: "deviation", colour: colour(2), values: f.deviation }]}
           />
           <Plot
-            title="Objective J"
+            title="What the planner aims at (objective J)"
             xs={f.numbers}
             unit=""
             lines={[{ label: "J", colour: colour(3), values: f.objective }]}
           />
           {f.terms.length > 0 ? (
             <Plot
-              title="Its terms"
+              title="The planner's own figures"
               xs={f.numbers}
               unit=""
               lines={f.terms.map((t, i) => ({ label: t.label, colour: colour(i), values: t.values }))}

@@ -1,11 +1,13 @@
 import "./EventLog.css";
 import { useComputed, useSignal } from "@preact/signals";
 import { api } from "../api/client";
-import type { Level } from "../api/types";
+import type { EventView, Level } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
+import { vehicleOf } from "../state/placeThen";
 import { said } from "../state/session";
-import { openAlarms, selectedId, takenAlarm, view } from "../state/store";
+import { selectedId, view } from "../state/store";
+import { showEvent } from "../state/whereabouts";
 import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
@@ -21,12 +23,15 @@ export function EventLog() {
   const least = useSignal<(typeof LEAST)[number][0]>("all");
   const kind = useSignal("");
   const words = useSignal("");
+  const vehicle = useSignal("");
+  const named = useComputed(() => [...new Set(view.value.events.flatMap((e) => vehicleOf(e) ?? []))].sort());
   const kinds = useComputed(() => [...new Set(view.value.events.map((e) => e.kind))].sort());
   const wanted = words.value.trim().toLowerCase();
   const lines = view.value.events
     .filter((e) => least.value !== "important" || e.level !== "info")
     .filter((e) => least.value !== "notes" || e.kind === "note")
     .filter((e) => kind.value === "" || e.kind === kind.value)
+    .filter((e) => vehicle.value === "" || vehicleOf(e) === vehicle.value)
     .filter((e) => wanted === "" || `${e.message} ${e.kind}`.toLowerCase().includes(wanted))
     .slice(-MOST_SHOWN);
   return (
@@ -46,6 +51,13 @@ export function EventLog() {
           options={[["", "Every kind"], ...same(kinds.value)]}
           onChoose={into(kind)}
         />
+        <Choice
+          label="Vehicle"
+          value={vehicle.value}
+          options={[["", "Every vehicle"], ...same(named.value)]}
+          id="log-vehicle"
+          onChoose={into(vehicle)}
+        />
         <Typed text={words} type="search" label="Words in the line" placeholder="Words" id="log-words" />
       </div>
       {lines.length === 0 ? <p class="empty">No line is like that.</p> : null}
@@ -58,7 +70,18 @@ export function EventLog() {
             <span aria-hidden="true">{SIGNS[event.level]}</span>
             <span class="kind">{event.kind}</span>
             <span class="message">
-              {event.message}
+              {hasPlace(event) ? (
+                <Button
+                  kind="log-line"
+                  id={`where-${event.id}`}
+                  title="Show on the map where that was"
+                  onClick={() => void showEvent(event)}
+                >
+                  {event.message}
+                </Button>
+              ) : (
+                event.message
+              )}
               {event.kind === "note" && event.data.actor ? <small> {String(event.data.actor)}</small> : null}
             </span>
           </li>
@@ -67,6 +90,8 @@ export function EventLog() {
     </div>
   );
 }
+
+const hasPlace = (event: EventView) => vehicleOf(event) !== null || typeof event.data.lat_deg === "number";
 
 function NoteForm() {
   const text = useSignal("");
@@ -115,44 +140,5 @@ function NoteForm() {
         </span>
       ) : null}
     </form>
-  );
-}
-
-/** Alarms stay over the map, on every page, until someone takes them. */
-export function Alarms() {
-  const alarms = openAlarms.value;
-  const fault = useSignal("");
-  const newest = alarms[0];
-  if (!newest) return <Taken />;
-  const take = async () => {
-    try {
-      await Promise.all(alarms.map(({ id }) => api.acknowledge(id)));
-      fault.value = "";
-    } catch (error) {
-      fault.value = said(error);
-    }
-  };
-  return (
-    <section class="alarms" role="alert" data-testid="alarms">
-      <p>
-        <b>✕ {clock(new Date(newest.raised_at), "utc")} UTC</b> {newest.message}
-        {alarms.length > 1 ? <small> and {alarms.length - 1} more in the log</small> : null}
-        {fault.value ? <small class="fault"> {fault.value}</small> : null}
-      </p>
-      <Button id="take-alarms" commands onClick={() => void take()}>
-        Taken
-      </Button>
-    </section>
-  );
-}
-
-/** Who took the last alarm, for a moment, so that nobody else sets out for it. */
-function Taken() {
-  const taken = takenAlarm.value;
-  if (!taken?.acknowledged_at) return null;
-  return (
-    <p class="notice" role="status" data-testid="taken-alarm">
-      {clock(new Date(taken.acknowledged_at), "utc")} UTC: {taken.acknowledged_by} took “{taken.message}”
-    </p>
   );
 }

@@ -18,7 +18,7 @@ import {
   vehicleNames,
 } from "../state/draft";
 import { placeOf } from "../state/place";
-import { createMission, deleteMission, said } from "../state/session";
+import { createMission, describeMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, editedMission, mapCentre, picking } from "../state/store";
 import { AreaFields } from "./AreaFields";
 import { AskedFields } from "./AskedFields";
@@ -89,15 +89,15 @@ export function NewMissionForm() {
     if (Object.keys(faults.value).length > 0) return;
     sending.value = true;
     try {
-      const id = await createMission(toMission(draft.value));
+      const described = toMission(draft.value);
+      if (edited) await describeMission(edited.id, described);
+      const id = edited?.id ?? (await createMission(described));
       if (draft.value.tide_table) {
         await api.setTide(id, {
           table: draft.value.tide_table,
           source: draft.value.tide_source || "tide table",
         });
       }
-      // The one that it replaces goes last: whatever fails, one of them is there.
-      if (edited) await deleteMission(edited.id);
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;
@@ -125,8 +125,8 @@ export function NewMissionForm() {
         </header>
         {edited ? (
           <p class="hint">
-            It is made anew under another number. Files that it was to begin with, and a tide table, have to
-            be given again.
+            It keeps its number and its log. One that was given depths or a tide table for its area is copied
+            instead.
           </p>
         ) : (
           <Beginnings draft={draft.value} onBegin={begin} />

@@ -1,7 +1,12 @@
 import "./Plot.css";
 import "uplot/dist/uPlot.min.css";
+import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
+import { clock } from "../state/format";
+import { csvOf, digits, fileNameOf, lineWords } from "../state/plotFile";
+import { Button, flips } from "./Controls";
+import { save } from "./saving";
 
 export interface Line {
   label: string;
@@ -9,6 +14,10 @@ export interface Line {
   dash?: number[];
   values: readonly (number | null)[];
 }
+
+/** UTC as everywhere on the page; seconds where a tick is not a whole minute. */
+const clockWords = (at_s: number): string =>
+  clock(new Date(at_s * 1000), "utc").slice(0, at_s % 60 === 0 ? 5 : 8);
 
 interface PlotProps {
   title: string;
@@ -24,13 +33,22 @@ interface PlotProps {
   down?: boolean;
 }
 
-const HEIGHT = 150;
+const HEIGHT = 170;
+const LARGE_HEIGHT = 340;
+/** Above the chart in its picture. */
+const HEAD_PX = 48;
 
-/** A small chart of lines over steps or time; the values under the cursor stand in its legend. */
+/**
+ * A chart of lines over steps or time; the values under the cursor stand in its legend. Dragging over it enlarges a part,
+ * a double click shows all again.
+ */
 export function Plot({ title, xs, lines, unit, time = false, range, down = false }: PlotProps) {
   const box = useRef<HTMLDivElement>(null);
   const chart = useRef<uPlot | null>(null);
-  const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down}`;
+  const large = useSignal(false);
+  const zoomed = useSignal(false);
+  const height = large.value ? LARGE_HEIGHT : HEIGHT;
+  const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down} ${large.value}`;
 
   // A new chart only where its lines are others; new values are set below.
   useEffect(() => {
@@ -41,13 +59,23 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
       stroke: styles.getPropertyValue("--ink-2").trim() || "#667788",
       grid: { stroke: styles.getPropertyValue("--rule").trim() || "#8884", width: 1 },
       ticks: { show: false },
-      font: "11px sans-serif",
+      font: large.value ? "13px sans-serif" : "12px sans-serif",
     };
     const made = new uPlot(
       {
         width: Math.max(160, element.clientWidth),
-        height: HEIGHT,
-        cursor: { points: { size: 6 } },
+        height,
+        cursor: { points: { size: 6 }, drag: { x: true, y: false, dist: 5 } },
+        hooks: {
+          setScale: [
+            (of, key) => {
+              const xs = of.data[0];
+              const { min, max } = of.scales.x ?? {};
+              if (key !== "x" || xs.length < 2 || min == null || max == null) return;
+              zoomed.value = min > (xs[0] as number) || max < (xs[xs.length - 1] as number);
+            },
+          ],
+        },
         legend: { show: lines.length > 1, live: true },
         tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), "UTC"),
         scales: {
@@ -55,7 +83,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
           y: { ...(range ? { range } : {}), dir: down ? -1 : 1 },
         },
         axes: [
-          { ...axis, space: 60 },
+          { ...axis, space: 70, ...(time ? { values: (_, ticks) => ticks.map(clockWords) } : {}) },
           { ...axis, size: 46, values: (_, ticks) => ticks.map((v) => `${v}${unit === "%" ? " %" : ""}`) },
         ],
         series: [
@@ -76,7 +104,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
     );
     chart.current = made;
     const watcher = new ResizeObserver(() =>
-      made.setSize({ width: Math.max(160, element.clientWidth), height: HEIGHT }),
+      made.setSize({ width: Math.max(160, element.clientWidth), height }),
     );
     watcher.observe(element);
     return () => {
@@ -87,26 +115,77 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
   }, [shape]);
 
   useEffect(() => {
-    chart.current?.setData([xs, ...lines.map((l) => l.values)] as unknown as uPlot.AlignedData);
+    // What was enlarged stays so while more comes.
+    chart.current?.setData(
+      [xs, ...lines.map((l) => l.values)] as unknown as uPlot.AlignedData,
+      !zoomed.peek(),
+    );
+    if (zoomed.peek()) chart.current?.redraw();
   });
 
-  const newest = lines
-    .map((l) => {
-      const value = l.values.at(-1);
-      return `${l.label} ${value == null ? "unknown" : `${digits(value)} ${unit}`}`;
-    })
-    .join(", ");
+  const savePicture = () => {
+    const canvas = chart.current?.root.querySelector("canvas");
+    if (!canvas) return;
+    const paper = document.createElement("canvas");
+    [paper.width, paper.height] = [canvas.width, canvas.height + HEAD_PX];
+    const pen = paper.getContext("2d");
+    if (!pen) return;
+    const styles = getComputedStyle(canvas);
+    pen.fillStyle = styles.getPropertyValue("--paper").trim() || "#ffffff";
+    pen.fillRect(0, 0, paper.width, paper.height);
+    pen.font = "bold 16px sans-serif";
+    pen.fillStyle = styles.color;
+    pen.fillText(unit ? `${title}, ${unit}` : title, 8, 20);
+    lines.forEach((line, i) => {
+      pen.fillStyle = line.colour;
+      pen.fillText(line.label, 8 + ((i * paper.width) / lines.length) * 0.98, 40);
+    });
+    pen.drawImage(canvas, 0, HEAD_PX);
+    paper.toBlob((blob) => {
+      if (blob) save(`${fileNameOf(title)}.png`, blob);
+    });
+  };
+
   return (
-    <figure class="plot">
+    <figure class={`plot${large.value ? " large" : ""}`}>
       <figcaption>
         {title}
         {unit && unit !== "%" ? <small> {unit}</small> : null}
-        <span class="visually-hidden">: {newest}</span>
+        <span class="plot-does">
+          <Button kind="link-button" aria-pressed={large.value} onClick={flips(large)}>
+            {large.value ? "Smaller" : "Larger"}
+          </Button>
+          {zoomed.value ? (
+            <Button
+              kind="link-button"
+              onClick={() => {
+                zoomed.value = false;
+                chart.current?.setData(chart.current.data, true);
+              }}
+            >
+              Show all
+            </Button>
+          ) : null}
+          <Button
+            kind="link-button"
+            title="What it shows, as a table"
+            onClick={() =>
+              save(`${fileNameOf(title)}.csv`, new Blob([csvOf(xs, lines, unit, time)], { type: "text/csv" }))
+            }
+          >
+            CSV
+          </Button>
+          <Button kind="link-button" title="What it shows, as a picture" onClick={savePicture}>
+            PNG
+          </Button>
+        </span>
       </figcaption>
       <div ref={box} aria-hidden="true" />
+      <ul class={large.value ? "plot-words" : "visually-hidden"}>
+        {lines.map((line) => (
+          <li key={line.label}>{lineWords(line, unit)}</li>
+        ))}
+      </ul>
     </figure>
   );
 }
-
-const digits = (value: number) =>
-  Math.abs(value) >= 100 ? value.toFixed(0) : Math.abs(value) >= 10 ? value.toFixed(1) : value.toPrecision(3);

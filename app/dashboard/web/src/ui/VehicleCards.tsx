@@ -3,7 +3,7 @@ import type { VehicleView } from "../api/types";
 import { age, clock, distance, metres, percent } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
-import { holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../state/session";
+import { bringHome, holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../state/session";
 import {
   abortDialogOpen,
   abortOne,
@@ -38,6 +38,7 @@ import { cardsFolded, cardsWidth, shownFolded } from "./room";
 import { SearchCard } from "./SearchCard";
 import { SwathCard } from "./SwathCard";
 import { TargetCards } from "./TargetCards";
+import { LineOrders, OrderLine } from "./VehicleOrders";
 
 export function VehicleCards() {
   const present = mission.value;
@@ -157,6 +158,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           {WAYPOINT_WORDS[vehicle.waypoint.status]}
         </p>
       ) : null}
+      <OrderLine of={v} />
       {v.active ? <Orders of={v} ended={ended} /> : null}
       {v.active ? null : (
         <p class="small left-at" data-testid={`left-${v.name}`}>
@@ -165,15 +167,28 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </p>
       )}
       {!v.active && !ended ? (
-        <Button
-          id={`rejoin-${v.name}`}
-          kind="command again"
-          commands
-          title="Let it take part again, as it was described"
-          onClick={() => void rejoin(v.name)}
-        >
-          Add again
-        </Button>
+        <div class="orders">
+          <Button
+            id={`rejoin-${v.name}`}
+            kind="command again"
+            commands
+            title="Let it take part again, as it was described"
+            onClick={() => void rejoin(v.name)}
+          >
+            Add again
+          </Button>
+          {mission.value?.state === "running" && v.recovery_point !== null ? (
+            <Button
+              id={`bring-home-${v.name}`}
+              kind="command again"
+              commands
+              title="Take it back and send it to its recovery point"
+              onClick={() => void bringHome(v.name)}
+            >
+              Bring home
+            </Button>
+          ) : null}
+        </div>
       ) : null}
     </article>
   );
@@ -244,7 +259,6 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
   const again = ended && unstopped.value.has(v.name);
   if (!present || (ended && !again)) return null;
   const led = present.state === "running" && present.ending === null;
-  const others = present.vehicles.some((one) => one.name !== v.name && one.withdrawn === "");
   return (
     <div class="orders">
       {led && v.recovery_point !== null && v.withdrawn === "" ? (
@@ -254,10 +268,10 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
           title="Send it home to its recovery point; the others go on"
           onClick={() => void returnVehicle(v.name)}
         >
-          Return
+          Bring home
         </Button>
       ) : null}
-      {led && v.withdrawn === "" && others ? (
+      {led && v.withdrawn === "" ? (
         <Button
           id={`hold-${v.name}`}
           commands
@@ -267,6 +281,7 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
           Hold
         </Button>
       ) : null}
+      <LineOrders of={v} />
       {led && isThere(v) ? (
         <Button
           id={`resume-${v.name}`}

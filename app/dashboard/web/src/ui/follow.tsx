@@ -62,6 +62,7 @@ import {
   site,
   stripHeight,
   theme,
+  type Vehicle,
   vehicles,
   view,
 } from "../state/store";
@@ -356,21 +357,29 @@ function swaths(): SwathLine[] {
 }
 
 function routes(): Route[] {
-  return vehicles.value.flatMap(({ view: { active, lon_deg, lat_deg }, waypoint, colour }) => {
-    if (!active || !waypoint || lon_deg === null || lat_deg === null) return [];
-    if (waypoint.status !== "sent" && waypoint.status !== "acknowledged") return [];
-    return [
-      {
-        points: [
-          [lon_deg, lat_deg],
-          [waypoint.lon_deg, waypoint.lat_deg],
-        ] as const,
-        colour,
-        acknowledged: waypoint.status === "acknowledged",
-        arrivalRadius_m: waypoint.arrival_radius_m,
-      },
-    ];
-  });
+  return [...vehicles.value.flatMap(orderedWay), ...vehicles.value.flatMap(routeOf)];
+}
+
+/** Where a vehicle was ordered: a mere wish until its legs are sent. */
+function orderedWay({ view: { active, order }, colour }: Vehicle): Route[] {
+  if (!active || !order || order.way.length === 0) return [];
+  return [{ points: order.way, colour, acknowledged: false, arrivalRadius_m: 0 }];
+}
+
+function routeOf({ view: { active, lon_deg, lat_deg }, waypoint, colour }: Vehicle): Route[] {
+  if (!active || !waypoint || lon_deg === null || lat_deg === null) return [];
+  if (waypoint.status !== "sent" && waypoint.status !== "acknowledged") return [];
+  return [
+    {
+      points: [
+        [lon_deg, lat_deg],
+        [waypoint.lon_deg, waypoint.lat_deg],
+      ] as const,
+      colour,
+      acknowledged: waypoint.status === "acknowledged",
+      arrivalRadius_m: waypoint.arrival_radius_m,
+    },
+  ];
 }
 
 function waypointPin(waypoint: WaypointView, colour: string): Pin {

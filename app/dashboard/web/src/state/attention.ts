@@ -1,0 +1,117 @@
+/** What needs a person: what, since when, and what to do about it. Pure. */
+
+import type { AlarmReport, AlarmView, MissionView, VehicleView } from "../api/types";
+import { clock } from "./format";
+
+export interface Matter {
+  key: string;
+  tone: "alarm" | "warning" | "calm";
+  what: string;
+  /** What to do about it. */
+  todo: string;
+  /** Milliseconds; null: nobody noted it. */
+  since: number | null;
+  vehicle: string | null;
+  /** The alarm, where it is one that somebody has to take. */
+  alarm: AlarmView | null;
+}
+
+const LOUDNESS = { alarm: 0, warning: 1, calm: 2 };
+
+/** All that needs a person, the loudest first, of these the newest. */
+export function mattersOf(mission: MissionView | null, alarms: readonly AlarmView[]): Matter[] {
+  const found = [
+    ...alarms.map(ofAlarm),
+    ...(mission ? [...ofMission(mission), ...mission.vehicles.flatMap((v) => ofVehicle(v, mission))] : []),
+  ];
+  return found.sort(
+    (a, b) =>
+      LOUDNESS[a.tone] - LOUDNESS[b.tone] || (b.since ?? 0) - (a.since ?? 0) || a.key.localeCompare(b.key),
+  );
+}
+
+const ofAlarm = (alarm: AlarmView): Matter => ({
+  key: `alarm ${alarm.id}`,
+  // What is over needs nobody any more but one who has seen it.
+  tone: alarm.severity === "minor" || alarm.ended_at !== null ? "warning" : "alarm",
+  what: alarm.message,
+  todo:
+    alarm.ended_at === null
+      ? alarm.action
+      : `it is over since ${clock(new Date(alarm.ended_at), "utc").slice(0, 5)}; take note of it`,
+  since: Date.parse(alarm.raised_at),
+  vehicle: alarm.vehicle,
+  alarm,
+});
+
+function ofMission({ id, state, reason, updated_at }: MissionView): Matter[] {
+  const since = Date.parse(updated_at);
+  const matter = { key: `mission ${id}`, vehicle: null, alarm: null };
+  if (state === "paused")
+    return [
+      { ...matter, tone: "warning", what: "The mission is paused", todo: "resume it, or finish it", since },
+    ];
+  if (state === "running" && reason !== "")
+    return [{ ...matter, tone: "warning", what: reason, todo: "read why, and see to that", since: null }];
+  return [];
+}
+
+function ofVehicle(v: VehicleView, { state, ending }: MissionView): Matter[] {
+  const matter = { key: `vehicle ${v.name}`, vehicle: v.name, alarm: null, since: null };
+  const led = state === "running" && ending === null;
+  if (!v.active) {
+    if (!led || v.phase === "home") return [];
+    return [
+      {
+        ...matter,
+        tone: "warning",
+        what: `${v.name} left the mission and nobody leads it`,
+        todo: `add it again${v.recovery_point ? ", bring it home" : ""} or recover it where it is`,
+        since: v.left_at ? Date.parse(v.left_at) : null,
+      },
+    ];
+  }
+  const warned = v.failsafes.find(({ response }) => response === "warn");
+  const found: Matter[] = warned
+    ? [
+        {
+          ...matter,
+          key: `warning ${v.name}`,
+          tone: "warning",
+          what: `${v.name}: ${warned.message}`,
+          todo: "watch it",
+        },
+      ]
+    : [];
+  if (led && v.phase === "home")
+    found.push({
+      ...matter,
+      tone: "calm",
+      what: `${v.name} is home`,
+      todo: "resume its survey with a new battery, or take it out of the water",
+    });
+  else if (led && v.phase === "stopped" && v.withdrawn !== "")
+    found.push({
+      ...matter,
+      tone: "warning",
+      what: `${v.name} waits: ${v.withdrawn}`,
+      todo: `resume its survey${v.recovery_point ? ", or bring it home" : ""}`,
+    });
+  return found;
+}
+
+/** Who was told of an alarm and when, the newest first; empty when nobody was to be told yet. */
+export function toldWords({ deliveries }: Pick<AlarmReport, "deliveries">): string {
+  return [...deliveries]
+    .sort((a, b) => b.created_at.localeCompare(a.created_at))
+    .map(({ recipient, notice, state, done_at, error }) => {
+      const after =
+        notice === "escalated" ? ", as nobody took it" : notice === "ended" ? " that it is over" : "";
+      const at = done_at ? ` at ${clock(new Date(done_at), "utc").slice(0, 5)}` : "";
+      if (state === "delivered") return `${recipient} was told${at}${after}`;
+      if (state === "failed") return `${recipient} could not be told: ${error}`;
+      return state === "waiting" ? `${recipient} is being told${after}` : "";
+    })
+    .filter((words) => words !== "")
+    .join("; ");
+}

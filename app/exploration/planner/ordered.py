@@ -1,0 +1,244 @@
+"""A mission's planner beside what its operator orders: vehicles on an ordered way are led along it, the others planned.
+
+An ordered leg is proposed like a planned one and held to the same checks. What is left of an ordered way is part of the
+planner's memory: it is written down with the legs, so that an order is neither lost nor carried out twice.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.routes import FreeSpace
+from app.exploration.core.snapshot_codec import pack, unpack
+from app.exploration.planner.base import PlannerBase, at_depth
+
+KIND = "ordered"
+NEAR_M = 0.5
+"""Who is so near a corner of its way has reached it."""
+
+PARTS = (1.0, 0.6, 0.3)
+"""Parts of a leg to try where the whole one is not allowed."""
+
+MOST_TRIES = 3
+"""So many legs in a row that come to nothing end an order."""
+
+
+MOST_LOST = 6
+"""So often legs of an order are given up before the order is."""
+
+
+@dataclass
+class OrderedWay:
+    """What is left of a vehicle's ordered way: corners (k, 2), and those (j, 2) to which legs were decided.
+
+    ``tries`` are legs in a row that led nowhere, ``lost`` is how often legs were given up.
+    """
+
+    order: int
+    corners_m: FloatArray
+    tries: int = 0
+    passed_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    lost: int = 0
+
+    def remember(self) -> dict[str, Any]:
+        """Return what is stored."""
+        return {
+            "order": self.order,
+            "corners": self.corners_m,
+            "tries": self.tries,
+            "passed": self.passed_m,
+            "lost": self.lost,
+        }
+
+    @classmethod
+    def recall(cls, stored: dict[str, Any]) -> "OrderedWay":
+        """Return what was stored."""
+        corners, passed = (np.array(stored[key], dtype=np.float64).reshape(-1, 2) for key in ("corners", "passed"))
+        return cls(int(stored["order"]), corners, int(stored["tries"]), passed, int(stored["lost"]))
+
+
+class OrderedPlanner:
+    """Leads vehicles along ordered ways, and leaves the others to a planner.
+
+    Attributes
+    ----------
+    ways
+        By vehicle, its ordered way; one without corners left is decided to its end.
+    taken
+        By vehicle, the last order that was taken up.
+    refused
+        By vehicle, the last order that could not be carried out, and why.
+    """
+
+    def __init__(self, planner: PlannerBase) -> None:
+        self.planner = planner
+        self.ways: dict[str, OrderedWay] = {}
+        self.taken: dict[str, int] = {}
+        self.refused: dict[str, tuple[int, str]] = {}
+        self._since: dict[str, int] = {}
+        """How many legs the planner has decided for vehicles since their last ordered one."""
+        self._space: tuple[Constraints, FreeSpace] | None = None
+
+    @property
+    def decides_apart(self) -> bool:
+        """Whether legs may be decided for some of the vehicles while the others fly on."""
+        return self.planner.decides_apart
+
+    def lead(
+        self, vehicle: str, order: int, corners_m: FloatArray, ends_m: FloatArray, resume_at_m: FloatArray | None
+    ) -> None:
+        """Take up an order to fly along corners (k, 2), in place of legs that end at ``ends_m`` (n, 2).
+
+        The planner goes on from ``resume_at_m`` (2,) when the way was flown.
+        """
+        before = self.ways.get(vehicle)
+        going_on = before is not None and len(before.corners_m) > 0
+        self.ways[vehicle] = OrderedWay(order, np.asarray(corners_m, dtype=np.float64).reshape(-1, 2))
+        self.taken[vehicle] = order
+        if not going_on:
+            self.planner.put_back(vehicle, ends_m, resume_at_m)
+        self._since[vehicle] = 0
+
+    def skip(self, vehicle: str, order: int, ends_m: FloatArray, begin_m: FloatArray, here_m: FloatArray) -> bool:
+        """Leave out the rest of a vehicle's line; returns False where the planner knows none.
+
+        Parameters
+        ----------
+        ends_m : (n, 2)
+            Where the legs end that are given up.
+        begin_m, here_m : (2,)
+            Where the line began, and where the vehicle is.
+        """
+        self.taken[vehicle] = order
+        self._since[vehicle] = 0
+        self.planner.put_back(vehicle, ends_m, None)
+        return self.planner.skip_line(vehicle, begin_m, here_m)
+
+    def lose(self, vehicle: str, ends_m: FloatArray) -> None:
+        """Lead a vehicle once more to corners of its way whose legs, ending at ``ends_m`` (n, 2), are not flown."""
+        way = self.ways.get(vehicle)
+        if way is None or not len(way.passed_m) or not len(ends_m):
+            return
+        away = np.hypot(*(way.passed_m[:, None] - ends_m[None]).transpose(2, 0, 1)).min(axis=1)
+        again = np.flatnonzero(away <= NEAR_M)
+        if not len(again):
+            return
+        # Legs are given up from one of them to the last.
+        way.corners_m = np.vstack([way.passed_m[again[0] :], way.corners_m])
+        way.passed_m = way.passed_m[: again[0]]
+        way.lost += 1
+        if way.lost > MOST_LOST:
+            self._refuse(vehicle, way, "its legs there came to nothing again and again")
+
+    def drop(self, vehicle: str) -> None:
+        """End a vehicle's ordered way."""
+        self.ways.pop(vehicle, None)
+
+    def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
+        """Return a configuration that obeys ``situation.constraints``."""
+        moves = situation.moves
+        led = [
+            i for i, name in enumerate(situation.vehicles) if moves[i] and self._has_way(name, situation.positions[i])
+        ]
+        planned = moves.copy()
+        planned[led] = False
+        for name, goes in zip(situation.vehicles, planned, strict=True):
+            if goes and name in self._since:
+                self._since[name] += 1
+        if not led:
+            return self.planner.propose(situation, rng)
+        proposal = self.planner.propose(replace(situation, moving=planned), rng)
+        positions = np.array(proposal.positions, dtype=np.float64)
+        belief = situation.belief
+        bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m) if belief.on_floor else Bottom.unknown()
+        for i in led:
+            self._since[situation.vehicles[i]] = 0
+            positions[i] = self._leg(situation, i, positions, bottom)
+        return replace(proposal, positions=positions, done=proposal.done - {situation.vehicles[i] for i in led})
+
+    def _has_way(self, vehicle: str, place_m: FloatArray) -> bool:
+        way = self.ways.get(vehicle)
+        if way is None:
+            return False
+        while len(way.corners_m) and np.hypot(*(way.corners_m[0] - place_m[:2])) <= NEAR_M:
+            way.passed_m = np.vstack([way.passed_m, way.corners_m[:1]])
+            way.corners_m, way.tries = way.corners_m[1:], 0
+        if way.tries >= MOST_TRIES:
+            self._refuse(vehicle, way, self.refused.get(vehicle, (0, "no leg there is allowed"))[1])
+            return False
+        return len(way.corners_m) > 0
+
+    def _refuse(self, vehicle: str, way: OrderedWay, why: str) -> None:
+        self.refused[vehicle] = (way.order, why)
+        del self.ways[vehicle]
+
+    def _leg(self, situation: Situation, row: int, positions: FloatArray, bottom: Bottom) -> FloatArray:
+        """Return the end (3,) of a vehicle's next leg along its way."""
+        way, origin, constraints = self.ways[situation.vehicles[row]], situation.positions, situation.constraints
+        space = self._free(constraints)
+        here_m = origin[row, :2]
+        corner_m = space.way(here_m, space.nearest(way.corners_m[0]))[0]
+        away_m = float(np.hypot(*(corner_m - here_m)))
+        whole_m = min(away_m, constraints.max_step_m * (1.0 - 1e-9))
+        tries = np.repeat(positions[None], len(PARTS), axis=0)
+        for k, part in enumerate(PARTS):
+            tries[k, row, :2] = here_m + part * whole_m / max(away_m, 1e-12) * (corner_m - here_m)
+        tries = at_depth(constraints, bottom, origin, tries[..., :2], positions[:, 2])
+        allowed = np.flatnonzero(constraints.feasible(origin, tries, bottom))
+        if len(allowed):
+            way.tries = 0
+            return np.asarray(tries[allowed[0], row])
+        way.tries += 1
+        broken = constraints.violations(situation.vehicles, origin, tries[0], bottom)
+        why = next((one.reason for one in broken if one.vehicle == situation.vehicles[row]), "others are in the way")
+        self.refused[situation.vehicles[row]] = (way.order, why)
+        return np.asarray(origin[row])
+
+    def _free(self, constraints: Constraints) -> FreeSpace:
+        if self._space is None or self._space[0] is not constraints:
+            self._space = constraints, FreeSpace(constraints, 0.0)
+        return self._space[1]
+
+    def take_back(self, legs: Mapping[str, int]) -> bool:
+        """See :meth:`.PlannerBase.take_back`; ordered legs are not taken back."""
+        if any(count > self._since.get(name, count) for name, count in legs.items()):
+            return False
+        if not self.planner.take_back(legs):
+            return False
+        for name, count in legs.items():
+            if name in self._since:
+                self._since[name] -= count
+        return True
+
+    def snapshot(self) -> bytes:
+        """Return the planner's memory, and the ordered ways."""
+        memory = self.planner.snapshot()
+        if not self.taken:
+            return memory
+        ways = {name: way.remember() for name, way in self.ways.items()}
+        state: dict[str, Any] = {"ways": ways, "taken": self.taken, "refused": self.refused, "since": self._since}
+        return pack(KIND, {**state, "planner": memory.decode()})
+
+    def restore(self, memory: bytes) -> None:
+        """Take up a memory made by ``snapshot``, or by the planner alone. Raises ValueError when it is not one."""
+        if not memory.startswith(b'{"kind":"ordered"'):
+            self.planner.restore(memory)
+            self.ways, self.taken, self.refused, self._since = {}, {}, {}, {}
+            return
+        state = unpack(KIND, memory)
+        try:
+            inner = str(state["planner"]).encode()
+            ways = {str(name): OrderedWay.recall(way) for name, way in state["ways"].items()}
+            taken = {str(name): int(order) for name, order in state["taken"].items()}
+            refused = {str(name): (int(order), str(why)) for name, (order, why) in state["refused"].items()}
+            since = {str(name): int(count) for name, count in state["since"].items()}
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise ValueError(f"the memory of ordered ways lacks or garbles a field: {error}") from error
+        self.planner.restore(inner)
+        self.ways, self.taken, self.refused, self._since = ways, taken, refused, since

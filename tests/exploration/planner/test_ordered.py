@@ -1,0 +1,156 @@
+"""Ordered ways: flown within every limit, to their end, remembered exactly, and the planner goes on after them."""
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Polygon
+
+from app.estimation import SingleBeam
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Situation
+from app.exploration.core.routes import FreeSpace
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planner.ordered import OrderedPlanner
+from app.exploration.planners import create_planner
+from tests.support.situations import SQUARE, make_belief, make_situation
+
+HOLLOW = np.array([[0, 0], [100, 0], [100, 100], [60, 100], [60, 30], [40, 30], [40, 100], [0, 100]], dtype=float)
+ZONE = np.array([[70.0, 40.0], [85.0, 40.0], [85.0, 60.0], [70.0, 60.0]])
+OPTIONS = PlannerOptions(search=20, candidates=20)
+
+
+def planner_of(name: str) -> OrderedPlanner:
+    return OrderedPlanner(create_planner(name, OPTIONS, SingleBeam()))
+
+
+def fly(planner: OrderedPlanner, situation: Situation, legs: int) -> list[np.ndarray]:
+    """Let planned legs be flown as they are; the places (n_vehicles, 3) one after the other."""
+    places = [np.array(situation.positions)]
+    for step in range(1, legs + 1):
+        here = replace(situation, step=step, positions=places[-1])
+        found = planner.propose(here, np.random.default_rng([7, step]))
+        assert not here.constraints.violations(here.vehicles, places[-1], found.positions)
+        places.append(np.array(found.positions))
+    return places
+
+
+@given(goal=st.tuples(st.floats(1.0, 99.0), st.floats(1.0, 99.0)), after=st.integers(0, 12))
+@settings(max_examples=8)
+def test_a_vehicle_gets_where_it_is_ordered_round_zones_and_inside_the_area(
+    goal: tuple[float, float], after: int
+) -> None:
+    constraints = Constraints(HOLLOW, (ZONE,), max_step_m=12.0, max_depth_m=20.0, min_separation_m=2.0)
+    space = FreeSpace(constraints, 0.0)
+    corner = space.nearest(np.array(goal))
+    situation = make_situation(constraints=constraints, belief=make_belief(known=False))
+    planner = planner_of("lawnmower")
+    here = fly(planner, situation, after)[-1]
+    planner.lead("a", 1, corner[None], np.zeros((0, 2)), here[0, :2])
+    places = fly(planner, replace(situation, positions=here), 35)
+    away = [float(np.hypot(*(place[0, :2] - corner))) for place in places]
+    assert min(away) <= 0.5, "it came there"
+    assert not len(planner.ways["a"].corners_m)
+    for a, b in pairwise(places):
+        for i in (0, 1):
+            leg = LineString([a[i, :2], b[i, :2] + 1e-9])
+            assert Polygon(HOLLOW).buffer(1e-4).covers(leg)
+            assert not Polygon(ZONE).buffer(-1e-4).intersects(leg)
+
+
+def test_a_place_nobody_may_be_at_ends_the_order_and_not_the_survey() -> None:
+    constraints = Constraints(SQUARE, max_step_m=10.0, max_depth_m=20.0, min_separation_m=5.0)
+    planner, situation = planner_of("lawnmower"), make_situation(constraints=constraints)
+    here = fly(planner, situation, 3)[-1]
+    # The other one waits there, and does not move.
+    planner.lead("a", 4, here[1:, :2], np.zeros((0, 2)), here[0, :2])
+    alone = replace(situation, positions=here, moving=np.array([True, False]))
+    places = fly(planner, alone, 12)
+    assert planner.refused["a"][0] == 4
+    assert "another vehicle" in planner.refused["a"][1]
+    assert "a" not in planner.ways
+    assert np.hypot(*(places[-1][0] - places[-3][0])[:2]) > 5.0, "it goes on with its lines"
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+def test_a_memory_taken_up_goes_on_as_if_nothing_had_happened(name: str) -> None:
+    whole, situation = planner_of(name), make_situation()
+    here = fly(whole, situation, 4)[-1]
+    whole.lead("a", 9, np.array([[80.0, 80.0], [20.0, 80.0]]), np.zeros((0, 2)), here[0, :2])
+    there = fly(whole, replace(situation, positions=here), 5)[-1]
+    again = planner_of(name)
+    again.restore(whole.snapshot())
+    assert again.snapshot() == whole.snapshot()
+    assert again.taken == {"a": 9}
+    on = replace(situation, positions=there)
+    assert np.array_equal(np.array(fly(whole, on, 25)), np.array(fly(again, on, 25)))
+    # One who never ordered anything finds the planner's own memory.
+    plain = planner_of(name)
+    fly(plain, situation, 2)
+    inner = create_planner(name, OPTIONS, SingleBeam())
+    inner.restore(plain.snapshot())
+    again.restore(inner.snapshot())
+    assert (again.ways, again.taken) == ({}, {})
+    with pytest.raises(ValueError, match="memory"):
+        again.restore(b'{"kind":"ordered","version":1,"memory":{}}')
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+def test_the_survey_goes_on_where_it_was_left(name: str) -> None:
+    planner, situation = planner_of(name), make_situation(steps=200, vehicles=("a",))
+    places = fly(planner, situation, 6)
+    # It turns back from the end of its fourth leg: the last two are not flown.
+    left = places[4][0, :2]
+    planner.lead("a", 1, np.array([[90.0, 50.0]]), np.array([place[0, :2] for place in places[5:]]), left)
+    after = fly(planner, replace(situation, positions=places[4]), 40)
+    for place in [left, *(place[0, :2] for place in places[5:])]:
+        ways = [LineString([a[0, :2], b[0, :2] + 1e-9]) for a, b in pairwise(after)]
+        assert min(way.distance(LineString([place, place + 1e-6])) for way in ways[12:]) < 2.0
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+def test_the_rest_of_a_line_is_left_out(name: str) -> None:
+    planner, situation = planner_of(name), make_situation(steps=200, vehicles=("a",))
+    places = fly(planner, situation, 3)
+    here = places[-1][0, :2]
+    line = places[-1][0, :2] - places[-2][0, :2]
+    ahead = here + 4.0 * line  # where it would be in four legs
+    assert planner.skip("a", 1, np.zeros((0, 2)), places[1][0, :2], here)
+    after = fly(planner, replace(situation, positions=places[-1]), 12)
+    assert min(float(np.hypot(*(place[0, :2] - ahead))) for place in after) > 2.0
+    assert not planner_of("random").skip("a", 1, np.zeros((0, 2)), here, here)
+
+
+def test_ordered_legs_are_not_taken_back() -> None:
+    planner, situation = planner_of("cao"), make_situation(steps=200)
+    here = fly(planner, situation, 4)[-1]
+    planner.lead("a", 1, np.array([[80.0, 80.0]]), np.zeros((0, 2)), here[0, :2])
+    there = fly(planner, replace(situation, positions=here), 2)[-1]
+    assert not planner.take_back({"a": 1})
+    fly(planner, replace(situation, positions=there), 12)
+    assert not planner.take_back({"a": 12})
+    memory: Any = planner.snapshot()
+    assert planner.take_back({"a": 1, "b": 1})
+    assert planner.snapshot() != memory
+
+
+def test_legs_that_are_given_up_are_decided_again() -> None:
+    planner, situation = planner_of("lawnmower"), make_situation(steps=200, vehicles=("a",))
+    here = fly(planner, situation, 2)[-1]
+    goal = here[0, :2] + np.array([25.0, 0.0])
+    planner.lead("a", 1, goal[None], np.zeros((0, 2)), here[0, :2])
+    legs = fly(planner, replace(situation, positions=here), 5)
+    assert not len(planner.ways["a"].corners_m), "its last leg is decided"
+    planner.lose("a", np.array([leg[0, :2] for leg in legs[2:4]]))
+    assert planner.ways["a"].corners_m.tolist() == [goal.tolist()]
+    again = fly(planner, replace(situation, positions=legs[1]), 3)
+    assert np.allclose(again[-1][0, :2], goal) or np.allclose(again[-2][0, :2], goal)
+    for _ in range(10):
+        fly(planner, replace(situation, positions=again[0]), 4)
+        planner.lose("a", goal[None])
+    assert planner.refused["a"][0] == 1
+    assert "a" not in planner.ways
