@@ -81,4 +81,6 @@ def march(
 
 def warm_up() -> None:
     """Compile, or load from the cache, what would else be compiled while vehicles move."""
-    march(np.full((2, 2), 5.0), 1.0, 1.0, 1.0, 0.0, np.array([[0.0, 0.0, 1.0]]), 5.0, 5.0, 10.0)
+    floor = np.full((2, 2), 5.0)
+    floor.setflags(write=False)  # as those of terrains are: numba compiles anew for arrays that may be written
+    march(floor, 1.0, 1.0, 1.0, 0.0, np.array([[0.0, 0.0, 1.0]]), 5.0, 5.0, 10.0)

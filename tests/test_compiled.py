@@ -1,13 +1,17 @@
 """The service starts for a user who may write nothing but temporary files, and compiles beside its start."""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
+import pytest
+
 from app import compiled
-from app.compiled import PARTS, compile_beside, wait_for_compiling
+from app.compiled import FIRST, PARTS, PROCESSES, compile_beside, wait_for_compiling
 from tests.support.faults.other_users import SERVICE, as_user, needs_root
 from tests.support.paths import PROJECT
 
@@ -54,10 +58,35 @@ def test_what_an_earlier_start_compiled_is_not_compiled_again() -> None:
         compile_beside()
         wait_for_compiling()
         compile_beside()
-        assert {name: process.returncode for name, process in compiled._beside.items()} == dict.fromkeys(PARTS, 0)
+        assert len(set(compiled._beside.values())) == 2
+        assert {name: process.wait() for name, process in compiled._beside.items()} == dict.fromkeys(PARTS, 0)
         assert len(list(folder.glob("bathyfleet-*.compiled"))) == len(PARTS)
     finally:
         compiled._beside.clear()
+
+
+def test_each_part_is_compiled_by_one_process_after_what_it_calls() -> None:
+    order = [part for parts in PROCESSES for part in parts]
+    assert sorted(order) == sorted(PARTS)
+    # What the first waypoint waits for waits for nothing else, and processes do not wait for each other in circles.
+    assert {part for part in FIRST if PARTS[part].after} == set()
+    done: set[str] = set()
+    while len(done) < len(PARTS):
+        ready = {part for part in PARTS if part not in done and done.issuperset(PARTS[part].after)}
+        assert ready
+        done |= ready
+
+
+def test_a_service_that_ends_waits_for_no_other_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as endless:
+        monkeypatch.setattr(compiled, "_beside", {"maps": endless})
+        monkeypatch.setattr(compiled, "_mark", lambda _part: Path("/nowhere/mark"))
+        ending = threading.Event()
+        ending.set()
+        assert not wait_for_compiling("maps", ending=ending)
+        assert endless.poll() is None
+        endless.communicate(b"\n")
+        assert wait_for_compiling("maps"), "a process that ended is waited for no longer"
 
 
 KERNEL = """
@@ -88,3 +117,51 @@ def test_code_compiled_for_names_of_an_earlier_version_is_compiled_again(tmp_pat
         command = [sys.executable, "-B", "-c", program]
         ended = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=120, check=False)
         assert ended.stdout.strip() == "6.0", ended.stderr
+
+
+WHOLE = """
+import numba
+from app.floor import {imported}
+
+@numba.njit(cache=True)
+def whole(x):
+    return scaled(x) + 1.0
+"""
+PARTIAL = """
+import numba
+from app.sizes import FACTOR
+
+@numba.njit(cache=True)
+def scaled(x):
+    return FACTOR * x
+"""
+REPORT = (
+    "import app.compiled_index; from app.whole import whole; print(whole(2.0), sum(whole.stats.cache_hits.values()))"
+)
+
+
+def test_a_function_is_compiled_again_when_one_that_it_calls_or_a_constant_of_that_changed(tmp_path: Path) -> None:
+    package = tmp_path / "app"
+    package.mkdir()
+    for name in ("__init__.py", "compiled_index.py", "compiled_sources.py"):
+        shutil.copy(PROJECT / "app" / name, package / name)
+
+    def result(*, factor: float, imported: str = "scaled", aside: str = "") -> list[float]:
+        (package / "sizes.py").write_text(f"FACTOR = {factor}\n")
+        (package / "floor.py").write_text(PARTIAL)
+        (package / "whole.py").write_text(WHOLE.format(imported=imported))
+        (package / "aside.py").write_text(aside)
+        variables = {name: text for name, text in os.environ.items() if not name.startswith(("NUMBA_", "PYTHON"))}
+        variables |= {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}
+        command = [sys.executable, "-B", "-c", REPORT]
+        ended = subprocess.run(
+            command, env=variables, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert ended.returncode == 0, ended.stderr
+        return [float(word) for word in ended.stdout.split()]
+
+    assert result(factor=3.0) == [7.0, 0.0]
+    assert result(factor=3.0, aside="FACTOR = 9.0\n") == [7.0, 1.0], "what it does not import is no matter"
+    assert result(factor=5.0) == [11.0, 0.0], "a constant of a module that a called one imports"
+    assert result(factor=5.0, imported="(\n    scaled,  # in more than one line\n)") == [11.0, 0.0]
+    assert result(factor=4.0, imported="(\n    scaled,  # in more than one line\n)") == [9.0, 0.0]

@@ -182,13 +182,13 @@ def _start(position: FloatArray, ranges: FloatArray, noise: float) -> tuple[Floa
 
 
 class _Measured(NamedTuple):
-    """What one vehicle measured at ``position`` (3,): ``ranges`` (k,) of landmarks ``index`` (k,).
+    """What one vehicle measured at ``position`` (3,): ``ranges`` (k,) of ``landmarks`` (k,), by number.
 
     ``noise`` is relative to a range, ``blur`` the variance of the vehicle's own place along east and along north, m^2.
     """
 
     position: FloatArray
-    index: IntArray
+    landmarks: IntArray
     ranges: FloatArray
     noise: float
     blur: float
@@ -210,11 +210,11 @@ def _take(
 
     ``looks``, ``mean``, ``covariance`` are of all landmarks; ``row`` is the bundle of each, -1 for a single filter.
     """
-    position, index, ranges, noise, blur = measured
+    position, landmarks, ranges, noise, blur = measured
     means, covariances, weights = bundles
     single = np.zeros(len(means), dtype=np.bool_)
-    for k in range(len(index)):
-        m = index[k]
+    for k in range(len(landmarks)):
+        m = landmarks[k]
         b = row[m]
         if b < 0:
             _filter(mean[m], covariance[m], position, ranges[k], noise, blur)

@@ -113,7 +113,8 @@ class MissionService:
         """Maps that are made while nobody waits for them."""
         self.web_tiles = WebTiles()
         """Tiles of maps for web maps and GIS."""
-        self._compilation = Compilation(self._executor)
+        self._compiling = ThreadPoolExecutor(WORKERS, thread_name_prefix="compiling")
+        self._compilation = Compilation(self._compiling)
         self.forecaster = Forecaster(self.hub, self._compilation)
         """Flies missions ahead."""
         self._supervisor = MissionSupervisor(
@@ -173,6 +174,8 @@ class MissionService:
         await self._supervisor.close()
         await self._registry.close()
         await self.process.leave()
+        self._compilation.end()
+        self._compiling.shutdown(wait=True, cancel_futures=True)
         self._executor.shutdown(wait=True, cancel_futures=True)
         self.forecaster.close()
         self.web_tiles.close()

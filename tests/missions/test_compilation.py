@@ -78,7 +78,7 @@ def test_an_executor_that_ends_cancels_what_waits_to_be_compiled(waiting: str, m
     def compile_planner(*_: object) -> None:
         executor.submit(block)  # ahead of the maps, which are submitted when this has ended
 
-    monkeypatch.setattr(compilation, "_warm_up", compile_planner)
+    monkeypatch.setattr(compilation.Compilation, "_warm_up", compile_planner)
     if waiting == "planner":
         executor.submit(block)
         busy.wait()
@@ -92,3 +92,4 @@ def test_an_executor_that_ends_cancels_what_waits_to_be_compiled(waiting: str, m
     let_go.set()
     assert not end.is_alive()
     assert compiling.done
+    assert compiling._search.cancelled()

@@ -265,3 +265,10 @@ def _corners(region: BaseGeometry) -> FloatArray:
     parts = [p for p in getattr(region, "geoms", [region]) if isinstance(p, Polygon)]
     rings = [np.asarray(ring.coords)[:-1] for part in parts for ring in (part.exterior, *part.interiors)]
     return np.vstack(rings) if rings else np.zeros((0, 2))
+
+
+def warm_up() -> None:
+    """Compile what follows routes, or load it from the cache of an earlier start."""
+    route = np.array([[0.0, 1.0]])
+    next_waypoint(0.0, 0.0, route, 0, 1, 1.0, 0.0)
+    flown_m(0.0, 0.0, 0.0, route, Turns(0.0, 0.0))

@@ -7,6 +7,7 @@ from numba import njit
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Constraints, Region
+from app.exploration.core.copies import copy_row, copy_rows
 from app.exploration.core.geometry import enters, leaves, signed_distance
 from app.exploration.core.routes import Turns, Underway, Vehicles, set_out
 from app.exploration.survey.value import Nodes, SurveyObjective, expected_error, lower_to_leg, make_nodes
@@ -235,7 +236,7 @@ def _fly(
 ) -> None:
     """Fly a vehicle's route anew from its leg ``first`` on."""
     for k in range(first, plan.counts[v]):
-        flights.d2[v, k + 1] = flights.d2[v, k]
+        copy_row(flights.d2[v, k + 1], flights.d2[v, k])
         at = _under_way(flights.at[v, k])
         after = lower_to_leg(flights.d2[v, k + 1], nodes, objective, at, plan.vias[v, k, 0], plan.vias[v, k, 1], left_m)
         for i, value in enumerate(after):
@@ -254,7 +255,7 @@ def _try(
     plan: ViaPoints,
 ) -> None:
     """Set ``d2`` (m,) to what it is after a vehicle's route, which is as it was up to its leg ``first``."""
-    d2[:] = flights.d2[v, first]
+    copy_row(d2, flights.d2[v, first])
     at = _under_way(flights.at[v, first])
     for k in range(first, plan.counts[v]):
         if at.flown_m >= left_m:
@@ -310,7 +311,7 @@ def improve(
         for i, number in enumerate(set_out(starts[v, 0], starts[v, 1], headings[v])):
             flights.at[v, 0, i] = number
         _fly(flights, v, 0, nodes, objective, left_m[v], plan)
-        after[v] = flights.d2[v, plan.counts[v]]
+        copy_row(after[v], flights.d2[v, plan.counts[v]])
     running = _left(d2, after, weight, scale, power)
     value = running[-1]
     best, best_counts, best_value = current.copy(), current_counts.copy(), value
@@ -337,18 +338,19 @@ def improve(
                 running = left
                 if value < best_value:
                     best_value = value
-                    best[:] = plan.vias
-                    best_counts[:] = plan.counts
+                    for v in range(n):
+                        copy_rows(best[v], plan.vias[v])
+                        best_counts[v] = plan.counts[v]
         for v in range(n):
             if changed[v] and keep:
-                current[v] = plan.vias[v]
+                copy_rows(current[v], plan.vias[v])
                 current_counts[v] = plan.counts[v]
-                after[v] = trial[v]
+                copy_row(after[v], trial[v])
                 _fly(flights, v, first[v], nodes, objective, left_m[v], plan)
             elif changed[v]:
-                plan.vias[v] = current[v]
+                copy_rows(plan.vias[v], current[v])
                 plan.counts[v] = current_counts[v]
-                trial[v] = after[v]
+                copy_row(trial[v], after[v])
     return best, best_counts, best_value
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
+from app.exploration.core.copies import copy_row, copy_rows
 from app.exploration.core.routes import Turns, Underway, Vehicles, after_leg, set_out
 
 BUCKETS_PER_SIDE = 12
@@ -232,9 +233,11 @@ def values_after_first_leg(
         after = d2.copy()
         for j in range(n):
             start, heading, left = vehicles.en_m[j], vehicles.headings_rad[j], vehicles.left_m[j]
-            route[0] = targets[i, j]
-            route[1:] = vias[i, j]
-            lower_to_route(first, nodes, objective, start, heading, left, route, 1)
+            copy_row(route[0], targets[i, j])
+            copy_rows(route[1:], vias[i, j])
+            # From the counts as below: numba compiles lower_to_route once more for the number 1 itself.
+            only_first = counts[i, j] * 0 + 1
+            lower_to_route(first, nodes, objective, start, heading, left, route, only_first)
             lower_to_route(after, nodes, objective, start, heading, left, route, counts[i, j] + 1)
         out[i, 0] = uncertainty(first, nodes.weight, objective.scale_m, objective.power)
         out[i, 1] = uncertainty(after, nodes.weight, objective.scale_m, objective.power)

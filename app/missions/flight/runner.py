@@ -6,6 +6,7 @@ crash between any two moments loses nothing and repeats nothing but the sending,
 """
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from concurrent.futures import Executor
 
 import numpy as np
@@ -49,16 +50,25 @@ class Runner:
     ----------
     time_scale
         How much faster than the wall clock the vehicles live.
+    maps_ready
+        Returns when what maps are made with is compiled.
     """
 
-    def __init__(self, live: LiveMission, hub: FleetHub, executor: Executor, time_scale: float) -> None:
+    def __init__(
+        self,
+        live: LiveMission,
+        hub: FleetHub,
+        executor: Executor,
+        time_scale: float,
+        maps_ready: Callable[[], Awaitable[None]],
+    ) -> None:
         self._live = live
         self._time_scale = time_scale
         self._constraints = constraints = make_constraints(live.spec)
         planner = OrderedPlanner(make_planner(live.spec, live.planning_sensor))
         linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
         self._apart = live.search is None and not linked and planner.decides_apart
-        self._maps = StepMaps(live, executor, time_scale)
+        self._maps = StepMaps(live, executor, time_scale, maps_ready)
         self._waiting = Waiting(live)
         self._lookout = SearchHooks(live, time_scale, self._waiting.until)
         self._decider = Decider(live, constraints, planner, self._maps, executor)

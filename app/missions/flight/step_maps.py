@@ -3,6 +3,7 @@
 import asyncio
 import math
 import threading
+from collections.abc import Awaitable, Callable
 from concurrent.futures import Executor, Future
 
 import structlog
@@ -32,12 +33,17 @@ class StepMaps:
         Whose threads make and refine maps.
     time_scale
         How much faster than the wall clock the vehicles live.
+    ready
+        Returns when what maps are made with is compiled: it takes longer where two threads or processes do it.
     """
 
-    def __init__(self, live: LiveMission, executor: Executor, time_scale: float) -> None:
+    def __init__(
+        self, live: LiveMission, executor: Executor, time_scale: float, ready: Callable[[], Awaitable[None]]
+    ) -> None:
         self._live = live
         self._executor = executor
         self._time_scale = time_scale
+        self._ready = ready
         self._took_s = 0.0
         self._made_at_s = -math.inf
         self._making: asyncio.Task[None] | None = None
@@ -85,6 +91,8 @@ class StepMaps:
         await live.journal.flush()
         await live.whole.complete()
         await live.swath.complete()
+        if live.builder.newest is None:
+            await self._ready()
         before = live.builder.newest
         built = await loop.run_in_executor(self._executor, live.builder.build)
         if built is not None and built is not before:

@@ -141,7 +141,7 @@ class Forecaster:
         if not ours:
             raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
         # The time that a forecast may take is for steps, not for compiling.
-        await self._compilation.maps()
+        await self._compilation.search()
         gone = threading.Event()
         known = np.zeros((0, 4)) if prior is None else prior
         starts, where = await asyncio.to_thread(starts_of, spec, ours)

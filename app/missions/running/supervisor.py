@@ -79,7 +79,7 @@ class MissionSupervisor:
 
         def fly() -> Awaitable[str]:
             # Made where its failure ends this mission alone: its planner may be gone since the mission was begun.
-            return Runner(live, self._hub, self._executor, self._time_scale).run()
+            return Runner(live, self._hub, self._executor, self._time_scale, self._compilation.maps).run()
 
         self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
 

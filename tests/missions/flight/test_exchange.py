@@ -32,6 +32,10 @@ TIME_SCALE = 0.01
 ASIDE_M = 0.4
 
 
+async def _at_once() -> None:
+    """Everything is compiled."""
+
+
 class Flight:
     """Two vehicles that each fly a leg and have others ahead, and what decides and commits these."""
 
@@ -41,7 +45,7 @@ class Flight:
         constraints = make_constraints(spec)
         self.planner = make_planner(spec)
         self.committing = LegCommit(live, constraints, leads=False)
-        maps = StepMaps(live, executor, TIME_SCALE)
+        maps = StepMaps(live, executor, TIME_SCALE, _at_once)
         self.decider = Decider(live, constraints, self.planner, maps, executor)
         ways = RangeLeft(live, constraints, self.committing)
         self.exchange = LegExchange(live, self.decider, self.committing, ways, TIME_SCALE)

@@ -85,7 +85,7 @@ class Listed(NamedTuple):
     ----------
     points : (k, 3)
         Where they are.
-    index : (k,), starts : (2 * n_vehicles + 1,)
+    rows : (k,), starts : (2 * n_vehicles + 1,)
         As returned by :func:`within_reach`.
     needed : (n,)
         Information (inverse variance) that each landmark lacks, one entry for each landmark that there is.
@@ -94,7 +94,7 @@ class Listed(NamedTuple):
     """
 
     points: FloatArray
-    index: IntArray
+    rows: IntArray
     starts: NDArray[np.int64]
     needed: FloatArray
     direction: FloatArray | None = None
@@ -126,8 +126,8 @@ def predict(
     step : float
         Unit of distance.
     """
-    near, index, starts, needed, direction = listed
-    members, slot = np.unique(index, return_inverse=True)
+    near, rows, starts, needed, direction = listed
+    members, slot = np.unique(rows, return_inverse=True)
     unit = 1.0 / (noise * noise * needed[members])
     owner = np.repeat(np.arange(len(positions)), np.diff(starts[::2]))
     # Single precision, relative to where each vehicle is now: twice as many at once, and to a millionth of the range.
@@ -144,7 +144,7 @@ def predict(
         else np.ascontiguousarray(direction.T, dtype=np.float32),
     )
     moves = (candidates - positions).astype(np.float32)
-    parts = np.array_split(moves, WORKERS) if len(moves) * len(index) >= WORTH_SHARING else [moves]
+    parts = np.array_split(moves, WORKERS) if len(moves) * len(rows) >= WORTH_SHARING else [moves]
     done = (
         _pool().map(lambda part: _predict(part, *arguments), parts) if len(parts) > 1 else [_predict(moves, *arguments)]
     )

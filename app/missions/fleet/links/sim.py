@@ -2,12 +2,14 @@
 
 import asyncio
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import structlog
 
+from app.compiled import RAYS, wait_for_compiling
 from app.missions.clock import now
 from app.missions.fleet.interface import (
     BeamGeometry,
@@ -229,15 +231,17 @@ class SimFleetLink(FleetLink):
         self._swimmers: dict[str, _Swimmer] = {}
         self._sink: EventSink = lambda _event: None
         self._task: asyncio.Task[None] | None = None
+        self._ending = threading.Event()
 
     async def start(self, sink: EventSink) -> None:
         """Let time pass from now on."""
         self._sink = sink
-        await asyncio.to_thread(warm_up)
+        self._ending.clear()
         self._task = asyncio.create_task(self._live())
 
     async def close(self) -> None:
         """Stop every vehicle and let time stand still."""
+        self._ending.set()
         for name in self._swimmers:
             await self.stop(name)
         if self._task is not None:
@@ -408,7 +412,13 @@ class SimFleetLink(FleetLink):
         self._sink(LinkReport(vehicle, LinkState.READY))
         return StopReceipt(vehicle, acknowledged=True, detail="motor off")
 
+    def _warm_up(self) -> None:
+        if wait_for_compiling(RAYS, ending=self._ending):
+            warm_up()
+
     async def _live(self) -> None:
+        # Nobody waits for that whose vehicles are real.
+        await asyncio.to_thread(self._warm_up)
         loop = asyncio.get_running_loop()
         then_s = loop.time()
         while True:
