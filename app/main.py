@@ -90,6 +90,35 @@ log = structlog.get_logger(__name__)
 warnings.filterwarnings("ignore", message=r"The 'alias' attribute with value .* was provided to the `Field")
 
 
+ROUTERS = (
+    missions.router,
+    sites.router,
+    sites.mission_router,
+    forecasts.router,
+    measurements.router,
+    corrections.router,
+    imports.router,
+    imports.charts_router,
+    maps.router,
+    maps.layers_router,
+    tiles.router,
+    tiles.tile_router,
+    features.router,
+    soundings.router,
+    pings.router,
+    targets.router,
+    searches.router,
+    streams.router,
+    fleet.router,
+    orders.router,
+    alarms.router,
+    audit_routes.router,
+    signing_in.router,
+    health_router(API),
+)
+"""In the order in which a request's path is looked for."""
+
+
 def create_app(settings: Settings | None = None, *, port: int | None = None) -> FastAPI:
     """Return the application.
 
@@ -165,42 +194,22 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         openapi_tags=openapi.TAGS,
         lifespan=lifespan,
     )
-    routers = (
-        missions.router,
-        sites.router,
-        sites.mission_router,
-        forecasts.router,
-        measurements.router,
-        corrections.router,
-        imports.router,
-        imports.charts_router,
-        maps.router,
-        maps.layers_router,
-        tiles.router,
-        tiles.tile_router,
-        features.router,
-        soundings.router,
-        pings.router,
-        targets.router,
-        searches.router,
-        streams.router,
-        fleet.router,
-        orders.router,
-        alarms.router,
-        audit_routes.router,
-        signing_in.router,
-        health_router(API),
-    )
-    for router in routers:
+    for router in ROUTERS:
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
     mount_dashboard(app, charts=settings.charts)
     problems.install(app)
     openapi.install(app)
+    _add_middleware(app, settings, limits)
+    return app
+
+
+def _add_middleware(app: FastAPI, settings: Settings, limits: RequestLimits) -> None:
+    """Add what requests pass through, from the inside out."""
     app.add_middleware(ForwardingMiddleware)
     app.add_middleware(
         BodyMiddleware,
-        intakes=Intakes(routers),
+        intakes=Intakes(ROUTERS),
         budget=Budget(settings.bytes_in_flight),
         max_bytes=settings.max_body_bytes,
         max_file_bytes=settings.max_import_bytes,
@@ -219,7 +228,6 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
     app.add_middleware(RequestMiddleware)
     app.add_middleware(UnreadBodyMiddleware)
     app.add_middleware(AddressKeyMiddleware)
-    return app
 
 
 async def _begin(service: MissionService) -> None:

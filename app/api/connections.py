@@ -35,6 +35,7 @@ def is_shared_host(settings: Settings, host: str) -> bool:
 def patient_http(settings: Settings, sockets: Sockets[asyncio.Protocol]) -> type[asyncio.Protocol]:
     """Return uvicorn's HTTP protocol that bounds a request's head, in time and size, and the open connections.
 
+    One function because the class in it needs the settings of the application: uvicorn makes its instances.
     Between requests uvicorn itself closes idle connections; the body's time is the business of the middleware.
     """
 

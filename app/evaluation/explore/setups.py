@@ -100,7 +100,10 @@ class ReportSection:
 
 
 def sections(steps: int, *, quick: bool = False) -> tuple[ReportSection, ...]:
-    """Return the report's tables for runs of ``steps`` steps; the quick ones leave out what takes long."""
+    """Return the report's tables for runs of ``steps`` steps; the quick ones leave out what takes long.
+
+    One function because it is a table.
+    """
     change = max(1, steps // 10)
     many = 5 if quick else 50
     three, ten = Setup("cao"), Setup("cao", robots=10)

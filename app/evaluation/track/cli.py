@@ -1,6 +1,6 @@
 """``bathyfleet evaluate track``: moving targets and fading localization."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -96,9 +96,11 @@ def track(
     sea_floor = generated if terrain is None else replace(terrain_of(terrain), name=terrain.stem)
     chosen = seed_list(seed, seeds)
     if write is not None:
-        _report(
-            write, sea_floor, chosen, seeds or str(seed), steps, rollouts, jobs, scheduler, only, terrain, no_run=no_run
-        )
+        report = _Report(write, steps, rollouts, jobs, scheduler, only, no_run)
+        said = seeds or str(seed)
+        command = f"bathyfleet evaluate track --write FOLDER --seeds {said} --steps {steps} --rollouts {rollouts}"
+        command += f" --jobs {jobs}" + (" --terrain FILE" if terrain else "") + (f" --only {only}" if only else "")
+        report.make(sea_floor, chosen, command)
         return
     from app.evaluation.track.setups import TrackJob
 
@@ -123,48 +125,51 @@ def track(
     compare(runs, COLUMNS, jobs, scheduler, as_json=as_json)
 
 
-def _report(
-    out: Path,
-    sea_floor: Terrain,
-    seeds: list[int],
-    said: str,
-    steps: int,
-    rollouts: int,
-    jobs: int,
-    scheduler: str | None,
-    only: str | None,
-    terrain: Path | None,
-    *,
-    no_run: bool,
-) -> None:
-    from app.evaluation.runs.facts import made
-    from app.evaluation.runs.jobs import run_jobs
-    from app.evaluation.runs.store import Results
-    from app.evaluation.track.consistency import consistency
-    from app.evaluation.track.plots import draw
-    from app.evaluation.track.report import markdown
-    from app.evaluation.track.setups import experiments, report_jobs
+@dataclass(frozen=True)
+class _Report:
+    """The report of both papers' experiments in the folder ``out``; runs kept there are not repeated."""
 
-    known = experiments(steps)
-    names = [e.name for e in known] if only is None else [name.strip() for name in only.split(",")]
-    for name in names:
-        if name not in [e.name for e in known]:
-            there = ", ".join(e.name for e in known)
-            raise typer.BadParameter(f"there is no {name!r}; choose from {there}", param_hint="--only")
-    chosen = [e for e in known if e.name in names]
-    out.mkdir(parents=True, exist_ok=True)
-    results = Results(out / "tracking.jsonl")
-    wanted = list(report_jobs(chosen, sea_floor, seeds, rollouts))
-    open_ = [] if no_run else [job for job in wanted if job.key not in results.runs]
-    with progress_bar() as bar:
-        task = bar.add_task("track", total=len(open_))
-        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
-            results.add(run)
-            bar.advance(task)
-    command = f"bathyfleet evaluate track --write FOLDER --seeds {said} --steps {steps} --rollouts {rollouts}"
-    command += f" --jobs {jobs}" + (" --terrain FILE" if terrain else "") + (f" --only {only}" if only else "")
-    facts = {**made(command, jobs), "sea floor": sea_floor.name}
-    pictures = {name: f"images/{file}" for name, file in draw(wanted, results.runs, chosen, out / "images").items()}
-    text = markdown(wanted, results.runs, chosen, facts, consistency(), pictures)
-    (out / "tracking.md").write_text(text + "\n", encoding="utf-8")
-    typer.echo(f"{out / 'tracking.md'}: {len(open_)} runs made, {len(results.runs)} kept")
+    out: Path
+    steps: int
+    rollouts: int
+    jobs: int
+    scheduler: str | None
+    only: str | None
+    no_run: bool
+
+    def make(self, sea_floor: Terrain, seeds: list[int], command: str) -> None:
+        """Fly what is missing and write it all down; ``command`` is how it was asked for."""
+        from app.evaluation.runs.facts import made
+        from app.evaluation.runs.jobs import Job, run_jobs
+        from app.evaluation.runs.store import Results
+        from app.evaluation.track.consistency import consistency
+        from app.evaluation.track.plots import draw
+        from app.evaluation.track.report import markdown
+        from app.evaluation.track.setups import experiments, report_jobs
+
+        known = experiments(self.steps)
+        names = [e.name for e in known] if self.only is None else [name.strip() for name in self.only.split(",")]
+        for name in names:
+            if name not in [e.name for e in known]:
+                there = ", ".join(e.name for e in known)
+                raise typer.BadParameter(f"there is no {name!r}; choose from {there}", param_hint="--only")
+        chosen = [e for e in known if e.name in names]
+        self.out.mkdir(parents=True, exist_ok=True)
+        results = Results(self.out / "tracking.jsonl")
+        wanted = list(report_jobs(chosen, sea_floor, seeds, self.rollouts))
+        open_ = [] if self.no_run else [job for job in wanted if job.key not in results.runs]
+        with progress_bar() as bar:
+            task = bar.add_task("track", total=len(open_))
+
+            def tell(job: Job, _step: int) -> None:
+                bar.update(task, description=job.title)
+
+            for run in run_jobs(open_, self.jobs, tell, self.scheduler):
+                results.add(run)
+                bar.advance(task)
+        facts = {**made(command, self.jobs), "sea floor": sea_floor.name}
+        drawn = draw(wanted, results.runs, chosen, self.out / "images")
+        pictures = {name: f"images/{file}" for name, file in drawn.items()}
+        text = markdown(wanted, results.runs, chosen, facts, consistency(), pictures)
+        (self.out / "tracking.md").write_text(text + "\n", encoding="utf-8")
+        typer.echo(f"{self.out / 'tracking.md'}: {len(open_)} runs made, {len(results.runs)} kept")

@@ -50,6 +50,8 @@ def reduced_state(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the state of every vehicle: vectors (n, 7, 2), figures (n, 4), and what schedules (n, 2).
 
+    One function because everything that a vehicle sees is gathered in one pass over the landmarks.
+
     Parameters
     ----------
     positions : (n, 3)
