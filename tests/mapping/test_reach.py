@@ -65,6 +65,17 @@ def test_the_deviation_grows_with_the_distance_and_planning_is_left_what_the_pro
     np.testing.assert_array_equal(np.isinf(bathymetry.claim_sd_m), away > 2.0)
 
 
+def test_a_map_without_claims_is_the_same_and_claims_nothing() -> None:
+    soundings = lines(10.0, 20.0, 30.0, 40.0)
+    whole = GaussianProcessMap().fit(soundings).predict(GRID)
+    plain = GaussianProcessMap(claims=False).fit(soundings).predict(GRID)
+    np.testing.assert_array_equal(plain.depth_m, whole.depth_m)
+    np.testing.assert_array_equal(plain.sd_m, whole.sd_m)
+    np.testing.assert_array_equal(plain.planning_sd_m, whole.planning_sd_m)
+    assert np.isinf(plain.claim_sd_m).all()
+    assert np.isfinite(whole.claim_sd_m).any()
+
+
 def test_ground_between_lines_is_known_once_they_lie_side_by_side() -> None:
     apart = np.arange(2.0, 100.0, 6.0)
     between = np.abs(GRID.east_m - 5.0) < 1.1

@@ -45,7 +45,7 @@ REACH = 4.0
 """Line spacings beyond which a place counts as quite unknown."""
 LEAVE_BACKBONE = 0.98
 """The freer plan must promise at most this part of the squared error that the backbone promises."""
-LEAVE_LINES = 0.85
+LEAVE_LINES = 0.95
 """The same where all lines are flown in order: an even survey is hard to better."""
 KNOWN = 0.5
 """A map of this part of the area at the beginning tells where it is rough."""
