@@ -61,7 +61,7 @@ BEYOND_THE_SCHEMA = {
 }
 
 
-EXAMPLES = int(os.environ.get("BATHYFLEET_EXAMPLES", "20"))
+EXAMPLES = int(os.environ.get("BATHYFLEET_EXAMPLES", "10"))
 """Requests for each operation; more of them than in every run are asked for with the variable."""
 
 
