@@ -1,3 +1,4 @@
+import { say } from "../words/say";
 import type {
   ActionView,
   AlarmView,
@@ -54,14 +55,14 @@ export async function toServiceError(response: Response): Promise<ServiceError> 
   try {
     const problem = (await response.json()) as Partial<Problem>;
     return new ServiceError(
-      problem.detail || problem.title || `The service answered ${response.status}`,
+      problem.detail || problem.title || say("service.theServiceAnswered", { status: response.status }),
       response.status,
       problem.remedy ?? "",
       problem.errors ?? [],
     );
   } catch {
     return new ServiceError(
-      `The service answered ${response.status} ${response.statusText}`,
+      say("service.theServiceAnswered2", { status: response.status, statusText: response.statusText }),
       response.status,
     );
   }
@@ -80,11 +81,7 @@ async function ask(address: string, init: RequestInit): Promise<Response> {
   try {
     response = await fetch(address, init);
   } catch {
-    throw new ServiceError(
-      "The service does not answer",
-      0,
-      "Check that it is running and that this device reaches it.",
-    );
+    throw new ServiceError(say("service.theServiceDoesNotAnswer"), 0, say("service.checkThatItIsRunningAnd"));
   }
   if (!response.ok) throw await toServiceError(response);
   return response;

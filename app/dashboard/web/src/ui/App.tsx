@@ -9,6 +9,9 @@ import { ChartPane } from "./ChartPane";
 import { Alarms } from "./EventLog";
 import { FinishDialog } from "./FinishDialog";
 import { FleetDialog } from "./FleetDialog";
+import { Heard, Others } from "./Heard";
+import { KeysDialog } from "./KeysDialog";
+import { watchKeys } from "./keys";
 import { Legend } from "./Legend";
 import { LinksDialog } from "./LinksDialog";
 import { MissionPanel } from "./MissionPanel";
@@ -16,6 +19,7 @@ import { Notices } from "./Notices";
 import { PreflightDialog } from "./PreflightDialog";
 import { Readout } from "./Readout";
 import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom } from "./room";
+import { SettingsDialog } from "./SettingsDialog";
 import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
 import { VehicleCards } from "./VehicleCards";
@@ -42,6 +46,7 @@ export function App() {
     return () => watcher.disconnect();
   }, []);
   useEffect(() => (root.current ? watchRoom(root.current) : undefined), []);
+  useEffect(watchKeys, []);
   // What lies under a dialog is out of reach; the top bar with the stop never is.
   const covered = dialogOpen.value;
   const classes = [
@@ -68,6 +73,7 @@ export function App() {
         <Legend />
         <div class="over-map">
           <Alarms />
+          <Others />
           <Notices />
         </div>
       </main>
@@ -82,6 +88,9 @@ export function App() {
       <FleetDialog />
       <FinishDialog />
       <AccountDialog />
+      <SettingsDialog />
+      <KeysDialog />
+      <Heard />
     </div>
   );
 }

@@ -1,10 +1,12 @@
 import "./ChartPane.css";
-import { useSignal } from "@preact/signals";
+import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Chart, GridFrame } from "../map/chart";
 import { latitude, longitude } from "../state/format";
 import { chosenSounding, cursor, in3d, isDark, mapCentre, measured, picking, theme } from "../state/store";
+import { say } from "../words/say";
 import { follow } from "./follow";
+import { fitAsked } from "./keys";
 import { MapTools } from "./MapTools";
 import { overlaid } from "./room";
 
@@ -60,15 +62,18 @@ export function ChartPane() {
     };
   }, []);
 
+  useSignalEffect(() => {
+    if (fitAsked.value > 0) chart.peek()?.fit(overlaid);
+  });
+
   return (
-    <section class="chart" aria-label="Map" inert={in3d.value}>
+    <section class="chart" aria-label={say("chartPane.map")} inert={in3d.value}>
       <div ref={container} class="chart-canvas" data-testid="map" data-ready={chart.value !== null} />
       {frame.value ? <GridLabels frame={frame.value} /> : null}
       <MapTools onFit={() => chart.value?.fit(overlaid)} />
       {fault.value ? (
         <p class="notice alarm" role="alert">
-          The map cannot be drawn: {fault.value}. It needs WebGL 2: switch on hardware acceleration or use
-          another browser.
+          {say("chartPane.theMapCannotBeDrawnIt", { fault: fault.value })}
         </p>
       ) : null}
     </section>

@@ -1,24 +1,27 @@
 import "./EventLog.css";
-import { useComputed, useSignal } from "@preact/signals";
+import { signal, useComputed, useSignal } from "@preact/signals";
 import { api } from "../api/client";
 import type { Level } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { clock } from "../state/format";
 import { said } from "../state/session";
 import { openAlarms, selectedId, takenAlarm, view } from "../state/store";
+import { say } from "../words/say";
 import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
 const MOST_SHOWN = 300;
-const LEAST = [
-  ["all", "All lines"],
-  ["important", "Warnings and alarms"],
-  ["notes", "Notes"],
-] as const;
+/** Which lines are shown. */
+const choices = () =>
+  [
+    ["all", say("log.allLines")],
+    ["important", say("log.warningsAndAlarms")],
+    ["notes", say("log.notes")],
+  ] as const;
 
 /** The mission's log, newest first, with a field for what the next watch should know. */
 export function EventLog() {
-  const least = useSignal<(typeof LEAST)[number][0]>("all");
+  const least = useSignal<ReturnType<typeof choices>[number][0]>("all");
   const kind = useSignal("");
   const words = useSignal("");
   const kinds = useComputed(() => [...new Set(view.value.events.map((e) => e.kind))].sort());
@@ -34,25 +37,34 @@ export function EventLog() {
       <NoteForm />
       <div class="filters">
         <Choice
-          label="Which lines"
+          label={say("log.whichLines")}
           value={least.value}
-          options={LEAST}
+          options={choices()}
           id="log-level"
           onChoose={into(least)}
         />
         <Choice
-          label="Kind of line"
+          label={say("log.kindOfLine")}
           value={kind.value}
-          options={[["", "Every kind"], ...same(kinds.value)]}
+          options={[["", say("log.everyKind")], ...same(kinds.value)]}
           onChoose={into(kind)}
         />
-        <Typed text={words} type="search" label="Words in the line" placeholder="Words" id="log-words" />
+        <Typed
+          text={words}
+          type="search"
+          label={say("log.wordsInTheLine")}
+          placeholder={say("log.words")}
+          id="log-words"
+        />
       </div>
-      {lines.length === 0 ? <p class="empty">No line is like that.</p> : null}
-      <ol aria-label="Log, newest first">
+      {lines.length === 0 ? <p class="empty">{say("log.noLineIsLikeThat")}</p> : null}
+      <ol aria-label={say("log.logNewestFirst")}>
         {lines.reverse().map((event) => (
           <li key={event.id} class={`${event.level}${event.kind === "note" ? " note" : ""}`}>
-            <time dateTime={event.time} title={`${clock(new Date(event.time), "local")} local`}>
+            <time
+              dateTime={event.time}
+              title={say("log.local", { it: clock(new Date(event.time), "local") })}
+            >
               {clock(new Date(event.time), "utc")}
             </time>
             <span aria-hidden="true">{SIGNS[event.level]}</span>
@@ -96,8 +108,8 @@ function NoteForm() {
     >
       <Typed
         text={text}
-        label="Note for the log"
-        placeholder="Note for the next watch"
+        label={say("log.noteForTheLog")}
+        placeholder={say("log.noteForTheNextWatch")}
         maxLength={2000}
         id="note"
       />
@@ -107,7 +119,7 @@ function NoteForm() {
         disabled={sending.value || text.value.trim() === "" || whyNotCommand.value !== ""}
         title={whyNotCommand.value}
       >
-        Write down
+        {say("log.writeDown")}
       </button>
       {fault.value ? (
         <span class="fault" role="alert">
@@ -118,29 +130,34 @@ function NoteForm() {
   );
 }
 
+const takeFault = signal("");
+
+/** Acknowledges every open alarm; what went wrong is shown beside them. */
+export async function takeAlarms(): Promise<void> {
+  try {
+    await Promise.all(openAlarms.value.map(({ id }) => api.acknowledge(id)));
+    takeFault.value = "";
+  } catch (error) {
+    takeFault.value = said(error);
+  }
+}
+
 /** Alarms stay over the map, on every page, until someone takes them. */
 export function Alarms() {
   const alarms = openAlarms.value;
-  const fault = useSignal("");
   const newest = alarms[0];
   if (!newest) return <Taken />;
-  const take = async () => {
-    try {
-      await Promise.all(alarms.map(({ id }) => api.acknowledge(id)));
-      fault.value = "";
-    } catch (error) {
-      fault.value = said(error);
-    }
-  };
   return (
-    <section class="alarms" role="alert" data-testid="alarms">
+    <section class="alarms" aria-label={say("log.openAlarms")} data-testid="alarms">
       <p>
-        <b>✕ {clock(new Date(newest.raised_at), "utc")} UTC</b> {newest.message}
-        {alarms.length > 1 ? <small> and {alarms.length - 1} more in the log</small> : null}
-        {fault.value ? <small class="fault"> {fault.value}</small> : null}
+        <b>{say("log.utc", { it: clock(new Date(newest.raised_at), "utc") })}</b> {newest.message}
+        {alarms.length > 1 ? (
+          <small> {say("log.andMoreInTheLog", { alarms: alarms.length - 1 })}</small>
+        ) : null}
+        {takeFault.value ? <small class="fault"> {takeFault.value}</small> : null}
       </p>
-      <Button id="take-alarms" commands onClick={() => void take()}>
-        Taken
+      <Button id="take-alarms" commands onClick={() => void takeAlarms()}>
+        {say("log.taken")}
       </Button>
     </section>
   );
@@ -152,7 +169,11 @@ function Taken() {
   if (!taken?.acknowledged_at) return null;
   return (
     <p class="notice" role="status" data-testid="taken-alarm">
-      {clock(new Date(taken.acknowledged_at), "utc")} UTC: {taken.acknowledged_by} took “{taken.message}”
+      {say("log.utcTook", {
+        it: clock(new Date(taken.acknowledged_at), "utc"),
+        acknowledgedBy: taken.acknowledged_by ?? "",
+        message: taken.message,
+      })}
     </p>
   );
 }

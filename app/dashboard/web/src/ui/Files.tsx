@@ -2,8 +2,9 @@ import "./Files.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { api, ServiceError } from "../api/client";
 import type { ProductView, QualityView } from "../api/types";
-import { duration, megabytes } from "../state/format";
+import { duration, fixed, megabytes } from "../state/format";
 import { now, selectedId, view } from "../state/store";
+import { say } from "../words/say";
 import { Button } from "./Controls";
 import { save } from "./saving";
 
@@ -89,7 +90,7 @@ export function Files() {
           </li>
         ))}
       </ul>
-      {hasMap.value ? null : <p class="empty">Files of the map follow with the first accepted sounding.</p>}
+      {hasMap.value ? null : <p class="empty">{say("files.filesOfTheMapFollowWith")}</p>}
     </div>
   );
 }
@@ -99,7 +100,9 @@ function Progress({ making: { since, received } }: { making: Making }) {
   const seconds = Math.max(0, (now.value - since) / 1000);
   return (
     <small role="status" data-testid="making">
-      {received === 0 ? `being made, ${duration(seconds)}` : `${megabytes(received)} received`}
+      {received === 0
+        ? say("files.beingMade", { seconds: duration(seconds) })
+        : say("files.received", { received: megabytes(received) })}
     </small>
   );
 }
@@ -108,7 +111,7 @@ function Quality({ found }: { found: QualityView | null }) {
   if (!found) return null;
   return (
     <div data-testid="quality">
-      <p>Depths are below {found.vertical_datum}.</p>
+      <p>{say("files.depthsAreBelow", { verticalDatum: found.vertical_datum })}</p>
       <ul class="statements">
         {found.tvu.map((one) => (
           <li key={one.order}>{one.statement}</li>
@@ -116,8 +119,11 @@ function Quality({ found }: { found: QualityView | null }) {
       </ul>
       {found.difference ? (
         <p>
-          Difference to the reference grid: RMSE {found.difference.rmse_m.toFixed(2)} m, bias{" "}
-          {found.difference.bias_m.toFixed(2)} m, 95 % within {found.difference.p95_m.toFixed(2)} m.
+          {say("files.differenceToTheReferenceGrid", {
+            rmseM: fixed(found.difference.rmse_m, 2),
+            biasM: fixed(found.difference.bias_m, 2),
+            p95M: fixed(found.difference.p95_m, 2),
+          })}
         </p>
       ) : null}
     </div>

@@ -66,6 +66,7 @@ import {
   view,
 } from "../state/store";
 import { tilesAddress } from "../state/tiles";
+import { say } from "../words/say";
 import { VehicleMark, WaypointMark } from "./marks";
 import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./room";
 
@@ -188,7 +189,9 @@ function pointedOut(): PlaceMark[] {
           },
         ]
       : []),
-    ...(own ? [{ words: "here", sign: "own" as const, at: own.at, radius_m: own.accuracy_m }] : []),
+    ...(own
+      ? [{ words: say("follow.here"), sign: "own" as const, at: own.at, radius_m: own.accuracy_m }]
+      : []),
   ];
 }
 
