@@ -1,4 +1,5 @@
 import "./base.css";
+import "./print.css";
 import "./ui/common.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";

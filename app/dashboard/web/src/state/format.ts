@@ -11,6 +11,10 @@ export function fixed(value: number, digits: number): string {
   return language.value === "pt" ? text.replace(".", ",") : text;
 }
 
+/** A number as it is, as the language writes it. */
+export const plain = (value: number): string =>
+  language.value === "pt" ? String(value).replace(".", ",") : String(value);
+
 /** A number as it was typed, with a point where a comma was typed. */
 export const pointed = (text: string): string => text.replace(",", ".");
 

@@ -17,6 +17,7 @@ import { LinksDialog } from "./LinksDialog";
 import { MissionPanel } from "./MissionPanel";
 import { Notices } from "./Notices";
 import { PreflightDialog } from "./PreflightDialog";
+import { watchPrinting } from "./printing";
 import { Readout } from "./Readout";
 import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom } from "./room";
 import { SettingsDialog } from "./SettingsDialog";
@@ -47,6 +48,7 @@ export function App() {
   }, []);
   useEffect(() => (root.current ? watchRoom(root.current) : undefined), []);
   useEffect(watchKeys, []);
+  useEffect(() => (root.current ? watchPrinting(root.current) : undefined), []);
   // What lies under a dialog is out of reach; the top bar with the stop never is.
   const covered = dialogOpen.value;
   const classes = [

@@ -1,7 +1,7 @@
 import "./BottomStrip.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { count, distance, metres, percent } from "../state/format";
+import { count, distance, metres, percent, plain } from "../state/format";
 import { shownStep } from "../state/replay";
 import { mission, replayStep, stripHeight, type Tab, tab, view } from "../state/store";
 import { say } from "../words/say";
@@ -87,7 +87,7 @@ export function BottomStrip() {
               <Figure
                 label={
                   p.ensonified_pct === null
-                    ? say("bottomStrip.knownToM", { accuracyM: present.spec.accuracy_m })
+                    ? say("bottomStrip.knownToM", { accuracyM: plain(present.spec.accuracy_m) })
                     : say("bottomStrip.ensonified")
                 }
                 value={percent(coverage_pct, 1)}

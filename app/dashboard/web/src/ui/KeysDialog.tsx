@@ -12,7 +12,13 @@ export function KeysDialog() {
     ...FURTHER,
   ];
   return (
-    <Dialog open={keysOpen.value} onClose={sets(keysOpen, false)} name="keys" heading={say("keys.keys")}>
+    <Dialog
+      open={keysOpen.value}
+      onClose={sets(keysOpen, false)}
+      name="keys"
+      kind="wide"
+      heading={say("keys.keys")}
+    >
       <dl class="keys" data-testid="keys">
         {lines.map(([sign, words]) => (
           <div key={sign}>

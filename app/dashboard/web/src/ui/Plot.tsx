@@ -2,6 +2,8 @@ import "./Plot.css";
 import "uplot/dist/uPlot.min.css";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
+import { clock, fixed, plain } from "../state/format";
+import { language, say } from "../words/say";
 
 export interface Line {
   label: string;
@@ -26,11 +28,18 @@ interface PlotProps {
 
 const HEIGHT = 150;
 
+/** Times of day, UTC; seconds only where ticks are closer than a minute. */
+function clockTicks(_: uPlot, ticks: number[]): string[] {
+  const [first = 0, second = first + 60] = ticks;
+  const length = second - first < 60 ? 8 : 5;
+  return ticks.map((seconds) => clock(new Date(seconds * 1000), "utc").slice(0, length));
+}
+
 /** A small chart of lines over steps or time; the values under the cursor stand in its legend. */
 export function Plot({ title, xs, lines, unit, time = false, range, down = false }: PlotProps) {
   const box = useRef<HTMLDivElement>(null);
   const chart = useRef<uPlot | null>(null);
-  const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down}`;
+  const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down} ${language.value}`;
 
   // A new chart only where its lines are others; new values are set below.
   useEffect(() => {
@@ -55,11 +64,11 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
           y: { ...(range ? { range } : {}), dir: down ? -1 : 1 },
         },
         axes: [
-          { ...axis, space: 60 },
-          { ...axis, size: 46, values: (_, ticks) => ticks.map((v) => `${v}${unit === "%" ? " %" : ""}`) },
+          { ...axis, space: 60, ...(time ? { values: clockTicks } : {}) },
+          { ...axis, size: 46, values: (_, ticks) => ticks.map((v) => `${plain(v)}${unit === "%" ? " %" : ""}`) },
         ],
         series: [
-          { label: time ? "UTC" : "step" },
+          { label: time ? "UTC" : say("plot.step") },
           ...lines.map((l) => ({
             label: l.label,
             stroke: l.colour,
@@ -93,7 +102,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
   const newest = lines
     .map((l) => {
       const value = l.values.at(-1);
-      return `${l.label} ${value == null ? "unknown" : `${digits(value)} ${unit}`}`;
+      return `${l.label} ${value == null ? say("asked.notKnown") : `${digits(value)} ${unit}`}`;
     })
     .join(", ");
   return (
@@ -109,4 +118,8 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
 }
 
 const digits = (value: number) =>
-  Math.abs(value) >= 100 ? value.toFixed(0) : Math.abs(value) >= 10 ? value.toFixed(1) : value.toPrecision(3);
+  Math.abs(value) >= 100
+    ? fixed(value, 0)
+    : Math.abs(value) >= 10
+      ? fixed(value, 1)
+      : plain(Number(value.toPrecision(3)));

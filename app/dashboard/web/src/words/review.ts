@@ -2,7 +2,6 @@
 
 export const REVIEW = {
   "charts.depthOfVehicles": { en: "Depth of vehicles", pt: "Profundidade dos veículos" },
-  "charts.altitude": { en: "Altitude", pt: "Altura ao fundo" },
   "charts.battery": { en: "Battery", pt: "Bateria" },
   "charts.secondsSinceHeard": { en: "Seconds since heard", pt: "Segundos sem contacto" },
   "charts.chartsOverStepsBeginWithThe": {
@@ -17,6 +16,7 @@ export const REVIEW = {
   "charts.remaining": { en: "remaining", pt: "por ver" },
   "charts.deviation": { en: "deviation", pt: "desvio" },
   "charts.figureOfTheVehicles": { en: "Figure of the vehicles", pt: "Grandeza dos veículos" },
+  "charts.altitude": { en: "Altitude", pt: "Altura" },
   "compare.compareWith": { en: "Compare with", pt: "Comparar com" },
   "compare.chooseAMission": { en: "Choose a mission", pt: "Escolha uma missão" },
   "compare.knownToTheAskedAccuracy": {
@@ -193,4 +193,5 @@ export const REVIEW = {
     pt: "Corrigir o que é proposto",
   },
   "systematicErrors.takeNothingOut": { en: "Take nothing out", pt: "Não corrigir nada" },
+  "plot.step": { en: "step", pt: "passo" },
 } as const;
