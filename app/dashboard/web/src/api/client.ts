@@ -19,6 +19,7 @@ import type {
   PreflightView,
   Problem,
   ProductView,
+  ProfileView,
   QualityView,
   SearchGridView,
   SessionView,
@@ -188,6 +189,11 @@ export const api = {
   deleteSystematicErrors: (id: string) =>
     request<unknown>(`${missionPath(id)}/systematic-errors`, { method: "DELETE" }),
   holidays: (id: string) => request<Holidays>(`${missionPath(id)}/holidays`),
+  profile: (id: string, line: string, layers: readonly string[], gone: AbortSignal) => {
+    const query = new URLSearchParams({ line });
+    for (const layer of layers) query.append("layer", layer);
+    return request<ProfileView>(`${missionPath(id)}/profile?${query}`, { signal: gone });
+  },
   products: (id: string) => request<ProductView[]>(`${missionPath(id)}/products`),
   sites: () => request<SiteView[]>("/sites"),
   createSite: (site: NewSite) => post<SiteView>("/sites", site),

@@ -11,6 +11,7 @@ import { Button } from "./Controls";
 import { EventLog } from "./EventLog";
 import { Files } from "./Files";
 import { Grip } from "./Grip";
+import { ProfilePane } from "./ProfilePane";
 import { Review } from "./Review";
 import { paneHeight } from "./room";
 import { TimeSlider } from "./TimeSlider";
@@ -55,6 +56,7 @@ export function BottomStrip() {
       {tab.value === "charts" ? <Charts /> : null}
       {tab.value === "soundings" ? <Review /> : null}
       {tab.value === "compare" ? <Compare /> : null}
+      {tab.value === "profile" ? <ProfilePane /> : null}
       <TimeSlider />
       <div class="strip">
         <dl class="figures" data-past={past}>
@@ -115,6 +117,7 @@ export function BottomStrip() {
             {say("bottomStrip.rejected", { it: p.rejected ? ` (${count(p.rejected)})` : "" })}
           </Toggle>
           <Toggle name="files">{say("bottomStrip.files")}</Toggle>
+          <Toggle name="profile">{say("profile.profile")}</Toggle>
           <Toggle name="compare">{say("bottomStrip.compare")}</Toggle>
         </nav>
         <Button

@@ -24,6 +24,7 @@ import {
   showSite,
   showTargets,
   showTracks,
+  tab,
 } from "../state/store";
 import { say, sayWith } from "../words/say";
 import { Button, flips, sets } from "./Controls";
@@ -215,6 +216,17 @@ function Measured() {
           <Button kind="link-button" onClick={sets(measured, [])}>
             {say("mapTools.anew")}
           </Button>
+          {mission.value ? (
+            <Button
+              id="measured-profile"
+              kind="link-button"
+              onClick={() => {
+                tab.value = "profile";
+              }}
+            >
+              {say("profile.profile")}
+            </Button>
+          ) : null}
         </>
       ) : (
         <span>{say("mapTools.clickOnTheMapCornerAfter")}</span>

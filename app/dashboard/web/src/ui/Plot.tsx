@@ -65,7 +65,11 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
         },
         axes: [
           { ...axis, space: 60, ...(time ? { values: clockTicks } : {}) },
-          { ...axis, size: 46, values: (_, ticks) => ticks.map((v) => `${plain(v)}${unit === "%" ? " %" : ""}`) },
+          {
+            ...axis,
+            size: 46,
+            values: (_, ticks) => ticks.map((v) => `${plain(v)}${unit === "%" ? " %" : ""}`),
+          },
         ],
         series: [
           { label: time ? "UTC" : say("plot.step") },

@@ -91,6 +91,11 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { key: "c", words: "bottomStrip.charts", run: opens("charts") },
   { key: "r", words: "keys.rejectedSoundings", run: opens("soundings") },
   { key: "f", words: "bottomStrip.files", run: opens("files") },
+  {
+    key: "q",
+    words: "profile.profile",
+    run: opens("profile"),
+  },
   { key: "k", words: "bottomStrip.compare", run: opens("compare") },
   {
     key: "0",

@@ -194,4 +194,52 @@ export const REVIEW = {
   },
   "systematicErrors.takeNothingOut": { en: "Take nothing out", pt: "Não corrigir nada" },
   "plot.step": { en: "step", pt: "passo" },
+  "profile.profile": { en: "Profile", pt: "Perfil" },
+  "profile.anotherSurvey": { en: "Another survey…", pt: "Outro levantamento…" },
+  "profile.furtherLayer": { en: "Another layer…", pt: "Outra camada…" },
+  "profile.soundings": { en: "{soundings} soundings beside it", pt: "{soundings} sondas ao lado" },
+  "profile.leaveOut": { en: "Leave {name} out", pt: "Deixar {name} de fora" },
+  "profile.drawALine": {
+    en: "Measure a line on the map, corner after corner, or type its places above: the sea floor along it is shown here.",
+    pt: "Meça uma linha no mapa, ponto a ponto, ou escreva acima os seus lugares: o fundo ao longo dela aparece aqui.",
+  },
+  "profile.line": {
+    en: "Line: places with semicolons between them",
+    pt: "Linha: lugares separados por ponto e vírgula",
+  },
+  "profile.lineSample": {
+    en: "41.1851, -8.7049; 41.1856, -8.7041",
+    pt: "41.1851, -8.7049; 41.1856, -8.7041",
+  },
+  "profile.noLine": {
+    en: "Two or more places are needed, with semicolons between them",
+    pt: "São precisos dois ou mais lugares, separados por ponto e vírgula",
+  },
+  "profile.nowhereBoth": {
+    en: "{name} and {first} know the bottom nowhere on this line both",
+    pt: "{name} e {first} não conhecem ambos o fundo em nenhum ponto desta linha",
+  },
+  "profile.deeper": {
+    en: "{name} is {mean} deeper than {first} on average, {largest} where they differ most",
+    pt: "{name} é {mean} mais fundo do que {first} em média, {largest} onde mais diferem",
+  },
+  "profile.noValues": {
+    en: "{name}: {title} has no values here",
+    pt: "{name}: {title} não tem valores aqui",
+  },
+  "profile.values": {
+    en: "{name}: {title} {least} to {largest}, mean {mean}",
+    pt: "{name}: {title} {least} a {largest}, média {mean}",
+  },
+  "profile.nothingKnown": {
+    en: "Nothing is known along this line.",
+    pt: "Nada se conhece ao longo desta linha.",
+  },
+  "profile.place": { en: "Place along the line", pt: "Lugar ao longo da linha" },
+  "profile.chart": { en: "Depth along the line: {names}", pt: "Profundidade ao longo da linha: {names}" },
+  "profile.point": {
+    en: "Point at the chart, or move along it below",
+    pt: "Aponte para o gráfico, ou percorra-o em baixo",
+  },
+  "profile.csv": { en: "Table (CSV)", pt: "Tabela (CSV)" },
 } as const;
