@@ -81,7 +81,8 @@ async function ask(address: string, init: RequestInit): Promise<Response> {
   let response: Response;
   try {
     response = await fetch(address, init);
-  } catch {
+  } catch (error) {
+    if (init.signal?.aborted) throw error;
     throw new ServiceError(say("service.theServiceDoesNotAnswer"), 0, say("service.checkThatItIsRunningAnd"));
   }
   if (!response.ok) throw await toServiceError(response);
@@ -92,8 +93,9 @@ async function ask(address: string, init: RequestInit): Promise<Response> {
 async function file(
   address: string,
   onBytes: (received: number) => void = () => {},
+  gone?: AbortSignal,
 ): Promise<{ name: string; content: Blob }> {
-  const response = await ask(address, {});
+  const response = await ask(address, gone ? { signal: gone } : {});
   const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1];
   const type = response.headers.get("Content-Type") ?? "application/octet-stream";
   const parts: BlobPart[] = [];

@@ -23,7 +23,7 @@ import {
 import type { PlaceMark, Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
-import type { Projection } from "./projection";
+import { moved, type Projection } from "./projection";
 import { Sheets } from "./sheets";
 import type { ShipMark } from "./ships";
 import { type Site, sitePicture } from "./site";
@@ -124,7 +124,7 @@ export class Chart {
     this.#look = look;
     this.#sheets = new Sheets(
       map,
-      (context, at) => paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]),
+      (context, at) => paintStill(context, at, at, this.#still, PAPER[this.#look]),
       (context, at) =>
         paintLively(context, at, this.#lively, this.#layLabels(context, at), PAPER[this.#look]),
     );
@@ -161,6 +161,37 @@ export class Chart {
     this.#map.getContainer().style.backgroundColor = PAPER[look].sea;
     if (this.#styled) this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
     this.#sheets.redraw();
+  }
+
+  /** The part of the window that nothing covers, and the window itself. */
+  seen(padding: Padding): {
+    window: Projection;
+    part: { left: number; top: number; width: number; height: number };
+  } {
+    const window = this.#sheets.projection;
+    const { left, right, top, bottom } = padding;
+    const width = Math.max(window.width - left - right, 1);
+    const height = Math.max(window.height - top - bottom, 1);
+    return { window, part: { left, top, width, height } };
+  }
+
+  /** Draws what the map shows for another window: charts under it as far as they are on the screen. */
+  paintOn(context: CanvasRenderingContext2D, at: Projection): void {
+    if (this.#tiles) {
+      // Within one turn of the event loop what MapLibre draws can be read.
+      this.#map.redraw();
+      const drawn = this.#sheets.projection;
+      const { x, y, scale } = moved(drawn, at);
+      const [width, height] = [drawn.width * scale, drawn.height * scale];
+      const [left, top] = [x + (drawn.width - width) / 2, y + (drawn.height - height) / 2];
+      context.drawImage(this.#map.getCanvas(), left, top, width, height);
+    }
+    paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]);
+    const sides = {
+      marks: this.#lively.marks.map(() => "right" as const),
+      targets: this.#lively.targets.map(() => "right" as const),
+    };
+    paintLively(context, at, { ...this.#lively, pointed: null }, sides, PAPER[this.#look]);
   }
 
   /** Charts under everything else, from a server of raster tiles; none without an address. */

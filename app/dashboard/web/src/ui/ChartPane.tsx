@@ -8,6 +8,7 @@ import { say } from "../words/say";
 import { follow } from "./follow";
 import { fitAsked } from "./keys";
 import { MapTools } from "./MapTools";
+import { shownChart } from "./mapPicture";
 import { overlaid } from "./room";
 
 // Most of the page's code: it is read while the service is asked, not before.
@@ -50,6 +51,7 @@ export function ChartPane() {
           },
         });
         chart.value = made;
+        shownChart.value = made;
         stop = follow(made);
       })
       .catch((error: unknown) => {
@@ -58,6 +60,7 @@ export function ChartPane() {
     return () => {
       ended = true;
       stop();
+      shownChart.value = null;
       chart.peek()?.destroy();
     };
   }, []);

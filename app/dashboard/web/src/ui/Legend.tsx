@@ -27,6 +27,7 @@ import {
   showSite,
   site,
 } from "../state/store";
+import { PHASE_WORDS } from "../state/words";
 import { named, say } from "../words/say";
 import { Button, Choice, flips, into, titles } from "./Controls";
 import { STAGES, VehicleShape } from "./marks";
@@ -194,7 +195,8 @@ function Stages() {
     <ul class="landmarks stages" data-testid="stage-legend">
       {STAGES.map((stage) => (
         <li key={stage}>
-          <VehicleShape stage={stage} colour="#8a9ca8" heading_deg={0} size={18} /> {stage}
+          <VehicleShape stage={stage} colour="#8a9ca8" heading_deg={0} size={18} />{" "}
+          {PHASE_WORDS[stage === "surveying" ? "survey" : stage]}
         </li>
       ))}
     </ul>

@@ -75,7 +75,7 @@ function markOnce(name: string): void {
   if (performance.getEntriesByName(name).length === 0) performance.mark(name);
 }
 
-const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
+export const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
 
 const homesOf = (spec: MissionView["spec"]) => recoveryMarks(spec, SPEC["recovery.radius_m"].default);
 

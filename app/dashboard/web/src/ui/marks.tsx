@@ -5,7 +5,7 @@ import type { LngLat, VehicleView, WaypointStatus, WaypointView } from "../api/t
 import { wayBetween } from "../map/geo";
 import { age } from "../state/format";
 import type { Vehicle } from "../state/store";
-import { WAYPOINT_WORDS } from "../state/words";
+import { PHASE_WORDS, WAYPOINT_WORDS } from "../state/words";
 import { say } from "../words/say";
 
 /** A vehicle as it was: its heading is that of its last way. */
@@ -105,8 +105,8 @@ function Mark({
       <VehicleShape stage={stage} colour={colour} heading_deg={heading_deg} />
       <span class="mark-label">
         {name}
-        {left ? " left" : ""}
-        {stage === "surveying" ? "" : ` ${stage}`}
+        {left ? say("marks.left") : ""}
+        {stage === "surveying" ? "" : ` ${PHASE_WORDS[stage]}`}
         {old ? <b> {say("marks.old", { old })}</b> : null}
         {alarm ? <b> ✕ {alarm}</b> : null}
       </span>

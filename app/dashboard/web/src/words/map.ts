@@ -112,6 +112,7 @@ export const MAP = {
     en: "Waypoint {step} of {vehicle}: {status}",
     pt: "Ponto {step} de {vehicle}: {status}",
   },
+  "marks.left": { en: " left", pt: " saiu" },
   "follow.here": { en: "here", pt: "aqui" },
   "ships.own": { en: " (own)", pt: " (próprio)" },
   "ships.mFrom": { en: "{distanceM} m from {vehicle}", pt: "a {distanceM} m de {vehicle}" },

@@ -122,6 +122,7 @@ export const REVIEW = {
     en: "Difference to the reference grid: RMSE {rmseM} m, bias {biasM} m, 95 % within {p95M} m.",
     pt: "Diferença para a malha de referência: REQM {rmseM} m, média {biasM} m, 95 % dentro de {p95M} m.",
   },
+  "files.cancelFile": { en: "Cancel {name}", pt: "Cancelar {name}" },
   "review.keptOutByTheGate": { en: "kept out by the gate", pt: "recusada pela verificação" },
   "review.leftOutByTheMap": { en: "left out by the map", pt: "excluída pelo mapa" },
   "review.keptOutByAnOperator": { en: "kept out by an operator", pt: "excluída por um operador" },
@@ -242,4 +243,15 @@ export const REVIEW = {
     pt: "Aponte para o gráfico, ou percorra-o em baixo",
   },
   "profile.csv": { en: "Table (CSV)", pt: "Tabela (CSV)" },
+  "picture.asShown": {
+    en: "The map as it is shown, on a sheet of A4",
+    pt: "O mapa como se vê, numa folha A4",
+  },
+  "picture.north": { en: "N", pt: "N" },
+  "picture.frame": { en: "WGS 84, Web Mercator, north up", pt: "WGS 84, Mercator Web, norte para cima" },
+  "picture.hatched": { en: "Hatched: guessed, not sounded", pt: "Tracejado: estimado, não sondado" },
+  "picture.nothing": {
+    en: "Nothing is drawn where a guess is no surer than ± {none} m",
+    pt: "Nada se desenha onde a estimativa não é melhor que ± {none} m",
+  },
 } as const;
