@@ -23,6 +23,7 @@ import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom
 import { SettingsDialog } from "./SettingsDialog";
 import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
+import { Tour } from "./Tour";
 import { VehicleCards } from "./VehicleCards";
 
 /** Before the strip's height was measured. */
@@ -76,6 +77,7 @@ export function App() {
         <div class="over-map">
           <Alarms />
           <Others />
+          <Tour />
           <Notices />
         </div>
       </main>

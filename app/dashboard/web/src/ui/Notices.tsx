@@ -19,6 +19,7 @@ import {
 import { say, sayWith } from "../words/say";
 import { SignIn } from "./Account";
 import { Button, sets } from "./Controls";
+import { beginTour } from "./Tour";
 
 /** What stands in the middle when there is nothing to show, or something is wrong: always with what to do next. */
 export function Notices() {
@@ -83,6 +84,13 @@ function NoMission({ none }: { none: boolean }) {
       fault.value = said(error);
     }
   };
+  const guide = async () => {
+    try {
+      await beginTour();
+    } catch (error) {
+      fault.value = said(error);
+    }
+  };
   return (
     <div class="notice" data-testid="no-mission">
       <p>
@@ -101,6 +109,9 @@ function NoMission({ none }: { none: boolean }) {
       </Button>
       <Button id="try" commands onClick={() => void tryIt()}>
         {say("notices.tryWithTwoSimulatedVehicles")}
+      </Button>
+      <Button id="begin-tour" commands onClick={() => void guide()}>
+        {say("tour.begin")}
       </Button>
       <Button onClick={sets(linksOpen, true)}>{say("notices.links")}</Button>
       {fault.value ? <p class="fault">{fault.value}</p> : null}

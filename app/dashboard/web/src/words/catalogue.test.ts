@@ -83,7 +83,7 @@ const UNTOLD =
   /^(class|kind|id|data-.*|style|key|href|style|transform|points?|d|src|form|type|role|.*Id|viewBox|aria-.*)$/;
 /** Names and signs that are the same in every language. */
 const SAME =
-  /^(km²?|kn|nmi|min|MB|(Multi)?Polygon|Feature|.*sans-serif|[\da-f]{6}( [\da-f]{6})*|bathyfleet.*|IMC|UTC|S-44|0x|MMSI|[NESW]{1,2}|J|GeoTIFF|Hz|[a-z]+:\/\/.*)$/;
+  /^(km²?|kn|nmi|min|MB|(Multi)?Polygon|Feature|.*sans-serif|[\da-f]{6}( [\da-f]{6})*|(\d+ )?\d+px|bathyfleet.*|IMC|UTC|S-44|0x|MMSI|[NESW]{1,2}|J|GeoTIFF|Hz|[a-z]+:\/\/.*)$/;
 
 /** Keys, types and fonts that look like words. */
 const NO_WORDS = new Set([

@@ -360,4 +360,49 @@ export const FRAME = {
     pt: "{alarms} {alarms|alarme|alarmes}. {message}",
   },
   "log.openAlarms": { en: "Open alarms", pt: "Alarmes em aberto" },
+  "tour.tour": { en: "Guided first mission", pt: "Primeira missão guiada" },
+  "tour.missionName": { en: "First mission", pt: "Primeira missão" },
+  "tour.stepOf": { en: "{step} of {steps}.", pt: "{step} de {steps}." },
+  "tour.begin": { en: "Guided first mission, five minutes", pt: "Primeira missão guiada, cinco minutos" },
+  "tour.leave": { en: "Leave the guide", pt: "Sair do guia" },
+  "tour.checklist": {
+    en: "Two simulated vehicles are to map this area. Press Start: a checklist is shown before anything moves.",
+    pt: "Dois veículos simulados vão cartografar esta área. Prima Iniciar: antes de algo se mover aparece uma verificação.",
+  },
+  "tour.start": {
+    en: "Every line says what was checked; a problem says what to do. Start the mission when all is well.",
+    pt: "Cada linha diz o que foi verificado; um problema diz o que fazer. Inicie a missão quando tudo estiver bem.",
+  },
+  "tour.watch": {
+    en: "The vehicles go to their waypoints, shown as rings, and sound the bottom. The map appears with the first soundings.",
+    pt: "Os veículos vão aos seus pontos, mostrados como anéis, e sondam o fundo. O mapa surge com as primeiras sondas.",
+  },
+  "tour.layer": {
+    en: "Strong colours were measured, hatched ones are guessed. Choose the layer Uncertainty to see how sure the map is.",
+    pt: "Cores fortes foram medidas, as tracejadas são estimadas. Escolha a camada Incerteza para ver quão certo é o mapa.",
+  },
+  "tour.hold": {
+    en: "Let one vehicle wait: press Hold on its card. The other goes on.",
+    pt: "Faça um veículo esperar: prima Aguardar na sua ficha. O outro continua.",
+  },
+  "tour.resume": {
+    en: "Let it go on: press Resume survey on its card.",
+    pt: "Deixe-o continuar: prima Retomar o levantamento na sua ficha.",
+  },
+  "tour.profile": {
+    en: "Cut the sea floor: press the ruler, click two places on the map, then Profile.",
+    pt: "Corte o fundo: prima a régua, clique em dois lugares no mapa, depois Perfil.",
+  },
+  "tour.finish": {
+    en: "Enough for a first time: press Finish early. The vehicles return first, or stop where they are.",
+    pt: "Chega para uma primeira vez: prima Terminar mais cedo. Os veículos regressam primeiro, ou param onde estão.",
+  },
+  "tour.files": {
+    en: "The mission is over; its map stays. Open Files to download it.",
+    pt: "A missão acabou; o mapa fica. Abra Ficheiros para o descarregar.",
+  },
+  "tour.end": {
+    en: "That is all: describe an area, check, start, watch, finish, take the files. With real vehicles it is the same.",
+    pt: "É tudo: descrever uma área, verificar, iniciar, vigiar, terminar, levar os ficheiros. Com veículos reais é igual.",
+  },
 } as const;
