@@ -7,6 +7,7 @@ import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { say } from "../words/say";
 import { coasts, showsCoast } from "./coast";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "./geo";
 import { type Box, type Label, placed, type Side } from "./labels";
@@ -81,6 +82,7 @@ const EMPTY_RATIO = 0.1;
 export class Chart {
   readonly #map: MapLibreMap;
   readonly #sheets: Sheets;
+  readonly #scale = new ScaleControl({ maxWidth: 140, unit: "metric" });
   readonly #pins = new Map<string, Marker>();
   /** Sizes of pins' labels, and the sides on which all labels are. */
   readonly #labels = new Map<string, Pick<Label, "width" | "height" | "reach">>();
@@ -120,6 +122,7 @@ export class Chart {
       this.setLook(this.#look);
       this.#layTiles();
     });
+    map.addControl(this.#scale, "bottom-left");
     this.#map = map;
     this.#look = look;
     this.#sheets = new Sheets(
@@ -161,6 +164,11 @@ export class Chart {
     this.#map.getContainer().style.backgroundColor = PAPER[look].sea;
     if (this.#styled) this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
     this.#sheets.redraw();
+  }
+
+  /** In what the scale counts. */
+  setUnits(units: "metric" | "nautical"): void {
+    this.#scale.setUnit(units);
   }
 
   /** The part of the window that nothing covers, and the window itself. */
@@ -519,12 +527,19 @@ function emptyMap(container: HTMLElement, centre: LngLat, look: Look): MapLibreM
     touchPitch: false,
     attributionControl: false,
     fadeDuration: 0,
+    locale: {
+      "Map.Title": say("chartPane.canvas"),
+      "NavigationControl.ZoomIn": say("chartPane.zoomIn"),
+      "NavigationControl.ZoomOut": say("chartPane.zoomOut"),
+      "ScaleControl.Meters": "m",
+      "ScaleControl.Kilometers": "km",
+      "ScaleControl.NauticalMiles": "nmi",
+    },
     pixelRatio: EMPTY_RATIO,
     canvasContextAttributes: { antialias: false },
   });
   map.touchZoomRotate.disableRotation();
   map.keyboard.disableRotation();
   map.addControl(new NavigationControl({ showCompass: false }), "bottom-right");
-  map.addControl(new ScaleControl({ maxWidth: 140, unit: "metric" }), "bottom-left");
   return map;
 }

@@ -206,6 +206,7 @@ describe("alarms", () => {
     vehicle: "a",
     message: `${id} is lost`,
     raised_at,
+    ended_at: null,
     state: by === null ? "open" : "acknowledged",
     acknowledged_at: by === null ? null : raised_at,
     acknowledged_by: by,

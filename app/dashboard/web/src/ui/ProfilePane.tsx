@@ -100,7 +100,7 @@ export function ProfilePane() {
           options={[
             ["", say("profile.furtherLayer")],
             ...layers.value
-              .filter(({ in_json, of_depths }) => in_json && !of_depths)
+              .filter(({ in_json, name }) => in_json && name !== "live")
               .map(({ name, title }) => [name, named("layer", name, title)] as const),
           ]}
           id="profile-layer"

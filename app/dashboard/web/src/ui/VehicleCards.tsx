@@ -44,10 +44,9 @@ export function VehicleCards() {
   const present = mission.value;
   if (!present) return null;
   return (
-    <div class="cards-column">
+    <aside class="cards-column" aria-label={say("compare.vehicles")}>
       <section
         class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
-        aria-label={say("compare.vehicles")}
         // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
         tabIndex={0}
       >
@@ -84,7 +83,7 @@ export function VehicleCards() {
           id="grip-cards"
         />
       )}
-    </div>
+    </aside>
   );
 }
 

@@ -19,7 +19,7 @@ import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
-import { place } from "../state/format";
+import { place, units } from "../state/format";
 import { ownPosition } from "../state/own";
 import { replayed } from "../state/replay";
 import {
@@ -169,6 +169,7 @@ export function follow(chart: Chart): () => void {
       ),
     ),
     effect(() => chart.setMeasure(measured.value ?? [])),
+    effect(() => chart.setUnits(units.value)),
   ];
   return () => {
     for (const stop of stops) stop();

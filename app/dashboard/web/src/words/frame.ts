@@ -308,6 +308,12 @@ export const FRAME = {
     en: "The map cannot be drawn: {fault}. It needs WebGL 2: switch on hardware acceleration or use another browser.",
     pt: "O mapa não pode ser desenhado: {fault}. Precisa de WebGL 2: ligue a aceleração gráfica ou use outro navegador.",
   },
+  "chartPane.canvas": {
+    en: "Sea chart; arrow keys move it, + and − zoom",
+    pt: "Carta; as setas movem-na, + e − ampliam",
+  },
+  "chartPane.zoomIn": { en: "Zoom in", pt: "Ampliar" },
+  "chartPane.zoomOut": { en: "Zoom out", pt: "Reduzir" },
   "readout.eMNM": { en: "E {eastM} m, N {northM} m", pt: "E {eastM} m, N {northM} m" },
   "readout.notKnownAGuessWouldBe": {
     en: "not known: a guess would be ±{sdM}",
