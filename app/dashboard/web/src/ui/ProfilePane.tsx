@@ -1,5 +1,6 @@
 import "./ProfilePane.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { LngLat, ProfileView } from "../api/types";
 import { count, metres, plain } from "../state/format";
@@ -150,6 +151,13 @@ export function ProfilePane() {
 /** The line in numbers, for those who cannot draw it. */
 function LineField({ line }: { line: readonly LngLat[] }) {
   const wrong = useSignal(false);
+  const shown = lineTyped(line);
+  // What is being typed stays, whatever else of the page is drawn meanwhile.
+  const text = useSignal(shown);
+  useEffect(() => {
+    text.value = shown;
+    wrong.value = false;
+  }, [shown]);
   return (
     <label class="field line-field">
       <span class="visually-hidden">{say("profile.line")}</span>
@@ -157,9 +165,12 @@ function LineField({ line }: { line: readonly LngLat[] }) {
         type="text"
         autocomplete="off"
         placeholder={say("profile.lineSample")}
-        value={lineTyped(line)}
+        value={text.value}
         aria-invalid={wrong.value ? "true" : "false"}
         data-testid="profile-line"
+        onInput={(event) => {
+          text.value = event.currentTarget.value;
+        }}
         onChange={(event) => {
           const corners = typedLine(event.currentTarget.value);
           wrong.value = corners === null;

@@ -1,7 +1,7 @@
 /** A sheet of paper has another shape than the window: the map is printed as it is seen, made smaller as one picture. */
 
 /** A4 on its side without its margins, in the pixels of style sheets, and how much of its height the map gets. */
-const PAPER_PX = { width: 1047, height: 350 };
+const PAPER_PX = { width: 1047, height: 390 };
 
 /** Tells the print style how large the map is; returns what ends that. */
 export function watchPrinting(root: HTMLElement): () => void {
