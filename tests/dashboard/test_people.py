@@ -130,7 +130,7 @@ def test_a_survey_is_cut_along_a_line_and_given_as_a_table(shared: Page, service
     by_id(page, "profile-add").select_option(again)
     expect(by_id(page, "profile-difference")).to_contain_text("deeper than Quay on average")
     by_id(page, "profile-layer").select_option("slope")
-    expect(by_id(page, "profile-layer-values")).to_contain_text("Quay: Slope")
+    expect(by_id(page, "profile-layer-values")).to_contain_text("Quay: Slope")  # shown once it has come
     assert faults(page) == []
     with page.expect_download() as begun:
         by_id(page, "profile-csv").click()
@@ -145,8 +145,6 @@ def test_a_survey_is_cut_along_a_line_and_given_as_a_table(shared: Page, service
 def test_the_map_is_given_as_a_picture_and_a_page_like_the_screen(shared: Page, surveyed: str) -> None:
     page = shared
     show(page, surveyed)
-    page.keyboard.press("?")  # closes nothing, opens the sheet: the page has the keyboard
-    page.keyboard.press("Escape")
     if not by_id(page, "files").is_visible():
         by_id(page, "toggle-files").click()
     with page.expect_download() as begun:

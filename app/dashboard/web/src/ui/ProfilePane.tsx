@@ -139,7 +139,9 @@ export function ProfilePane() {
           </ul>
           <ProfileChart cuts={cuts} none_m={shownCertainty.value?.none_m ?? Infinity} />
           <Difference cuts={cuts} />
-          {layer.value ? <LayerAlong cuts={cuts} layer={layer.value} /> : null}
+          {layer.value && cuts.every(({ profile }) => layer.value in profile.layers) ? (
+            <LayerAlong cuts={cuts} layer={layer.value} />
+          ) : null}
         </>
       ) : measured.value && measured.value.length > 1 ? null : (
         <p class="empty">{say("profile.drawALine")}</p>

@@ -356,7 +356,7 @@ export const FRAME = {
     en: "Single keys do this while nothing is typed",
     pt: "Teclas simples fazem isto quando não se está a escrever",
   },
-  "others.started": { en: "{actor} started the mission", pt: "{actor} iniciou a missão" },
+  "others.started": { en: "{actor} set the mission running", pt: "{actor} pôs a missão em curso" },
   "others.paused": { en: "{actor} paused the mission", pt: "{actor} pôs a missão em pausa" },
   "others.finished": { en: "{actor} finished the mission", pt: "{actor} terminou a missão" },
   "others.aborted": { en: "{actor} aborted the mission", pt: "{actor} abortou a missão" },
