@@ -1,5 +1,6 @@
 """A map along a line, over REST."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import httpx
@@ -22,7 +23,7 @@ async def measured(client: httpx.AsyncClient, mission: dict[str, Any]) -> str:
 
 
 async def test_a_profile_has_the_map_and_the_soundings_beside_it(client: httpx.AsyncClient, measured: str) -> None:
-    asked = {"line": LINE, "within_m": 30, "layer": ["slope", "tvu"]}
+    asked: dict[str, Any] = {"line": LINE, "within_m": 30, "layer": ["slope", "tvu"]}
     answer = await client.get(f"{measured}/profile", params=asked)
     assert answer.status_code == 200, answer.text
     found = ProfileView.model_validate(answer.json())
@@ -30,6 +31,7 @@ async def test_a_profile_has_the_map_and_the_soundings_beside_it(client: httpx.A
     count = len(found.along_m)
     assert found.length_m == pytest.approx(found.along_m[-1], abs=1e-3)
     assert found.spacing_m <= shown["cell_m"] / 2
+    values: Sequence[object]
     for values in (found.positions, found.depth_m, found.sd_m, found.sounded, *found.layers.values()):
         assert len(values) == count
     assert set(found.layers) == {"slope", "tvu"}

@@ -101,7 +101,10 @@ def test_a_watch_keeper_sees_what_another_commands(page: Page, service: Service,
     expect(page.get_by_test_id("link")).to_have_attribute("data-status", "open")
     path = f"{service.url}/api/v1/missions/{tokens['mission']}"
     operator = {"Authorization": f"Bearer {tokens['operator']}"}
-    for action, words in (("start", "the operator set the mission running"), ("abort", "the operator aborted the mission")):
+    for action, words in (
+        ("start", "the operator set the mission running"),
+        ("abort", "the operator aborted the mission"),
+    ):
         httpx.post(f"{path}/{action}", headers=operator, timeout=60).raise_for_status()
         expect(page.get_by_test_id("others")).to_have_text(words)
         expect(page.get_by_test_id("heard")).to_have_text(words)

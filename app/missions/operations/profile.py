@@ -67,9 +67,7 @@ async def profile_of(
     def view() -> ProfileView:
         profile = profile_along(snapshot.built.map, line)
         if not np.isfinite(profile.depth_m).any():
-            raise InvalidRequestError(
-                "line", "the line does not cross what is mapped", "Draw it over the map's cells"
-            )
+            raise InvalidRequestError("line", "the line does not cross what is mapped", "Draw it over the map's cells")
         return _view(snapshot, line, profile, layers(), within_m, near)
 
     return await asyncio.to_thread(view)
@@ -141,9 +139,7 @@ def _view(
         vertical_datum=snapshot.facts.vertical_datum.statement,
         length_m=line.length_m,
         spacing_m=float(line.along_m[1]),
-        positions=[
-            (lon, lat) for lon, lat in zip(lon_deg.round(7).tolist(), lat_deg.round(7).tolist(), strict=True)
-        ],
+        positions=[(lon, lat) for lon, lat in zip(lon_deg.round(7).tolist(), lat_deg.round(7).tolist(), strict=True)],
         along_m=line.along_m.round(3).tolist(),
         depth_m=_rounded(profile.depth_m),
         sd_m=_rounded(profile.sd_m),
