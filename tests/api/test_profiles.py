@@ -31,9 +31,8 @@ async def test_a_profile_has_the_map_and_the_soundings_beside_it(client: httpx.A
     count = len(found.along_m)
     assert found.length_m == pytest.approx(found.along_m[-1], abs=1e-3)
     assert found.spacing_m <= shown["cell_m"] / 2
-    values: Sequence[object]
-    for values in (found.positions, found.depth_m, found.sd_m, found.sounded, *found.layers.values()):
-        assert len(values) == count
+    lists: list[Sequence[object]] = [found.positions, found.depth_m, found.sd_m, found.sounded, *found.layers.values()]
+    assert {len(values) for values in lists} == {count}
     assert set(found.layers) == {"slope", "tvu"}
     known = [depth for depth in found.depth_m if depth is not None]
     assert shown["min_depth_m"] <= min(known) < max(known) <= shown["max_depth_m"]
