@@ -62,7 +62,7 @@ export function SettingsDialog() {
       <label class="field">
         {say("settings.positions")}
         <Choice
-          id="coordinates"
+          id="coordinate-format"
           value={coordinateFormat.value}
           options={positions}
           onChoose={into(coordinateFormat)}
