@@ -9,8 +9,10 @@ _ALWAYS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
-    "Permissions-Policy": "camera=(), geolocation=(self), microphone=(), payment=(), usb=()",
 }
+_PERMISSIONS = "camera=(), geolocation={}, microphone=(), payment=(), usb=()"
+_PAGE = ("/", "/index.html")
+"""The dashboard alone may ask the browser where the device is, which asks its user first; no answer of the API may."""
 _DATA_POLICY = "default-src 'none'; frame-ancestors 'none'"
 # The page of the API's description begins with a line of script; all the rest comes from this service.
 _DOCS_POLICY = (
@@ -25,6 +27,8 @@ def add_security_headers(scope: Scope, headers: MutableHeaders) -> None:
     """Add what is not there yet; by HTTPS also that this host is to be asked by HTTPS only."""
     for name, value in _ALWAYS.items():
         headers.setdefault(name, value)
+    own = "(self)" if scope["path"] in _PAGE else "()"
+    headers.setdefault("Permissions-Policy", _PERMISSIONS.format(own))
     headers.setdefault("Content-Security-Policy", _DOCS_POLICY if scope["path"] == _DOCS else _DATA_POLICY)
     if scope.get("scheme") == "https":
         headers.setdefault("Strict-Transport-Security", f"max-age={_ONE_YEAR_S}")

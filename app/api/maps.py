@@ -60,7 +60,7 @@ MAX_VALUE_M = 20_000.0
 
 End = Annotated[float | None, Field(ge=-MAX_VALUE_M, le=MAX_VALUE_M, allow_inf_nan=False)]
 """Of a range of colours; ``min`` and ``max`` are the query parameters' names."""
-_Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is compared with")]
+S44Order = Annotated[Order, Query(description="Order of IHO S-44 that the TVU is compared with")]
 
 
 def _by_extension(resource: str) -> dict[str, str]:
@@ -69,7 +69,7 @@ def _by_extension(resource: str) -> dict[str, str]:
 
 
 async def _file_options(
-    order: _Order = Order.ORDER_1A,
+    order: S44Order = Order.ORDER_1A,
     interval_m: Annotated[
         float | None, Query(gt=0, le=1000, allow_inf_nan=False, description="Between contours; default: about ten")
     ] = None,
@@ -92,7 +92,7 @@ def _layer_enum(title: str, description: str, among: Callable[[LayerKind], bool]
 
 
 @dataclass(frozen=True)
-class _OneOf:
+class OneOf:
     """Lets a string be one of an enumeration that is made of a table; the document has it like one that is written."""
 
     names: type[StrEnum]
@@ -142,10 +142,10 @@ async def get_map(
     reader: Reader,
     mission: Mission,
     layer: Annotated[
-        list[Annotated[str, _OneOf(JSON_LAYERS)]] | None,
+        list[Annotated[str, OneOf(JSON_LAYERS)]] | None,
         Query(max_length=len(JSON_LAYERS), description="Further layers, in `layers`; repeat it for several"),
     ] = None,
-    order: _Order = Order.ORDER_1A,
+    order: S44Order = Order.ORDER_1A,
     if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return depth, standard deviation and count of every cell, with an ETag that changes with every new map."""
@@ -156,7 +156,7 @@ async def get_map(
         return _not_modified(tag)
 
     def content() -> str:
-        wanted = [_layer(snapshot, name, order) for name in names]
+        wanted = [layer_of(snapshot, name, order) for name in names]
         return snapshot.view(wanted).model_dump_json()
 
     content_json = await asyncio.to_thread(content)
@@ -181,8 +181,8 @@ async def get_overlay(
     state: State,
     reader: Reader,
     mission: Mission,
-    layer: Annotated[str, _OneOf(PICTURES), Query(description="What is shown")] = "depth",
-    order: _Order = Order.ORDER_1A,
+    layer: Annotated[str, OneOf(PICTURES), Query(description="What is shown")] = "depth",
+    order: S44Order = Order.ORDER_1A,
     min: Annotated[End, Query(description="Value at the palette's begin, m; default: the map's least")] = None,  # noqa: A002
     max: Annotated[End, Query(description="Value at the palette's end, m; default: the map's largest")] = None,  # noqa: A002
     if_none_match: _IfNoneMatch = None,
@@ -199,7 +199,7 @@ async def get_overlay(
         return _not_modified(tag)
 
     def picture() -> bytes:
-        values = _layer(snapshot, layer, order).values
+        values = layer_of(snapshot, layer, order).values
         low = float(np.nanmin(values)) if min is None else min
         high = float(np.nanmax(values)) if max is None else max
         # A flat map, or one beyond the only end that was given, is all one colour.
@@ -230,7 +230,7 @@ async def get_tiles(
         str, Query(max_length=80, pattern=r"^[A-Za-z0-9.@]*$", description="`tag` of the map that the client has")
     ] = "",
     layer: Annotated[
-        list[Annotated[str, _OneOf(FURTHER_TILES)]] | None,
+        list[Annotated[str, OneOf(FURTHER_TILES)]] | None,
         Query(max_length=len(FURTHER_TILES), description="Layers beside the usual ones"),
     ] = None,
     step: Annotated[
@@ -294,7 +294,7 @@ async def get_crosslines(
     state: State,
     reader: Reader,
     mission: Mission,
-    order: _Order = Order.ORDER_1A,
+    order: S44Order = Order.ORDER_1A,
     if_none_match: _IfNoneMatch = None,
 ) -> Response:
     """Return what the depths of lines differ where they cross, and crosslines' beams from the grid of the main lines.
@@ -325,7 +325,7 @@ async def get_crosslines(
     },
 )
 async def get_crossovers_file(
-    service: Service, reader: Reader, mission: Mission, order: _Order = Order.ORDER_1A
+    service: Service, reader: Reader, mission: Mission, order: S44Order = Order.ORDER_1A
 ) -> Response:
     """Return where lines cross as a file, all crossings."""
     options = ProductOptions(order)
@@ -338,7 +338,7 @@ def _add_report(kind: ReportKind) -> None:
         reader: Reader,
         mission: Mission,
         lang: Annotated[Language, Query(description="Language that it is written in")] = Language.EN,
-        order: _Order = Order.ORDER_1A,
+        order: S44Order = Order.ORDER_1A,
     ) -> Response:
         return file_answer(await service.reports.report(mission, ReportOptions(kind, lang, order)))
 
@@ -470,7 +470,7 @@ _add_files(SOUNDINGS, "getSoundingsFile", "Download the soundings", "Return the 
 _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the vehicles were as a file.")
 
 
-def _layer(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
+def layer_of(snapshot: MapSnapshot, name: str, order: Order) -> Layer:
     """Return a layer. Raises ProblemError where the mission has none of that name."""
     kind = LAYERS[name]
     found = kind.of(snapshot.source(order))

@@ -64,6 +64,17 @@ def accepted_query(
     return query if until_step is None else query.where(SoundingRow.step <= until_step)
 
 
+def accepted_in(mission_id: str, box_m: tuple[float, float, float, float]) -> Select[*tuple[Any, ...]]:
+    """Return the query of accepted soundings in a box: west, south, east and north, local metres.
+
+    Columns are those of :func:`accepted_query`.
+    """
+    west, south, east, north = box_m
+    return accepted_query(mission_id).where(
+        SoundingRow.east_m.between(west, east), SoundingRow.north_m.between(south, north)
+    )
+
+
 async def vehicles_of(session: AsyncSession, mission_id: str) -> set[str]:
     """Return the names of those who sounded something."""
     return set(

@@ -126,7 +126,7 @@ def test_everything_can_be_reached_with_the_keyboard(page: Page, service: Servic
         page.keyboard.press("Tab")
         name = page.evaluate("document.activeElement?.dataset?.testid ?? ''")
         reached.add(str(name))
-    assert {"toggle-missions", "theme", "start", "abort", "new-mission", "toggle-log"} <= reached
+    assert {"toggle-missions", "open-settings", "start", "abort", "new-mission", "toggle-log"} <= reached
 
 
 def test_the_page_has_no_unlabelled_controls(page: Page, service: Service) -> None:

@@ -1,6 +1,7 @@
 import re
 from collections.abc import Iterator
 
+import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -92,3 +93,18 @@ def test_a_viewer_sees_what_he_may_not_do_and_signs_out(page: Page, tokens: dict
     expect(page.get_by_test_id("sign-in")).to_be_visible()
     page.reload()
     expect(page.get_by_test_id("sign-in")).to_be_visible()
+
+
+def test_a_watch_keeper_sees_what_another_commands(page: Page, service: Service, tokens: dict[str, str]) -> None:
+    page.goto(f"/#/missions/{tokens['mission']}")
+    sign_in(page, tokens["viewer"])
+    expect(page.get_by_test_id("link")).to_have_attribute("data-status", "open")
+    path = f"{service.url}/api/v1/missions/{tokens['mission']}"
+    operator = {"Authorization": f"Bearer {tokens['operator']}"}
+    for action, words in (
+        ("start", "the operator set the mission running"),
+        ("abort", "the operator aborted the mission"),
+    ):
+        httpx.post(f"{path}/{action}", headers=operator, timeout=60).raise_for_status()
+        expect(page.get_by_test_id("others")).to_have_text(words)
+        expect(page.get_by_test_id("heard")).to_have_text(words)

@@ -45,6 +45,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/crossovers.csv": "getCrossoversFile",
     "GET /missions/{mission_id}/report.pdf": "getPdfReport",
     "GET /missions/{mission_id}/report.html": "getHtmlReport",
+    "GET /missions/{mission_id}/profile": "getProfile",
     "GET /missions/{mission_id}/products": "listProducts",
     "GET /missions/{mission_id}/quality": "getQuality",
     "GET /missions/{mission_id}/adjustment": "getAdjustment",

@@ -1,4 +1,5 @@
 import "./base.css";
+import "./print.css";
 import "./ui/common.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
@@ -8,8 +9,9 @@ import { findCharts } from "./state/tiles";
 import { App } from "./ui/App";
 
 effect(() => {
+  const { value } = theme;
   document.documentElement.dataset.theme =
-    theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light";
+    value === "contrast" || value === "night" ? value : isDark.value ? "dark" : "light";
 });
 startSession();
 void findCharts();

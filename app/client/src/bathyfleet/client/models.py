@@ -1279,6 +1279,47 @@ class ProductView(Model):
     """Whether a first map is needed"""
 
 
+class ProfilePointView(Model):
+    """A sounding near the line."""
+
+    along_m: float
+    across_m: float
+    """To starboard of the line; negative: to port"""
+    depth_m: float
+    sd_m: float
+
+
+class ProfileView(Model):
+    """The map along a line, point by point; null outside the area or where unknown. All lists are equally long."""
+
+    mission_id: str
+    name: str
+    version: int
+    """Of the map"""
+    step: int
+    vertical_datum: str
+    """What depths are counted from"""
+    length_m: float
+    spacing_m: float
+    """Between two points"""
+    positions: list[tuple[float, float]]
+    """[longitude, latitude] of the points"""
+    along_m: list[float]
+    depth_m: list[float | None]
+    sd_m: list[float | None]
+    """Standard deviation: the largest of the cells that a point is between"""
+    sounded: list[bool]
+    """Whether the point's cell was sounded; else its depth is interpolated"""
+    layers: dict[str, list[float | None]]
+    """Further layers that were asked for, by name"""
+    within_m: float
+    """How far from the line its `soundings` lie at most"""
+    soundings: list[ProfilePointView]
+    """Accepted ones of single beams, in the order of the line"""
+    soundings_found: int
+    """So many there are; where more than are listed, evenly chosen ones are"""
+
+
 class Progress(Model):
     """How far a mission has come."""
 

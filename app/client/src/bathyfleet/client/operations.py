@@ -699,6 +699,24 @@ class Operations(ABC):
             query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
         ))
 
+    def get_profile(
+        self,
+        mission_id: str,
+        *,
+        line: str,
+        spacing_m: float | None = None,
+        within_m: float | None = None,
+        layer: list[models.LayerName] | None = None,
+        order: models.Order | None = None,
+    ) -> models.ProfileView:
+        """See the map along a line: ``GET /missions/{mission_id}/profile``."""
+        return self._call(Call[models.ProfileView](
+            "GET",
+            f"/missions/{part(mission_id)}/profile",
+            models.ProfileView,
+            query={"line": line, "spacing_m": spacing_m, "within_m": within_m, "layer": layer, "order": order},
+        ))
+
     def list_layers(self) -> list[models.LayerView]:
         """List the layers of maps: ``GET /layers``."""
         return self._call(Call[list[models.LayerView]]("GET", "/layers", list[models.LayerView]))
@@ -1700,6 +1718,24 @@ class AsyncOperations(ABC):
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
             bytes,
             query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    async def get_profile(
+        self,
+        mission_id: str,
+        *,
+        line: str,
+        spacing_m: float | None = None,
+        within_m: float | None = None,
+        layer: list[models.LayerName] | None = None,
+        order: models.Order | None = None,
+    ) -> models.ProfileView:
+        """See the map along a line: ``GET /missions/{mission_id}/profile``."""
+        return await self._call(Call[models.ProfileView](
+            "GET",
+            f"/missions/{part(mission_id)}/profile",
+            models.ProfileView,
+            query={"line": line, "spacing_m": spacing_m, "within_m": within_m, "layer": layer, "order": order},
         ))
 
     async def list_layers(self) -> list[models.LayerView]:

@@ -1,3 +1,4 @@
+import { say } from "../words/say";
 import type {
   ActionView,
   AlarmReport,
@@ -22,6 +23,7 @@ import type {
   PreflightView,
   Problem,
   ProductView,
+  ProfileView,
   QualityView,
   SearchGridView,
   SessionView,
@@ -58,14 +60,14 @@ export async function toServiceError(response: Response): Promise<ServiceError> 
   try {
     const problem = (await response.json()) as Partial<Problem>;
     return new ServiceError(
-      problem.detail || problem.title || `The service answered ${response.status}`,
+      problem.detail || problem.title || say("service.theServiceAnswered", { status: response.status }),
       response.status,
       problem.remedy ?? "",
       problem.errors ?? [],
     );
   } catch {
     return new ServiceError(
-      `The service answered ${response.status} ${response.statusText}`,
+      say("service.theServiceAnswered2", { status: response.status, statusText: response.statusText }),
       response.status,
     );
   }
@@ -83,12 +85,9 @@ async function ask(address: string, init: RequestInit): Promise<Response> {
   let response: Response;
   try {
     response = await fetch(address, init);
-  } catch {
-    throw new ServiceError(
-      "The service does not answer",
-      0,
-      "Check that it is running and that this device reaches it.",
-    );
+  } catch (error) {
+    if (init.signal?.aborted) throw error;
+    throw new ServiceError(say("service.theServiceDoesNotAnswer"), 0, say("service.checkThatItIsRunningAnd"));
   }
   if (!response.ok) throw await toServiceError(response);
   return response;
@@ -98,8 +97,9 @@ async function ask(address: string, init: RequestInit): Promise<Response> {
 async function file(
   address: string,
   onBytes: (received: number) => void = () => {},
+  gone?: AbortSignal,
 ): Promise<{ name: string; content: Blob }> {
-  const response = await ask(address, {});
+  const response = await ask(address, gone ? { signal: gone } : {});
   const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1];
   const type = response.headers.get("Content-Type") ?? "application/octet-stream";
   const parts: BlobPart[] = [];
@@ -211,6 +211,11 @@ export const api = {
   deleteSystematicErrors: (id: string) =>
     request<unknown>(`${missionPath(id)}/systematic-errors`, { method: "DELETE" }),
   holidays: (id: string) => request<Holidays>(`${missionPath(id)}/holidays`),
+  profile: (id: string, line: string, layers: readonly string[], gone: AbortSignal) => {
+    const query = new URLSearchParams({ line });
+    for (const layer of layers) query.append("layer", layer);
+    return request<ProfileView>(`${missionPath(id)}/profile?${query}`, { signal: gone });
+  },
   products: (id: string) => request<ProductView[]>(`${missionPath(id)}/products`),
   sites: () => request<SiteView[]>("/sites"),
   createSite: (site: NewSite) => post<SiteView>("/sites", site),

@@ -1175,6 +1175,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/profile": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See the map along a line
+         * @description Return depth and deviation of the newest map along a line, and the accepted soundings beside it.
+         *
+         *     Depths are interpolated between cells; the deviation of a point is the largest of the cells that it lies between.
+         */
+        get: operations["getProfile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/layers": {
         parameters: {
             query?: never;
@@ -4609,6 +4631,96 @@ export interface components {
              * @description Whether a first map is needed
              */
             needs_map: boolean;
+        };
+        /**
+         * ProfilePointView
+         * @description A sounding near the line.
+         */
+        ProfilePointView: {
+            /** Along M */
+            along_m: number;
+            /**
+             * Across M
+             * @description To starboard of the line; negative: to port
+             */
+            across_m: number;
+            /** Depth M */
+            depth_m: number;
+            /** Sd M */
+            sd_m: number;
+        };
+        /**
+         * ProfileView
+         * @description The map along a line, point by point; null outside the area or where unknown. All lists are equally long.
+         */
+        ProfileView: {
+            /** Mission Id */
+            mission_id: string;
+            /** Name */
+            name: string;
+            /**
+             * Version
+             * @description Of the map
+             */
+            version: number;
+            /** Step */
+            step: number;
+            /**
+             * Vertical Datum
+             * @description What depths are counted from
+             */
+            vertical_datum: string;
+            /** Length M */
+            length_m: number;
+            /**
+             * Spacing M
+             * @description Between two points
+             */
+            spacing_m: number;
+            /**
+             * Positions
+             * @description [longitude, latitude] of the points
+             */
+            positions: [
+                number,
+                number
+            ][];
+            /** Along M */
+            along_m: number[];
+            /** Depth M */
+            depth_m: (number | null)[];
+            /**
+             * Sd M
+             * @description Standard deviation: the largest of the cells that a point is between
+             */
+            sd_m: (number | null)[];
+            /**
+             * Sounded
+             * @description Whether the point's cell was sounded; else its depth is interpolated
+             */
+            sounded: boolean[];
+            /**
+             * Layers
+             * @description Further layers that were asked for, by name
+             */
+            layers: {
+                [key: string]: (number | null)[];
+            };
+            /**
+             * Within M
+             * @description How far from the line its `soundings` lie at most
+             */
+            within_m: number;
+            /**
+             * Soundings
+             * @description Accepted ones of single beams, in the order of the line
+             */
+            soundings: components["schemas"]["ProfilePointView"][];
+            /**
+             * Soundings Found
+             * @description So many there are; where more than are listed, evenly chosen ones are
+             */
+            soundings_found: number;
         };
         /**
          * Progress
@@ -13296,6 +13408,85 @@ export interface operations {
             };
             /** @description It contradicts the present state */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getProfile: {
+        parameters: {
+            query: {
+                /** @description Its 2 to 100 corners as longitude,latitude, with ; between them */
+                line: string;
+                /** @description Between points; default: half a cell */
+                spacing_m?: number;
+                /** @description From the line to soundings at most; default: one cell */
+                within_m?: number;
+                /** @description Further layers, in `layers`; repeat it for several */
+                layer?: components["schemas"]["LayerName"][];
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProfileView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -2,6 +2,8 @@
 
 import { kml } from "@tmcw/togeojson";
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { fixed } from "../state/format";
+import { say } from "../words/say";
 import { metresPerDegree } from "./geo";
 
 const MOST_CORNERS = 1000;
@@ -20,22 +22,27 @@ export function ringOf(polygon: PolygonGeometry): LngLat[] {
 
 /** What is wrong with an area; empty when it can be taken. */
 export function areaFault(ring: readonly LngLat[], cell_m: number): string {
-  if (ring.length < 3) return "An area needs at least three corners";
+  if (ring.length < 3) return say("area.anAreaNeedsAtLeastThree");
   if (ring.length > MOST_CORNERS)
-    return `The area has ${ring.length} corners, at most ${MOST_CORNERS} are taken`;
+    return say("area.theAreaHasCornersAtMost", { ring: ring.length, most: MOST_CORNERS });
   if (ring.some(([lng, lat]) => !(Math.abs(lng) <= 180 && Math.abs(lat) <= 85))) {
-    return "A corner lies outside of ±180° and ±85°: are longitude and latitude in this order?";
+    return say("area.aCornerLiesOutsideOf180");
   }
   const crossing = crossingOf(ring);
-  if (crossing) return `The outline crosses itself between corners ${crossing[0] + 1} and ${crossing[1] + 1}`;
+  if (crossing)
+    return say("area.theOutlineCrossesItself", { crossing: crossing[0] + 1, crossing2: crossing[1] + 1 });
   const { east_m, north_m } = sizeOf(ring);
   if (!(cell_m > 0)) return "";
   if (Math.min(east_m, north_m) < 2 * cell_m) {
-    return `The area is ${east_m.toFixed(1)} x ${north_m.toFixed(1)} m, less than two cells of ${cell_m} m`;
+    return say("area.theAreaIsXMLess", {
+      eastM: fixed(east_m, 1),
+      northM: fixed(north_m, 1),
+      cellM: cell_m,
+    });
   }
   const cells = Math.ceil(east_m / cell_m) * Math.ceil(north_m / cell_m);
   if (cells > MOST_CELLS) {
-    return `The area has ${(cells / 1e6).toFixed(1)} million cells of ${cell_m} m, at most 4 are taken: larger cells?`;
+    return say("area.theAreaHasMillionCellsOf", { cells: fixed(cells / 1e6, 1), cellM: cell_m });
   }
   return "";
 }
@@ -92,24 +99,20 @@ export function areasIn(name: string, text: string): FoundAreas {
   const json = /\.kml$/i.test(name) || text.trimStart().startsWith("<") ? fromKml(text) : parsed(text);
   const polygons = polygonsOf(json);
   const [first] = polygons;
-  if (!first) throw new Error(`${name} holds no polygon: an area is a polygon`);
+  if (!first) throw new Error(say("area.holdsNoPolygonAnAreaIs", { name }));
   const largest = polygons.reduce((a, b) => (sizeOf(b.ring).area_m2 > sizeOf(a.ring).area_m2 ? b : a), first);
   const area =
     polygons.find((p) => !p.keepOut && p === largest) ?? polygons.find((p) => !p.keepOut) ?? largest;
   const isZone = (p: Found) => p.keepOut || reaches(p.ring, area.ring);
   const keepOut = polygons.filter((p) => p !== area && isZone(p)).map((p) => p.ring);
   const others = polygons.filter((p) => p !== area && !isZone(p)).map((p) => p.ring);
-  const zones = keepOut.length
-    ? `, ${keepOut.length} more as keep-out zone${keepOut.length > 1 ? "s" : ""}`
-    : "";
-  const apart = others.length
-    ? `. ${others.length} more area${others.length > 1 ? "s lie" : " lies"} apart and ${others.length > 1 ? "are" : "is"} left out: a mission has one`
-    : "";
+  const zones = keepOut.length ? say("area.moreAsKeepOutZone", { keepOut: keepOut.length }) : "";
+  const apart = others.length ? say("area.moreAreaLiesApartAndIs", { others: others.length }) : "";
   return {
     area: area.ring,
     keepOut,
     others,
-    note: `${name}: area of ${area.ring.length} corners${zones}${apart}`,
+    note: say("area.areaOfCorners", { name, ring: area.ring.length, zones, apart }),
   };
 }
 
@@ -139,14 +142,13 @@ function parsed(text: string): unknown {
   try {
     return JSON.parse(text);
   } catch {
-    throw new Error("The file is neither GeoJSON nor KML");
+    throw new Error(say("area.theFileIsNeitherGeojsonNor"));
   }
 }
 
 function fromKml(text: string): unknown {
   const document = new DOMParser().parseFromString(text, "text/xml");
-  if (document.querySelector("parsererror"))
-    throw new Error("The KML file cannot be read: its XML is broken");
+  if (document.querySelector("parsererror")) throw new Error(say("area.theKmlFileCannotBeRead"));
   return kml(document);
 }
 
@@ -191,8 +193,7 @@ function polygonsOf(value: unknown, keepOut = false): Found[] {
 function cleaned(ring: readonly unknown[]): LngLat[] {
   const corners = ring.map((position) => {
     const [lng, lat] = position as number[];
-    if (typeof lng !== "number" || typeof lat !== "number")
-      throw new Error("A corner of the file has no numbers");
+    if (typeof lng !== "number" || typeof lat !== "number") throw new Error(say("area.aCornerOfTheFileHas"));
     return [lng, lat] as LngLat;
   });
   const [a, b] = [corners[0], corners.at(-1)];

@@ -7,6 +7,7 @@ import "maplibre-gl/dist/maplibre-gl.css";
 import { Map as MapLibreMap, Marker, NavigationControl, ScaleControl, setWorkerUrl } from "maplibre-gl";
 import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../api/types";
+import { say } from "../words/say";
 import { coasts, showsCoast } from "./coast";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "./geo";
 import { type Box, type Label, placed, type Side } from "./labels";
@@ -23,7 +24,7 @@ import {
 import type { PlaceMark, Route, Spot, Track } from "./marks";
 import { type Look, PAPER } from "./paper";
 import type { PictureResult } from "./picture.worker";
-import type { Projection } from "./projection";
+import { moved, type Projection } from "./projection";
 import { Sheets } from "./sheets";
 import type { ShipMark } from "./ships";
 import { type Site, sitePicture } from "./site";
@@ -83,6 +84,7 @@ const EMPTY_RATIO = 0.1;
 export class Chart {
   readonly #map: MapLibreMap;
   readonly #sheets: Sheets;
+  readonly #scale = new ScaleControl({ maxWidth: 140, unit: "metric" });
   readonly #pins = new Map<string, Marker>();
   /** Sizes of pins' labels, and the sides on which all labels are. */
   readonly #labels = new Map<string, Pick<Label, "width" | "height" | "reach">>();
@@ -122,11 +124,12 @@ export class Chart {
       this.setLook(this.#look);
       this.#layTiles();
     });
+    map.addControl(this.#scale, "bottom-left");
     this.#map = map;
     this.#look = look;
     this.#sheets = new Sheets(
       map,
-      (context, at) => paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]),
+      (context, at) => paintStill(context, at, at, this.#still, PAPER[this.#look]),
       (context, at) =>
         paintLively(context, at, this.#lively, this.#layLabels(context, at), PAPER[this.#look]),
     );
@@ -167,6 +170,42 @@ export class Chart {
     this.#map.getContainer().style.backgroundColor = PAPER[look].sea;
     if (this.#styled) this.#map.setPaintProperty("sea", "background-color", PAPER[look].sea);
     this.#sheets.redraw();
+  }
+
+  /** In what the scale counts. */
+  setUnits(units: "metric" | "nautical"): void {
+    this.#scale.setUnit(units);
+  }
+
+  /** The part of the window that nothing covers, and the window itself. */
+  seen(padding: Padding): {
+    window: Projection;
+    part: { left: number; top: number; width: number; height: number };
+  } {
+    const window = this.#sheets.projection;
+    const { left, right, top, bottom } = padding;
+    const width = Math.max(window.width - left - right, 1);
+    const height = Math.max(window.height - top - bottom, 1);
+    return { window, part: { left, top, width, height } };
+  }
+
+  /** Draws what the map shows for another window: charts under it as far as they are on the screen. */
+  paintOn(context: CanvasRenderingContext2D, at: Projection): void {
+    if (this.#tiles) {
+      // Within one turn of the event loop what MapLibre draws can be read.
+      this.#map.redraw();
+      const drawn = this.#sheets.projection;
+      const { x, y, scale } = moved(drawn, at);
+      const [width, height] = [drawn.width * scale, drawn.height * scale];
+      const [left, top] = [x + (drawn.width - width) / 2, y + (drawn.height - height) / 2];
+      context.drawImage(this.#map.getCanvas(), left, top, width, height);
+    }
+    paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]);
+    const sides = {
+      marks: this.#lively.marks.map(() => "right" as const),
+      targets: this.#lively.targets.map(() => "right" as const),
+    };
+    paintLively(context, at, { ...this.#lively, pointed: null }, sides, PAPER[this.#look]);
   }
 
   /** Charts under everything else, from a server of raster tiles; none without an address. */
@@ -494,12 +533,19 @@ function emptyMap(container: HTMLElement, centre: LngLat, look: Look): MapLibreM
     touchPitch: false,
     attributionControl: false,
     fadeDuration: 0,
+    locale: {
+      "Map.Title": say("chartPane.canvas"),
+      "NavigationControl.ZoomIn": say("chartPane.zoomIn"),
+      "NavigationControl.ZoomOut": say("chartPane.zoomOut"),
+      "ScaleControl.Meters": "m",
+      "ScaleControl.Kilometers": "km",
+      "ScaleControl.NauticalMiles": "nmi",
+    },
     pixelRatio: EMPTY_RATIO,
     canvasContextAttributes: { antialias: false },
   });
   map.touchZoomRotate.disableRotation();
   map.keyboard.disableRotation();
   map.addControl(new NavigationControl({ showCompass: false }), "bottom-right");
-  map.addControl(new ScaleControl({ maxWidth: 140, unit: "metric" }), "bottom-left");
   return map;
 }

@@ -1,9 +1,14 @@
 /** How well each cell is known: the layer that is drawn by classes instead of by a scale of colours. Pure. */
 
+import { say } from "../words/say";
 import type { Rgb } from "./palette";
 import { ACCURATE, type SeaFloor, UNKNOWN, VISIBLE } from "./seafloor";
 
-export const LANDMARK_WORDS = ["never seen", "visible", "accurate"] as const;
+export const landmarkWords = (): readonly string[] => [
+  say("landmark.unseen"),
+  say("landmark.visible"),
+  say("landmark.accurate"),
+];
 
 /** As in the papers' figure: never seen, visible, accurate. */
 export const LANDMARK_COLOURS: readonly Rgb[] = [

@@ -1,6 +1,7 @@
 /** What can be shown of the map, as the service declares it: each layer's colours and range. Pure. */
 
 import type { LayerView } from "../api/types";
+import { say } from "../words/say";
 import { isMeasured } from "./certainty";
 import { DEPTH_PALETTES, type DepthPalette, PALETTES, type Palette, roundRange } from "./palette";
 import { type SeaFloor, UNKNOWN } from "./seafloor";
@@ -79,6 +80,6 @@ export function shareOutside(map: SeaFloor, { name }: LayerView, { low, high }: 
 export function rangeFault(low: string, high: string): string {
   const ends = [low, high].map((text) => (text.trim() === "" ? Number.NaN : Number(text)));
   const [from, to] = ends as [number, number];
-  if (!Number.isFinite(from) || !Number.isFinite(to)) return "Both ends need a number";
-  return from < to ? "" : `The lower end, ${low.trim()}, must be below the upper one, ${high.trim()}`;
+  if (!Number.isFinite(from) || !Number.isFinite(to)) return say("layers.bothEndsNeedANumber");
+  return from < to ? "" : say("layers.theLowerEndMustBeBelow", { low: low.trim(), high: high.trim() });
 }

@@ -1,6 +1,7 @@
 /** Colour scales for grids. */
 
 import type { LayerView } from "../api/types";
+import { say } from "../words/say";
 
 export type Rgb = readonly [number, number, number];
 
@@ -43,11 +44,36 @@ const GREY = palette(
 
 /** What the operator may choose for depths: each perceptually even, shallow is light. */
 export const DEPTH_PALETTES = {
-  deep: { title: "Deep", palette: DEEP },
-  haline: { title: "Haline", palette: HALINE },
-  viridis: { title: "Viridis", palette: VIRIDIS },
-  cividis: { title: "Cividis (colour-blind safe)", palette: CIVIDIS },
-  grey: { title: "Grey", palette: GREY },
+  deep: {
+    get title() {
+      return say("palette.deep");
+    },
+    palette: DEEP,
+  },
+  haline: {
+    get title() {
+      return say("palette.haline");
+    },
+    palette: HALINE,
+  },
+  viridis: {
+    get title() {
+      return say("palette.viridis");
+    },
+    palette: VIRIDIS,
+  },
+  cividis: {
+    get title() {
+      return say("palette.cividisColourBlindSafe");
+    },
+    palette: CIVIDIS,
+  },
+  grey: {
+    get title() {
+      return say("palette.grey");
+    },
+    palette: GREY,
+  },
 } as const;
 
 export type DepthPalette = keyof typeof DEPTH_PALETTES;

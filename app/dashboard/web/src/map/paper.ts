@@ -1,3 +1,4 @@
+import { say } from "../words/say";
 /** Colours of the map in each look, and the stripes of forbidden zones. */
 
 export type Look = "light" | "dark" | "contrast";
@@ -48,7 +49,7 @@ export function striped(colour: string, size = 12, width = 2): HTMLCanvasElement
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = size;
   const context = canvas.getContext("2d");
-  if (!context) throw new Error("This browser cannot draw on a canvas");
+  if (!context) throw new Error(say("paper.thisBrowserCannotDrawOnA"));
   context.strokeStyle = colour;
   context.globalAlpha = 0.75;
   context.lineWidth = width;

@@ -1,5 +1,6 @@
 /** Where vehicles come home to, as places on the map. Pure. */
 
+import { say } from "../words/say";
 import type { PlaceMark } from "./marks";
 
 type At = readonly [number, number];
@@ -18,7 +19,9 @@ export function recoveryMarks({ recovery, vehicles }: Homes, usual_m: number): P
     radius_m: recovery?.radius_m ?? usual_m,
   });
   return [
-    ...(recovery ? [mark("Recovery", recovery.point)] : []),
-    ...vehicles.flatMap(({ name, recovery_point: own }) => (own ? [mark(`Recovery of ${name}`, own)] : [])),
+    ...(recovery ? [mark(say("mission.recovery"), recovery.point)] : []),
+    ...vehicles.flatMap(({ name, recovery_point: own }) =>
+      own ? [mark(say("recovery.recoveryOf", { name }), own)] : [],
+    ),
   ];
 }

@@ -1,6 +1,7 @@
 /** The map as this page holds it: whole numbers per cell and layer, kept up to date with the tiles that changed. */
 
 import type { LngLat, Place } from "../api/types";
+import { say } from "../words/say";
 
 export const SOUNDED = 1;
 export const PRIOR = 2;
@@ -40,7 +41,7 @@ export interface SeaFloor extends Omit<Header, "tiles" | "base" | "layers" | "sc
 export function withTiles(known: SeaFloor | null, answer: ArrayBuffer): SeaFloor | null {
   const view = new DataView(answer);
   if (answer.byteLength < 8 || view.getUint32(0) !== 0x42464d31)
-    throw new Error("The map's form is not known");
+    throw new Error(say("seafloor.theMapSFormIsNot"));
   const length = view.getUint32(4, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(answer, 8, length))) as Header;
   const { tiles, base, layers: names, scales, ...rest } = header;

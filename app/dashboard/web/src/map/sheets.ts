@@ -5,6 +5,7 @@
  */
 
 import type { Map as MapLibreMap } from "maplibre-gl";
+import { say } from "../words/say";
 import { moved, Projection } from "./projection";
 
 /** How far the still sheet reaches beyond the window, as a share of its size on every side. */
@@ -104,7 +105,7 @@ function sheet(name: string): CanvasRenderingContext2D {
   const canvas = document.createElement("canvas");
   canvas.className = `sheet ${name}`;
   const context = canvas.getContext("2d");
-  if (!context) throw new Error("This browser cannot draw on a canvas");
+  if (!context) throw new Error(say("paper.thisBrowserCannotDrawOnA"));
   return context;
 }
 

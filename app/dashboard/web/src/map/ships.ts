@@ -1,6 +1,8 @@
 /** Ships on the map: a triangle that points ahead, and where each will be in six minutes. Pure. */
 
 import type { LngLat, ShipView } from "../api/types";
+import { fixed } from "../state/format";
+import { say } from "../words/say";
 import { metresPerDegree } from "./geo";
 
 const AHEAD_S = 360;
@@ -36,12 +38,12 @@ export function shipMarks(ships: readonly ShipView[]): ShipMark[] {
 }
 
 export function shipWords({ name, mmsi, type, sog_mps, own, closest }: ShipView): string {
-  const who = `${name || `MMSI ${mmsi}`}${own ? " (own)" : type ? ` (${type})` : ""}`;
-  const speed = sog_mps === null ? "" : `, ${((sog_mps * 3600) / 1852).toFixed(1)} kn`;
+  const who = `${name || `MMSI ${mmsi}`}${own ? say("ships.own") : type ? ` (${type})` : ""}`;
+  const speed = sog_mps === null ? "" : `, ${fixed((sog_mps * 3600) / 1852, 1)} kn`;
   if (!closest) return who + speed;
-  const away = `${closest.distance_m.toFixed(0)} m from ${closest.vehicle}`;
-  const when = closest.in_s < 1 ? "now" : `in ${minutes(closest.in_s)}`;
-  return `${who}${speed}, CPA ${away} ${when}`;
+  const away = say("ships.mFrom", { distanceM: fixed(closest.distance_m, 0), vehicle: closest.vehicle });
+  const when = closest.in_s < 1 ? say("ships.now") : say("state.in", { inS: minutes(closest.in_s) });
+  return say("ships.cpa", { who, speed, away, when });
 }
 
 function minutes(seconds: number): string {

@@ -1,6 +1,7 @@
 /** The site of a search: what is known of each cell, as a picture, and the places that matter. Pure but for atob. */
 
 import type { LngLat, SearchGridView } from "../api/types";
+import { say } from "../words/say";
 import type { PlaceMark } from "./marks";
 
 /** What is known of a cell, as the service counts. */
@@ -14,10 +15,18 @@ export const SITE_COLOURS: Readonly<Record<keyof typeof CELL, readonly [number, 
 };
 
 export const SITE_WORDS: Readonly<Record<keyof typeof CELL, string>> = {
-  explored: "looked at, free",
-  unexplored: "not looked at",
-  known: "obstacle on the plan",
-  found: "obstacle found",
+  get explored() {
+    return say("site.lookedAtFree");
+  },
+  get unexplored() {
+    return say("site.notLookedAt");
+  },
+  get known() {
+    return say("site.obstacleOnThePlan");
+  },
+  get found() {
+    return say("site.obstacleFound");
+  },
 };
 
 export interface Site {
@@ -68,12 +77,12 @@ interface Places {
 export function searchMarks(search: Places): PlaceMark[] {
   const { goal, entry, transmitter } = search;
   const marks: PlaceMark[] = [
-    { words: "Goal", sign: "goal", at: [goal[0], goal[1]], radius_m: search.goal_radius_m },
-    { words: "Entry", sign: "entry", at: [entry[0], entry[1]], radius_m: 0 },
+    { words: say("mission.goal"), sign: "goal", at: [goal[0], goal[1]], radius_m: search.goal_radius_m },
+    { words: say("mission.entry"), sign: "entry", at: [entry[0], entry[1]], radius_m: 0 },
   ];
   const mast = transmitter ?? entry;
   marks.push({
-    words: transmitter ? "Transmitter" : "",
+    words: transmitter ? say("site.transmitter") : "",
     sign: "transmitter",
     at: [mast[0], mast[1]],
     radius_m: search.transmitter_range_m,

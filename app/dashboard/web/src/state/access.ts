@@ -3,6 +3,7 @@
 import { computed, signal } from "@preact/signals";
 import { api, type ServiceError } from "../api/client";
 import type { SessionView } from "../api/types";
+import { type Key, say } from "../words/say";
 
 /** Where earlier versions kept the token for every script to read. */
 const OLD_TOKEN = "bathyfleet.token";
@@ -12,13 +13,22 @@ export const me = signal<SessionView | null>(null);
 /** Why nobody is signed in; null while someone is, or it is not known yet. */
 export const signedOut = signal<ServiceError | null>(null);
 
+const ROLE_KEYS = {
+  viewer: "access.viewer",
+  vehicle: "access.vehicle",
+  operator: "access.operator",
+  admin: "access.admin",
+} as const satisfies Record<SessionView["role"], Key>;
+
+export const roleWords = (role: SessionView["role"]): string => say(ROLE_KEYS[role]);
+
 const COMMANDING: readonly SessionView["role"][] = ["operator", "admin"];
 
 /** Why whoever uses the page may command nothing; empty when he may. */
 export const whyNotCommand = computed(() => {
   const who = me.value;
   if (!who || COMMANDING.includes(who.role)) return "";
-  return `${who.name} has the role ${who.role}, which may look only: sign in with an operator's token`;
+  return say("access.hasTheRoleWhichMayLook", { who: who.name, role: roleWords(who.role) });
 });
 
 /** Asks who uses the page. Throws what the service refused. */

@@ -1,6 +1,7 @@
 /** What needs a person: what, since when, and what to do about it. Pure. */
 
 import type { AlarmReport, AlarmView, MissionView, VehicleView } from "../api/types";
+import { say } from "../words/say";
 import { clock } from "./format";
 
 export interface Matter {
@@ -38,7 +39,7 @@ const ofAlarm = (alarm: AlarmView): Matter => ({
   todo:
     alarm.ended_at === null
       ? alarm.action
-      : `it is over since ${clock(new Date(alarm.ended_at), "utc").slice(0, 5)}; take note of it`,
+      : say("attention.overSince", { time: clock(new Date(alarm.ended_at), "utc").slice(0, 5) }),
   since: Date.parse(alarm.raised_at),
   vehicle: alarm.vehicle,
   alarm,
@@ -49,10 +50,16 @@ function ofMission({ id, state, reason, updated_at }: MissionView): Matter[] {
   const matter = { key: `mission ${id}`, vehicle: null, alarm: null };
   if (state === "paused")
     return [
-      { ...matter, tone: "warning", what: "The mission is paused", todo: "resume it, or finish it", since },
+      {
+        ...matter,
+        tone: "warning",
+        what: say("attention.paused"),
+        todo: say("attention.resumeOrFinish"),
+        since,
+      },
     ];
   if (state === "running" && reason !== "")
-    return [{ ...matter, tone: "warning", what: reason, todo: "read why, and see to that", since: null }];
+    return [{ ...matter, tone: "warning", what: reason, todo: say("attention.readWhy"), since: null }];
   return [];
 }
 
@@ -65,8 +72,8 @@ function ofVehicle(v: VehicleView, { state, ending }: MissionView): Matter[] {
       {
         ...matter,
         tone: "warning",
-        what: `${v.name} left the mission and nobody leads it`,
-        todo: `add it again${v.recovery_point ? ", bring it home" : ""} or recover it where it is`,
+        what: say("attention.left", { name: v.name }),
+        todo: say(v.recovery_point ? "attention.addHomeOrRecover" : "attention.addOrRecover"),
         since: v.left_at ? Date.parse(v.left_at) : null,
       },
     ];
@@ -79,7 +86,7 @@ function ofVehicle(v: VehicleView, { state, ending }: MissionView): Matter[] {
           key: `warning ${v.name}`,
           tone: "warning",
           what: `${v.name}: ${warned.message}`,
-          todo: "watch it",
+          todo: say("attention.watchIt"),
         },
       ]
     : [];
@@ -87,15 +94,15 @@ function ofVehicle(v: VehicleView, { state, ending }: MissionView): Matter[] {
     found.push({
       ...matter,
       tone: "calm",
-      what: `${v.name} is home`,
-      todo: "resume its survey with a new battery, or take it out of the water",
+      what: say("attention.isHome", { name: v.name }),
+      todo: say("attention.newBattery"),
     });
   else if (led && v.phase === "stopped" && v.withdrawn !== "")
     found.push({
       ...matter,
       tone: "warning",
-      what: `${v.name} waits: ${v.withdrawn}`,
-      todo: `resume its survey${v.recovery_point ? ", or bring it home" : ""}`,
+      what: say("attention.waits", { name: v.name, why: v.withdrawn }),
+      todo: say(v.recovery_point ? "attention.resumeOrHome" : "attention.resume"),
     });
   return found;
 }
@@ -106,11 +113,15 @@ export function toldWords({ deliveries }: Pick<AlarmReport, "deliveries">): stri
     .sort((a, b) => b.created_at.localeCompare(a.created_at))
     .map(({ recipient, notice, state, done_at, error }) => {
       const after =
-        notice === "escalated" ? ", as nobody took it" : notice === "ended" ? " that it is over" : "";
-      const at = done_at ? ` at ${clock(new Date(done_at), "utc").slice(0, 5)}` : "";
-      if (state === "delivered") return `${recipient} was told${at}${after}`;
-      if (state === "failed") return `${recipient} could not be told: ${error}`;
-      return state === "waiting" ? `${recipient} is being told${after}` : "";
+        notice === "escalated"
+          ? say("attention.asNobodyTookIt")
+          : notice === "ended"
+            ? say("attention.thatItIsOver")
+            : "";
+      const at = done_at ? say("attention.at", { time: clock(new Date(done_at), "utc").slice(0, 5) }) : "";
+      if (state === "delivered") return say("attention.wasTold", { recipient, at, after });
+      if (state === "failed") return say("attention.couldNotBeTold", { recipient, error });
+      return state === "waiting" ? say("attention.isBeingTold", { recipient, after }) : "";
     })
     .filter((words) => words !== "")
     .join("; ");

@@ -4,6 +4,7 @@ import SPEC from "../api/mission.json";
 import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSpec } from "../api/types";
 import { areaFault, polygonOf, ringOf, sizeOf } from "../map/area";
 import { rectangle, wayBetween } from "../map/geo";
+import { say } from "../words/say";
 import {
   FIELDS,
   type FieldName,
@@ -26,7 +27,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./fields";
-import { PLACE_SAMPLE, placeOf, typedPlace } from "./place";
+import { placeOf, placeSample, typedPlace } from "./place";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -77,19 +78,28 @@ export type Faults = Partial<Record<keyof Draft, string>>;
 /** Planners in plain words, the sensible one first. */
 export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: string }>> = {
   cao: {
-    title: "As sure as the time allows",
-    words:
-      "Adaptive: begins evenly and goes where the map is least sure. The right choice for nearly every survey.",
+    get title() {
+      return say("draft.asSureAsTheTimeAllows");
+    },
+    get words() {
+      return say("draft.adaptiveBeginsEvenlyAndGoes");
+    },
   },
   lawnmower: {
-    title: "Even lines",
-    words:
-      "Parallel lines over the whole area, shared among the vehicles. Predictable; finds no more where it is rough.",
+    get title() {
+      return say("draft.evenLines");
+    },
+    get words() {
+      return say("draft.parallelLinesOverTheWhole");
+    },
   },
   swath: {
-    title: "Full coverage",
-    words:
-      "Lines as far apart as the measured depth lets swath sonars see, then what was missed. Needs a multibeam on every vehicle.",
+    get title() {
+      return say("draft.fullCoverage");
+    },
+    get words() {
+      return say("draft.linesAsFarApartAsThe");
+    },
   },
 };
 
@@ -142,7 +152,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     ...emptyDraft(ring[0] ?? [0, 0]),
     ...texts,
     ...places,
-    name: `${name} (copy)`,
+    name: say("draft.copy", { name }),
     kind: spec.kind,
     site: spec.site ?? "",
     length: Object.keys(spec.budget)[0] as LengthUnit,
@@ -227,12 +237,13 @@ const LONGITUDE: Schema = SPEC["area.coordinates.0"];
 const LATITUDE: Schema = SPEC["area.coordinates.1"];
 const SIZE: Schema = { type: "number", exclusiveMinimum: 0 };
 /** Numbers that are no value of a mission but what values are made of. */
-const CORNER = [
-  ["latitude", "Latitude", LATITUDE],
-  ["longitude", "Longitude", LONGITUDE],
-  ["east_m", "Size to the east", SIZE],
-  ["north_m", "Size to the north", SIZE],
-] as const;
+const corner = () =>
+  [
+    ["latitude", say("draft.latitude"), LATITUDE],
+    ["longitude", say("draft.longitude"), LONGITUDE],
+    ["east_m", say("draft.sizeToTheEast"), SIZE],
+    ["north_m", say("draft.sizeToTheNorth"), SIZE],
+  ] as const;
 const VEHICLES: Schema = { type: "integer", minimum: 0, maximum: SPEC.vehicles.maxItems };
 
 /** The draft with the length that its lines ask of each vehicle, where it is given by how far they are apart. */
@@ -266,54 +277,56 @@ export function faultsOf(described: Draft): Faults {
   const note = (field: keyof Draft, fault: string) => {
     if (fault) faults[field] = fault;
   };
-  note("name", draft.name.trim() ? "" : "Give the mission a name");
+  note("name", draft.name.trim() ? "" : say("draft.giveTheMissionAName"));
   if (draft.spacing_m.trim() !== "")
-    note("spacing_m", numberFault("Distance of lines", draft.spacing_m, SIZE));
+    note("spacing_m", numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE));
   if (draft.source === "typed") {
-    for (const [field, label, schema] of CORNER) note(field, numberFault(label, draft[field], schema));
+    for (const [field, label, schema] of corner()) note(field, numberFault(label, draft[field], schema));
   }
   for (const [name, field] of fieldsOf(draft.kind, draft.length)) {
     if (field.part !== "recovery" || draft.recovery.trim() !== "") note(name, fieldFault(field, draft[name]));
   }
   if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
-    faults.recovery = `Pick the recovery point on the map, or type ${PLACE_SAMPLE}`;
+    faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
   }
-  note("simulated", numberFault("Simulated vehicles", draft.simulated, VEHICLES));
+  note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
   if (draft.source === "drawn") {
     const fault = areaFault(draft.ring, faults.cell_m ? 0 : Number(draft.cell_m));
-    if (fault) faults.ring = draft.ring.length === 0 ? "Draw the area, or read it from a file" : fault;
+    if (fault) faults.ring = draft.ring.length === 0 ? say("draft.drawTheAreaOrReadIt") : fault;
   }
   draft.keepOut.forEach((zone, i) => {
     const fault = areaFault(zone, 0);
-    if (fault) faults.keepOut = `Keep-out zone ${i + 1}: ${fault.toLowerCase()}`;
+    if (fault) faults.keepOut = say("draft.keepOutZone", { i: i + 1, fault: fault.toLowerCase() });
   });
   if (draft.kind === "search") {
     for (const [field, words] of [
-      ["goal", "the goal"],
-      ["entry", "the entry"],
+      ["goal", say("draft.theGoal")],
+      ["entry", say("draft.theEntry")],
     ] as const) {
-      if (!placeOf(draft[field])) faults[field] = `Pick ${words} on the map, or type ${PLACE_SAMPLE}`;
+      if (!placeOf(draft[field]))
+        faults[field] = say("draft.pickOnTheMapOrType", { words, sample: placeSample() });
     }
     draft.obstacles.forEach((ring, i) => {
       const fault = areaFault(ring, 0);
-      if (fault) faults.obstacles = `Obstacle ${i + 1}: ${fault.toLowerCase()}`;
+      if (fault) faults.obstacles = say("draft.obstacle", { i: i + 1, fault: fault.toLowerCase() });
     });
   }
   const shallowest = draft.kind === "survey" ? Number(draft.min_depth_m) : 0;
   if (!faults.max_depth_m && !faults.min_depth_m && Number(draft.max_depth_m) < shallowest) {
-    faults.max_depth_m = "Deepest travel must not be above the shallowest";
+    faults.max_depth_m = say("draft.deepestTravelMustNotBeAbove");
   }
   if (!faults.simulated) {
     const all = vehicleNames(draft);
     const twice = all.find((name, i) => all.indexOf(name) !== i);
-    if (twice !== undefined) faults.names = `Two vehicles are called ${twice || "nothing"}`;
+    if (twice !== undefined)
+      faults.names = say("draft.twoVehiclesAreCalled", { twice: twice || say("draft.nothing") });
   }
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
-    faults.simulated = "Choose at least one vehicle, or simulate some";
+    faults.simulated = say("draft.chooseAtLeastOneVehicleOr");
   }
   for (const name of vehicleNames(draft)) note("own", ownFault(name, draft));
   if (draft.kind === "survey" && !canPlan(draft.planner, draft)) {
-    faults.planner = "Full coverage needs vehicles with a multibeam: choose their sensor, or another planner";
+    faults.planner = say("draft.fullCoverageNeedsVehicles");
   }
   return faults;
 }
@@ -323,17 +336,23 @@ function ownFault(name: string, draft: Draft): string {
   const own = draft.own[name] ?? {};
   const fault = vehicleFieldsOf(draft.kind, sensorOf(draft, name))
     .map(([field, declared]) =>
-      fieldFault({ ...declared, label: `${declared.label} of ${name}`, optional: true }, own[field] ?? ""),
+      fieldFault(
+        { ...declared, label: say("draft.of", { label: declared.label, name }), optional: true },
+        own[field] ?? "",
+      ),
     )
     .find((words) => words !== "");
   const point = own.recovery_point?.trim() ?? "";
-  return fault ?? (point === "" || placeOf(point) ? "" : `Recovery point of ${name}: type ${PLACE_SAMPLE}`);
+  return (
+    fault ??
+    (point === "" || placeOf(point) ? "" : say("draft.recoveryPointOfType", { name, sample: placeSample() }))
+  );
 }
 
 /** The area that a draft describes; null while it describes none. */
 export function areaOf(draft: Draft) {
   if (draft.source === "drawn") return draft.ring.length >= 3 ? polygonOf(draft.ring) : null;
-  if (CORNER.some(([field, label, schema]) => numberFault(label, draft[field], schema) !== "")) return null;
+  if (corner().some(([field, label, schema]) => numberFault(label, draft[field], schema) !== "")) return null;
   return rectangle(
     [Number(draft.longitude), Number(draft.latitude)],
     Number(draft.east_m),
@@ -368,7 +387,7 @@ export function toMission(described: Draft): NewMission {
     vehicles,
     ...(draft.kind === "survey" && draft.site ? { site: draft.site } : {}),
     ...(draft.tide_m.trim()
-      ? { tide: { source: draft.tide_source.trim() || "stated by the operator" } }
+      ? { tide: { source: draft.tide_source.trim() || say("draft.statedByTheOperator") } }
       : {}),
     ...(draft.kind === "search"
       ? searchOf(draft, vehicles)

@@ -2,6 +2,7 @@
 
 import SPEC from "../api/mission.json";
 import type { NewMission, Sensor } from "../api/types";
+import { say } from "../words/say";
 
 export type MissionKind = NonNullable<NewMission["kind"]>;
 
@@ -39,179 +40,394 @@ export interface Field {
 }
 
 export const FIELDS = {
-  steps: { path: "budget.steps", part: "length", label: "Steps", kind: "survey" },
-  minutes: { path: "budget.minutes", part: "length", label: "Minutes", kind: "survey" },
+  steps: {
+    path: "budget.steps",
+    part: "length",
+    get label() {
+      return say("fields.steps");
+    },
+    kind: "survey",
+  },
+  minutes: {
+    path: "budget.minutes",
+    part: "length",
+    get label() {
+      return say("fields.minutes");
+    },
+    kind: "survey",
+  },
   km_per_vehicle: {
     path: "budget.km_per_vehicle",
     part: "length",
-    label: "Km per vehicle",
+    get label() {
+      return say("fields.kmPerVehicle");
+    },
     kind: "survey",
   },
   goal_radius_m: {
     path: "search.goal_radius_m",
     part: "search",
-    label: "Radius of the goal",
+    get label() {
+      return say("fields.radiusOfTheGoal");
+    },
     unit: "m",
     kind: "search",
   },
   window_min: {
     path: "search.window_s",
     part: "search",
-    label: "Back within",
+    get label() {
+      return say("fields.backWithin");
+    },
     unit: "min",
     kind: "search",
     factor: 60,
   },
-  safety_m: { path: "search.safety_m", part: "search", label: "From obstacles", unit: "m", kind: "search" },
-  reach_m: {
-    path: "search.scanner.reach_m",
+  safety_m: {
+    path: "search.safety_m",
     part: "search",
-    label: "Scanner reaches",
+    get label() {
+      return say("fields.fromObstacles");
+    },
     unit: "m",
     kind: "search",
   },
-  max_step_m: { path: "limits.max_step_m", part: "limits", label: "Largest step", unit: "m" },
-  speed_mps: { path: "speed_mps", part: "limits", label: "Speed", unit: "m/s" },
-  min_depth_m: { path: "limits.min_depth_m", part: "limits", label: "Shallowest", unit: "m", kind: "survey" },
-  max_depth_m: { path: "limits.max_depth_m", part: "limits", label: "Deepest", unit: "m" },
-  min_altitude_m: { path: "limits.min_altitude_m", part: "limits", label: "Altitude", unit: "m" },
-  min_separation_m: { path: "limits.min_separation_m", part: "limits", label: "Apart", unit: "m" },
+  reach_m: {
+    path: "search.scanner.reach_m",
+    part: "search",
+    get label() {
+      return say("fields.scannerReaches");
+    },
+    unit: "m",
+    kind: "search",
+  },
+  max_step_m: {
+    path: "limits.max_step_m",
+    part: "limits",
+    get label() {
+      return say("fields.largestStep");
+    },
+    unit: "m",
+  },
+  speed_mps: {
+    path: "speed_mps",
+    part: "limits",
+    get label() {
+      return say("fleet.speed");
+    },
+    unit: "m/s",
+  },
+  min_depth_m: {
+    path: "limits.min_depth_m",
+    part: "limits",
+    get label() {
+      return say("fields.shallowest");
+    },
+    unit: "m",
+    kind: "survey",
+  },
+  max_depth_m: {
+    path: "limits.max_depth_m",
+    part: "limits",
+    get label() {
+      return say("fields.deepest");
+    },
+    unit: "m",
+  },
+  min_altitude_m: {
+    path: "limits.min_altitude_m",
+    part: "limits",
+    get label() {
+      return say("charts.altitude");
+    },
+    unit: "m",
+  },
+  min_separation_m: {
+    path: "limits.min_separation_m",
+    part: "limits",
+    get label() {
+      return say("fields.apart");
+    },
+    unit: "m",
+  },
   com_range_m: {
     path: "limits.com_range_m",
     part: "limits",
-    label: "Com. range",
+    get label() {
+      return say("fields.comRange");
+    },
     unit: "m",
-    placeholder: "unlimited",
+    get placeholder() {
+      return say("fields.unlimited");
+    },
     optional: true,
   },
-  cell_m: { path: "cell_m", part: "limits", label: "Cell", unit: "m" },
+  cell_m: {
+    path: "cell_m",
+    part: "limits",
+    get label() {
+      return say("fields.cell");
+    },
+    unit: "m",
+  },
   cell_of_depth: {
     path: "coverage.cell_of_depth",
     part: "limits",
-    label: "Cell by depth",
+    get label() {
+      return say("fields.cellByDepth");
+    },
     kind: "survey",
-    placeholder: "one size",
+    get placeholder() {
+      return say("fields.oneSize");
+    },
     optional: true,
   },
-  accuracy_m: { path: "accuracy_m", part: "quality", label: "Accuracy", unit: "m" },
+  accuracy_m: {
+    path: "accuracy_m",
+    part: "quality",
+    get label() {
+      return say("fields.accuracy");
+    },
+    unit: "m",
+  },
   shoal_depth_m: {
     path: "shoal_depth_m",
     part: "quality",
-    label: "Shoal above",
+    get label() {
+      return say("fields.shoalAbove");
+    },
     unit: "m",
     kind: "survey",
-    placeholder: "no layer",
+    get placeholder() {
+      return say("fields.noLayer");
+    },
     optional: true,
   },
   overlap_pct: {
     path: "coverage.overlap_pct",
     part: "coverage",
-    label: "Overlap of swaths",
+    get label() {
+      return say("fields.overlapOfSwaths");
+    },
     unit: "%",
     kind: "survey",
   },
   crosslines_pct: {
     path: "coverage.crosslines_pct",
     part: "coverage",
-    label: "Crosslines",
+    get label() {
+      return say("crosslines.crosslines");
+    },
     unit: "%",
     kind: "survey",
   },
   tide_m: {
     path: "tide.level_m",
     part: "tide",
-    label: "Level",
+    get label() {
+      return say("fields.level");
+    },
     unit: "m",
-    placeholder: "none",
+    get placeholder() {
+      return say("fields.none");
+    },
     optional: true,
   },
-  sd_range_m: { path: "uncertainty.range_m", part: "uncertainty", label: "Range", unit: "m", kind: "survey" },
+  sd_range_m: {
+    path: "uncertainty.range_m",
+    part: "uncertainty",
+    get label() {
+      return say("fields.range");
+    },
+    unit: "m",
+    kind: "survey",
+  },
   sd_range_pct: {
     path: "uncertainty.range_pct",
     part: "uncertainty",
-    label: "Range, by length",
+    get label() {
+      return say("fields.rangeByLength");
+    },
     unit: "%",
     kind: "survey",
   },
   sd_beam_angle_deg: {
     path: "uncertainty.beam_angle_deg",
     part: "uncertainty",
-    label: "Beam angle",
+    get label() {
+      return say("fields.beamAngle");
+    },
     unit: "°",
     kind: "survey",
   },
   sd_roll_deg: {
     path: "uncertainty.roll_deg",
     part: "uncertainty",
-    label: "Roll",
+    get label() {
+      return say("fields.roll");
+    },
     unit: "°",
     kind: "survey",
   },
   sd_pitch_deg: {
     path: "uncertainty.pitch_deg",
     part: "uncertainty",
-    label: "Pitch",
+    get label() {
+      return say("fields.pitch");
+    },
     unit: "°",
     kind: "survey",
   },
   sd_heading_deg: {
     path: "uncertainty.heading_deg",
     part: "uncertainty",
-    label: "Heading",
+    get label() {
+      return say("fields.heading");
+    },
     unit: "°",
     kind: "survey",
   },
   sd_roll_patch_deg: {
     path: "uncertainty.roll_patch_deg",
     part: "uncertainty",
-    label: "Roll of the mounting",
+    get label() {
+      return say("fields.rollOfTheMounting");
+    },
     unit: "°",
     kind: "survey",
   },
-  sd_heave_m: { path: "uncertainty.heave_m", part: "uncertainty", label: "Heave", unit: "m", kind: "survey" },
+  sd_heave_m: {
+    path: "uncertainty.heave_m",
+    part: "uncertainty",
+    get label() {
+      return say("fields.heave");
+    },
+    unit: "m",
+    kind: "survey",
+  },
   sd_waterline_m: {
     path: "uncertainty.waterline_m",
     part: "uncertainty",
-    label: "Waterline",
+    get label() {
+      return say("fields.waterline");
+    },
     unit: "m",
     kind: "survey",
   },
   sd_surface_sound_speed_mps: {
     path: "uncertainty.surface_sound_speed_mps",
     part: "uncertainty",
-    label: "Sound speed at the sonar",
+    get label() {
+      return say("fields.soundSpeedAtTheSonar");
+    },
     unit: "m/s",
     kind: "survey",
   },
   sd_sound_speed_profile_mps: {
     path: "uncertainty.sound_speed_profile_mps",
     part: "uncertainty",
-    label: "Sound speed profile",
+    get label() {
+      return say("fields.soundSpeedProfile");
+    },
     unit: "m/s",
     kind: "survey",
   },
   sd_position_m: {
     path: "uncertainty.position_m",
     part: "uncertainty",
-    label: "Position",
+    get label() {
+      return say("fields.position");
+    },
     unit: "m",
     kind: "survey",
   },
-  recovery_radius_m: { path: "recovery.radius_m", part: "recovery", label: "Radius", unit: "m" },
-  on_finish: { path: "recovery.on_finish", part: "recovery", label: "On finish" },
-  on_low_energy: { path: "recovery.on_low_energy", part: "recovery", label: "On low energy" },
-  on_lost_link: { path: "recovery.on_lost_link", part: "recovery", label: "On a lost link" },
+  recovery_radius_m: {
+    path: "recovery.radius_m",
+    part: "recovery",
+    get label() {
+      return say("fields.radius");
+    },
+    unit: "m",
+  },
+  on_finish: {
+    path: "recovery.on_finish",
+    part: "recovery",
+    get label() {
+      return say("fields.onFinish");
+    },
+  },
+  on_low_energy: {
+    path: "recovery.on_low_energy",
+    part: "recovery",
+    get label() {
+      return say("fields.onLowEnergy");
+    },
+  },
+  on_lost_link: {
+    path: "recovery.on_lost_link",
+    part: "recovery",
+    get label() {
+      return say("fields.onALostLink");
+    },
+  },
 } as const satisfies Record<string, Field>;
 
 /** The numbers that a single vehicle may have of its own. */
 export const VEHICLE_FIELDS = {
-  speed_mps: { path: "vehicles.speed_mps", label: "Speed", unit: "m/s", kind: "survey" },
-  altitude_m: { path: "vehicles.altitude_m", label: "Height above bottom", unit: "m", kind: "survey" },
-  endurance_min: { path: "vehicles.endurance_min", label: "Endurance", unit: "min" },
-  aperture_deg: { path: "vehicles.sonar.aperture_deg", label: "Aperture", unit: "°", sensor: "multibeam" },
-  beams: { path: "vehicles.sonar.beams", label: "Beams", sensor: "multibeam" },
-  rate_hz: { path: "vehicles.sonar.rate_hz", label: "Pings a second", unit: "Hz", sensor: "multibeam" },
-  range_m: { path: "vehicles.sonar.range_m", label: "Range", unit: "m", sensor: "multibeam" },
+  speed_mps: {
+    path: "vehicles.speed_mps",
+    get label() {
+      return say("fleet.speed");
+    },
+    unit: "m/s",
+    kind: "survey",
+  },
+  altitude_m: {
+    path: "vehicles.altitude_m",
+    get label() {
+      return say("fields.heightAboveBottom");
+    },
+    unit: "m",
+    kind: "survey",
+  },
+  endurance_min: {
+    path: "vehicles.endurance_min",
+    get label() {
+      return say("fields.endurance");
+    },
+    unit: "min",
+  },
+  aperture_deg: {
+    path: "vehicles.sonar.aperture_deg",
+    get label() {
+      return say("fields.aperture");
+    },
+    unit: "°",
+    sensor: "multibeam",
+  },
+  beams: {
+    path: "vehicles.sonar.beams",
+    get label() {
+      return say("bottomStrip.beams");
+    },
+    sensor: "multibeam",
+  },
+  rate_hz: {
+    path: "vehicles.sonar.rate_hz",
+    get label() {
+      return say("fields.pingsASecond");
+    },
+    unit: "Hz",
+    sensor: "multibeam",
+  },
+  range_m: {
+    path: "vehicles.sonar.range_m",
+    get label() {
+      return say("fields.range");
+    },
+    unit: "m",
+    sensor: "multibeam",
+  },
 } as const satisfies Record<string, OwnField>;
 
 /** A number of a single vehicle; with a `sensor` it describes that one. */
@@ -315,9 +531,12 @@ export function fieldFault(field: Omit<Field, "part">, text: string): string {
 /** What is wrong with a typed number; bounds are in units of which `factor` make one of the text's. */
 export function numberFault(label: string, text: string, schema: Schema, factor = 1): string {
   const value = Number(text);
-  if (text.trim() === "" || !Number.isFinite(value)) return `${label} needs a number`;
-  if (schema.type === "integer" && !Number.isInteger(value)) return `${label} needs a whole number`;
-  return isWithin(value * factor, schema) ? "" : `${label} must be ${boundsIn(schema, factor)}`;
+  if (text.trim() === "" || !Number.isFinite(value)) return say("fields.needsANumber", { label });
+  if (schema.type === "integer" && !Number.isInteger(value))
+    return say("fields.needsAWholeNumber", { label });
+  return isWithin(value * factor, schema)
+    ? ""
+    : say("fields.mustBe", { label, schema: boundsIn(schema, factor) });
 }
 
 export function isWithin(value: number, schema: Schema): boolean {
@@ -329,15 +548,15 @@ export function isWithin(value: number, schema: Schema): boolean {
 function boundsIn(schema: Schema, factor: number): string {
   const { minimum, maximum } = schema;
   if (minimum !== undefined && maximum !== undefined) {
-    return `between ${minimum / factor} and ${maximum / factor}`;
+    return say("fields.betweenAnd", { minimum: minimum / factor, maximum: maximum / factor });
   }
   const words = [
-    ["at least", minimum],
-    ["more than", schema.exclusiveMinimum],
-    ["at most", maximum],
-    ["less than", schema.exclusiveMaximum],
+    [say("fields.atLeast"), minimum],
+    [say("fields.moreThan"), schema.exclusiveMinimum],
+    [say("fields.atMost"), maximum],
+    [say("fields.lessThan"), schema.exclusiveMaximum],
   ] as const;
   return words
     .flatMap(([how, bound]) => (bound === undefined ? [] : [`${how} ${bound / factor}`]))
-    .join(" and ");
+    .join(say("fields.and"));
 }

@@ -1,27 +1,66 @@
+import { kept } from "../kept";
+import { language, locale, say } from "../words/say";
+
 /** Numbers as an operator reads them. An en dash stands for "not known". */
 
 const UNKNOWN = "–";
 
+/** A number with so many decimals, as the language writes it. */
+export function fixed(value: number, digits: number): string {
+  const text = value.toFixed(digits);
+  return language.value === "pt" ? text.replace(".", ",") : text;
+}
+
+/** A number as it is, as the language writes it. */
+export const plain = (value: number): string =>
+  language.value === "pt" ? String(value).replace(".", ",") : String(value);
+
+/** A number as it was typed, with a point where a comma was typed. */
+export const pointed = (text: string): string => text.replace(",", ".");
+
+export type Units = "metric" | "nautical";
+
+/** Lengths and speeds in the units that were chosen; depths are in metres in both. */
+export const units = kept<Units>("units", "metric");
+
+const NAUTICAL_MILE_M = 1852;
+
 export function metres(value: number | null | undefined, digits = 1): string {
-  return value == null ? UNKNOWN : `${value.toFixed(digits)} m`;
+  return value == null ? UNKNOWN : `${fixed(value, digits)} m`;
 }
 
 /** A signed value with as many digits as its unit asks for. */
 export function quantity(value: number, unit: string): string {
   const digits = unit === "m" ? 3 : unit === "m/s" ? 1 : 2;
-  return `${value < 0 ? "-" : "+"}${Math.abs(value).toFixed(digits)} ${unit}`;
+  return `${value < 0 ? "-" : "+"}${fixed(Math.abs(value), digits)} ${unit}`;
 }
 
 export function percent(value: number | null | undefined, digits = 0): string {
-  return value == null ? UNKNOWN : `${value.toFixed(digits)} %`;
+  return value == null ? UNKNOWN : `${fixed(value, digits)} %`;
 }
 
 export function distance(value_m: number, digits = 0): string {
-  return value_m < 1000 ? `${value_m.toFixed(digits)} m` : `${(value_m / 1000).toFixed(2)} km`;
+  if (value_m < 1000) return `${fixed(value_m, digits)} m`;
+  return units.value === "nautical"
+    ? `${fixed(value_m / NAUTICAL_MILE_M, 2)} nmi`
+    : `${fixed(value_m / 1000, 2)} km`;
 }
 
+export function speed(value_mps: number): string {
+  return units.value === "nautical"
+    ? `${fixed((value_mps * 3600) / NAUTICAL_MILE_M, 1)} kn`
+    : `${fixed(value_mps, 1)} m/s`;
+}
+
+/** A moment's day and time, where the page is; a day alone in UTC. */
+export const dayAndTime = (date: Date): string =>
+  date.toLocaleString(locale.value, { dateStyle: "medium", timeStyle: "short" });
+
+export const day = (date: Date): string =>
+  date.toLocaleDateString(locale.value, { dateStyle: "medium", timeZone: "UTC" });
+
 export function area(value_m2: number): string {
-  return value_m2 < 1e6 ? `${count(Math.round(value_m2))} m²` : `${(value_m2 / 1e6).toFixed(2)} km²`;
+  return value_m2 < 1e6 ? `${count(Math.round(value_m2))} m²` : `${fixed(value_m2 / 1e6, 2)} km²`;
 }
 
 export function count(value: number): string {
@@ -43,8 +82,8 @@ export function minutes(seconds: number): string {
 }
 
 export function age(seconds: number | null): string {
-  if (seconds === null) return "never";
-  return seconds < 10 ? `${seconds.toFixed(1)} s` : duration(seconds);
+  if (seconds === null) return say("format.never");
+  return seconds < 10 ? `${fixed(seconds, 1)} s` : duration(seconds);
 }
 
 /** Coordinates with as many decimals as a step of the given size needs. */
@@ -83,5 +122,5 @@ function pad(value: number): string {
 }
 
 export function megabytes(bytes: number): string {
-  return `${(bytes / 1e6).toFixed(1)} MB`;
+  return `${fixed(bytes / 1e6, 1)} MB`;
 }

@@ -2,6 +2,7 @@
 
 import type { LngLat, StepView, TimedTracks } from "../api/types";
 import { wayBetween } from "../map/geo";
+import { type Key, say } from "../words/say";
 
 export interface Series {
   label: string;
@@ -22,19 +23,23 @@ export function figuresOf(steps: readonly StepView[]) {
   };
 }
 
-const TERMS: Readonly<Record<string, string>> = {
-  feasible: "choices that break no limit",
-  finish: "step at which all is done",
-  left_m: "metres of lines left",
-  left_pct: "% left to see",
-  waypoints: "waypoints planned",
-  errands: "vehicles on errands",
+type Term = Extract<Key, `terms.${string}`>;
+
+const TERMS: Readonly<Record<string, Exclude<Term, "terms.trustInPrediction">>> = {
+  feasible: "terms.feasible",
+  finish: "terms.finish",
+  left_m: "terms.left_m",
+  left_pct: "terms.left_pct",
+  waypoints: "terms.waypoints",
+  errands: "terms.errands",
 };
 
 /** A planner's figure in words. */
 export function termWords(name: string): string {
   const theta = /^theta_(\d+)$/.exec(name);
-  return theta ? `trust in prediction ${Number(theta[1]) + 1}` : (TERMS[name] ?? name.replaceAll("_", " "));
+  if (theta) return say("terms.trustInPrediction", { number: Number(theta[1]) + 1 });
+  const term = TERMS[name];
+  return term ? say(term) : name.replaceAll("_", " ");
 }
 
 function termsOf(steps: readonly StepView[]): Series[] {

@@ -2,6 +2,7 @@
 
 import SPEC from "../api/mission.json";
 import type { MissionView, NewMission } from "../api/types";
+import { say } from "../words/say";
 import { copyOf, type Draft } from "./draft";
 
 const FORMAT = "bathyfleet mission";
@@ -30,13 +31,13 @@ export function draftIn(fileName: string, text: string): Draft {
   try {
     content = JSON.parse(text);
   } catch {
-    throw new Error(`${fileName} is no JSON: a mission's file comes from "Export"`);
+    throw new Error(say("missionFile.isNoJsonAMissionS", { fileName }));
   }
   // What was posted to the service by hand is as good.
   const mission = content?.format === FORMAT ? content.mission : (content as NewMission);
   const ring = mission?.area?.coordinates?.[0];
   if (!mission?.name || !Array.isArray(ring) || ring.length < 4) {
-    throw new Error(`${fileName} holds no mission: it needs a name and an area`);
+    throw new Error(say("missionFile.holdsNoMissionItNeedsA", { fileName }));
   }
   const draft = draftOf(mission);
   return content.tide_table ? { ...draft, tide_table: content.tide_table } : draft;

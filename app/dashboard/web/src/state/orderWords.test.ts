@@ -28,7 +28,7 @@ test("an order is one line, with who gave it", () => {
     [-8.7, 41.181],
   ];
   expect(orderWords(order({ kind: "denser", way }))).toBe(
-    "Surveys a part denser, 1 lines, 111 m: ordered by Ana",
+    "Surveys a part denser, 1 line, 111 m: ordered by Ana",
   );
 });
 

@@ -2,6 +2,7 @@
 
 import type { LngLat, OrderView, VehicleView } from "../api/types";
 import { wayBetween } from "../map/geo";
+import { say } from "../words/say";
 import { distance } from "./format";
 
 /** How long a way through places is. */
@@ -11,12 +12,16 @@ export const lengthOf = (way: readonly LngLat[]): number =>
 /** What a vehicle was ordered, as one line. */
 export function orderWords({ kind, state, way, asked_by }: OrderView): string {
   const what = {
-    go: "Goes where it was sent",
-    "skip-line": "Leaves out the rest of its line",
-    "repeat-line": `Flies a line again, ${distance(lengthOf(way))}`,
-    denser: `Surveys a part denser, ${Math.ceil(way.length / 2)} lines, ${distance(lengthOf(way))}`,
+    go: say("orders.goes"),
+    "skip-line": say("orders.leavesOut"),
+    "repeat-line": say("orders.fliesAgain", { length: distance(lengthOf(way)) }),
+    denser: say("orders.surveysDenser", {
+      lines: Math.ceil(way.length / 2),
+      length: distance(lengthOf(way)),
+    }),
   }[kind];
-  return `${what}${state === "accepted" ? ", next" : ""}: ordered by ${asked_by}`;
+  const next = state === "accepted" ? say("orders.next") : "";
+  return say("orders.orderedBy", { what, next, askedBy: asked_by });
 }
 
 interface Led {

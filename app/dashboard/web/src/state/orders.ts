@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 import { api } from "../api/client";
 import type { LngLat } from "../api/types";
 import { polygonOf } from "../map/area";
+import { say } from "../words/say";
 import { send } from "./session";
 import { drawing, mission, picking, selectedId } from "./store";
 
@@ -16,7 +17,7 @@ export const typingFor = signal<string | null>(null);
 
 /** Lets the next click on the map say where a vehicle goes. */
 export function pickPlaceFor(name: string): void {
-  picking.value = { what: `where ${name} goes`, onPicked: (at) => void goVehicle(name, at) };
+  picking.value = { what: say("orders.whereItGoes", { name }), onPicked: (at) => void goVehicle(name, at) };
 }
 
 /** Lets an area be drawn that is to be surveyed denser. */
@@ -35,10 +36,10 @@ const ofMission = async <T>(what: string, ask: (id: string) => Promise<T>): Prom
 };
 
 export const goVehicle = (name: string, at: LngLat) =>
-  ofMission(`sending ${name} there`, (id) => api.goVehicle(id, name, at));
+  ofMission(say("orders.sending", { name }), (id) => api.goVehicle(id, name, at));
 export const skipLine = (name: string) =>
-  ofMission(`leaving out the line of ${name}`, (id) => api.skipLine(id, name));
+  ofMission(say("orders.leavingOut", { name }), (id) => api.skipLine(id, name));
 export const repeatLine = (name: string, near?: LngLat) =>
-  ofMission(`the line again by ${name}`, (id) => api.repeatLine(id, name, near ?? null));
+  ofMission(say("orders.lineAgainBy", { name }), (id) => api.repeatLine(id, name, near ?? null));
 export const surveyDenser = (ring: readonly LngLat[], spacing_m: number | null, vehicle: string | null) =>
-  ofMission("surveying that denser", (id) => api.denser(id, polygonOf([...ring]), spacing_m, vehicle));
+  ofMission(say("orders.surveyingDenser"), (id) => api.denser(id, polygonOf([...ring]), spacing_m, vehicle));

@@ -2,6 +2,7 @@
 
 import { effect, signal } from "@preact/signals";
 import type { LngLat } from "../api/types";
+import { say } from "../words/say";
 import { destination } from "./store";
 
 export interface OwnPosition {
@@ -17,15 +18,20 @@ export const ownFault = signal("");
 
 /** Why a browser may not tell at all; empty where it may. */
 export function whyNoPosition(): string {
-  if (!isSecureContext)
-    return "Browsers tell positions only to pages that come by https or from this machine";
-  return "geolocation" in navigator ? "" : "This browser tells no position";
+  if (!isSecureContext) return say("own.browsersTellPositionsOnlyTo");
+  return "geolocation" in navigator ? "" : say("own.thisBrowserTellsNoPosition");
 }
 
 const REASONS: Readonly<Record<number, string>> = {
-  1: "Allow this page to know your position, in the browser's settings",
-  2: "This device does not know where it is",
-  3: "This device has not found its position yet",
+  get 1() {
+    return say("own.allowThisPageToKnowYour");
+  },
+  get 2() {
+    return say("own.thisDeviceDoesNotKnowWhere");
+  },
+  get 3() {
+    return say("own.thisDeviceHasNotFoundIts");
+  },
 };
 /** As much about the position as is shown when it is first known, degrees. */
 const ABOUT = 0.002;

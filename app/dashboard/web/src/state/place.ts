@@ -3,9 +3,10 @@
 import { convert } from "geo-coordinates-parser";
 import SPEC from "../api/mission.json";
 import type { LngLat } from "../api/types";
+import { say } from "../words/say";
 import { isWithin } from "./fields";
 
-export const PLACE_SAMPLE = '"41.1852, -8.7046" or "41°11.112′ N 8°42.276′ W"';
+export const placeSample = (): string => say("place.sample");
 
 /** A place typed as decimal degrees, latitude first, or in another of the usual ways; null when it is none. */
 export function placeOf(text: string): LngLat | null {

@@ -15,7 +15,7 @@ test("a chart is a table with a row for each moment", () => {
 
 test("what a line did is said in words", () => {
   expect(lineWords({ label: "a", values: [null, 2, 12, 5] }, "m")).toBe(
-    "a 5.00 m now, 2.00 m at first, between 2.00 m and 12.0 m",
+    "a 5 m now, 2 m at first, between 2 m and 12.0 m",
   );
   expect(lineWords({ label: "a", values: [null] }, "m")).toBe("a: nothing is known");
 });

@@ -1,5 +1,8 @@
 /** What a chart shows as a table for other programs. Pure. */
 
+import { say } from "../words/say";
+import { fixed, plain } from "./format";
+
 export interface Column {
   label: string;
   values: readonly (number | null)[];
@@ -28,14 +31,18 @@ export function csvOf(
 /** What the lines of a chart did, in a sentence each: from, to, least and most. */
 export function lineWords({ label, values }: Column, unit: string): string {
   const known = values.filter((v): v is number => v != null);
-  if (known.length === 0) return `${label}: nothing is known`;
+  if (known.length === 0) return say("plot.nothingIsKnown", { label });
   const [first, last] = [known[0] as number, known.at(-1) as number];
   const [least, most] = [known.reduce((a, b) => Math.min(a, b)), known.reduce((a, b) => Math.max(a, b))];
   const n = (value: number) => `${digits(value)}${unit ? ` ${unit}` : ""}`;
-  return `${label} ${n(last)} now, ${n(first)} at first, between ${n(least)} and ${n(most)}`;
+  return say("plot.fromTo", { label, last: n(last), first: n(first), least: n(least), most: n(most) });
 }
 
 export const digits = (value: number): string =>
-  Math.abs(value) >= 100 ? value.toFixed(0) : Math.abs(value) >= 10 ? value.toFixed(1) : value.toPrecision(3);
+  Math.abs(value) >= 100
+    ? fixed(value, 0)
+    : Math.abs(value) >= 10
+      ? fixed(value, 1)
+      : plain(Number(value.toPrecision(3)));
 
 export const fileNameOf = (title: string): string => title.toLowerCase().replace(/[^a-z0-9]+/g, "-");

@@ -6,15 +6,19 @@ import { LiveSocket } from "../api/socket";
 import type { ActionView, MissionAction, NewMission } from "../api/types";
 import { withTiles } from "../map/seafloor";
 import { siteOf } from "../map/site";
-import { identify, me, signedOut } from "./access";
+import { type Key, say } from "../words/say";
+import { identify, me, signedOut, whyNotCommand } from "./access";
 import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
 import {
+  abortDialogOpen,
+  abortOne,
   crossovers,
   crossoversWanted,
   fleet,
   furtherLayers,
   holidays,
   layers,
+  mission,
   missions,
   now,
   replayStep,
@@ -27,13 +31,14 @@ import {
   telemetry,
   view,
 } from "./store";
+import { isAllowed } from "./words";
 
 const LIST_PERIOD_MS = 5000;
 const LEAST_MAP_PERIOD_MS = 300;
 const REPLAY_MAP_PERIOD_MS = 120;
 
 /** The last command that was refused, until it is dismissed or the next one succeeds. */
-export const refusal = signal<{ what: string; error: ServiceError } | null>(null);
+export const refusal = signal<{ what: string; error: ServiceError; inDialog: boolean } | null>(null);
 export const busyWith = signal<MissionAction | null>(null);
 
 const HASH = /^#\/missions\/(.+)$/;
@@ -290,6 +295,25 @@ export async function fetchTelemetry(): Promise<void> {
   if (selectedId.peek() === id) telemetry.value = found;
 }
 
+/** Asks before the selected mission's team, or one vehicle, is stopped; nothing where that may not be. */
+export function askAbort(vehicle: string | null): void {
+  const present = mission.value;
+  if (!present || whyNotCommand.value !== "" || (vehicle === null && !isAllowed("abort", present))) return;
+  abortOne.value = vehicle;
+  abortDialogOpen.value = true;
+}
+
+const ACTION_KEYS = {
+  start: "session.start",
+  pause: "session.pause",
+  resume: "session.resume",
+  finish: "finish.finish",
+  abort: "abort.abort2",
+} as const satisfies Record<MissionAction, Key>;
+
+/** A command, as its refusal names it. */
+export const actionWords = (action: MissionAction): string => say(ACTION_KEYS[action]);
+
 /**
  * Sends a command for the selected mission; `home`: whether vehicles go home first when that ends it. Returns the
  * service's answer, or null when it was refused.
@@ -299,7 +323,11 @@ export async function act(action: MissionAction, home?: boolean): Promise<Action
   if (!id) return null;
   busyWith.value = action;
   try {
-    return await send(action, api.act(id, action, home));
+    return await send(
+      actionWords(action),
+      api.act(id, action, home),
+      action === "abort" || action === "finish",
+    );
   } finally {
     busyWith.value = null;
   }
@@ -308,36 +336,36 @@ export async function act(action: MissionAction, home?: boolean): Promise<Action
 /** Stops one vehicle of the selected mission and takes it out. */
 export async function abortVehicle(name: string): Promise<ActionView | null> {
   const id = selectedId.value;
-  return id ? send(`abort of ${name}`, api.abortVehicle(id, name)) : null;
+  return id ? send(say("session.abortOf", { name }), api.abortVehicle(id, name), true) : null;
 }
 
 /** Lets a vehicle that left take part again. */
 export async function rejoin(name: string): Promise<void> {
   const id = selectedId.value;
-  if (id) await send(`taking ${name} back`, api.rejoin(id, name));
+  if (id) await send(say("session.takingBack", { name }), api.rejoin(id, name));
 }
 
 /** Sends a vehicle home in the middle of the mission. */
 export async function returnVehicle(name: string): Promise<void> {
   const id = selectedId.value;
-  if (id) await send(`return of ${name}`, api.returnVehicle(id, name));
+  if (id) await send(say("session.returnOf", { name }), api.returnVehicle(id, name));
 }
 
 /** Lets a vehicle wait where it is. */
 export async function holdVehicle(name: string): Promise<void> {
   const id = selectedId.value;
-  if (id) await send(`holding ${name}`, api.holdVehicle(id, name));
+  if (id) await send(say("session.holding", { name }), api.holdVehicle(id, name));
 }
 
 /** Lets a vehicle survey again that went home or was stopped. */
 export async function resumeVehicle(name: string): Promise<void> {
   const id = selectedId.value;
-  if (id) await send(`sending ${name} on`, api.resumeVehicle(id, name));
+  if (id) await send(say("session.sendingOn", { name }), api.resumeVehicle(id, name));
 }
 
 /** Deletes a mission in which nothing was measured. */
 export async function deleteMission(id: string): Promise<void> {
-  await send("deleting the mission", api.deleteMission(id));
+  await send(say("session.deletingTheMission"), api.deleteMission(id));
   if (selectedId.value === id) location.hash = "#/";
   await refresh();
 }
@@ -345,12 +373,12 @@ export async function deleteMission(id: string): Promise<void> {
 /** Takes a vehicle back that left and sends it home: nobody else leads it there. */
 export async function bringHome(name: string): Promise<void> {
   const id = selectedId.value;
-  if (!id || !(await send(`taking ${name} back`, api.rejoin(id, name)))) return;
-  await send(`return of ${name}`, api.returnVehicle(id, name));
+  if (!id || !(await send(say("session.takingBack", { name }), api.rejoin(id, name)))) return;
+  await send(say("session.returnOf", { name }), api.returnVehicle(id, name));
 }
 
 /** Awaits an answer; null where the service refused, which is shown. */
-export async function send<T>(what: string, answer: Promise<T>): Promise<T | null> {
+export async function send<T>(what: string, answer: Promise<T>, inDialog = false): Promise<T | null> {
   try {
     const found = await answer;
     refusal.value = null;
@@ -358,7 +386,7 @@ export async function send<T>(what: string, answer: Promise<T>): Promise<T | nul
     return found;
   } catch (error) {
     if (!(error instanceof ServiceError)) throw error;
-    refusal.value = { what, error };
+    refusal.value = { what, error, inDialog };
     return null;
   }
 }

@@ -96,7 +96,9 @@ export const dialogOpen = computed(
     preflightOpen.value ||
     linksOpen.value ||
     fleetOpen.value ||
-    accountOpen.value,
+    accountOpen.value ||
+    settingsOpen.value ||
+    keysOpen.value,
 );
 
 export const vehicles = computed<Vehicle[]>(() =>
@@ -132,13 +134,15 @@ export const unstopped = computed(() => {
   return new Set([...answers].flatMap(([vehicle, acknowledged]) => (acknowledged ? [] : [vehicle])));
 });
 
-export type Theme = "system" | "light" | "dark" | "contrast";
+export type Theme = "system" | "light" | "dark" | "contrast" | "night";
 export const theme = kept<Theme>("theme", "system");
 const systemDark = signal(matchMedia("(prefers-color-scheme: dark)").matches);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (e) => {
   systemDark.value = e.matches;
 });
-export const isDark = computed(() => (theme.value === "system" ? systemDark.value : theme.value === "dark"));
+export const isDark = computed(() =>
+  theme.value === "system" ? systemDark.value : theme.value === "dark" || theme.value === "night",
+);
 
 /** What maps can show, as the service says; empty until its first answer. */
 export const layers = signal<readonly LayerView[]>([]);
@@ -253,8 +257,13 @@ export const linksOpen = signal(false);
 export const finishOpen = signal(false);
 /** Whether is shown who is signed in. */
 export const accountOpen = signal(false);
+/** Whether is shown what each person sets for himself, and what the keys do. */
+export const settingsOpen = signal(false);
+export const keysOpen = signal(false);
+/** Whether single keys are shortcuts; some people's aids type what they did not mean. */
+export const singleKeys = kept("single-keys", true);
 
-export type Tab = "log" | "files" | "charts" | "soundings" | "compare";
+export type Tab = "log" | "files" | "charts" | "soundings" | "compare" | "profile";
 /** What is opened above the bottom strip. */
 export const tab = signal<Tab | null>(null);
 

@@ -14,23 +14,40 @@ import type {
   WaypointStatus,
   WaypointView,
 } from "../api/types";
-import { clock, count, minutes, percent } from "./format";
+import { named, say } from "../words/say";
+import { clock, count, fixed, minutes, percent } from "./format";
 
 export const MISSION_WORDS: Record<MissionState, string> = {
-  draft: "Draft, needs a vehicle",
-  ready: "Ready to start",
-  running: "Running",
-  paused: "Paused",
-  finished: "Finished",
-  aborted: "Aborted",
-  failed: "Failed",
+  get draft() {
+    return say("state.draftNeedsAVehicle");
+  },
+  get ready() {
+    return say("state.readyToStart");
+  },
+  get running() {
+    return say("state.running");
+  },
+  get paused() {
+    return say("state.paused");
+  },
+  get finished() {
+    return say("state.finished");
+  },
+  get aborted() {
+    return say("state.aborted");
+  },
+  get failed() {
+    return say("state.failed");
+  },
 };
 
 type Stage = Pick<MissionView, "state" | "ending">;
 
 /** What a mission is at; one that is ending brings its vehicles home first. */
 export const missionWords = ({ state, ending }: Stage): string =>
-  ending ? `Returning home; then ${MISSION_WORDS[ending].toLowerCase()}` : MISSION_WORDS[state];
+  ending
+    ? say("state.returningHomeThen", { becomes: MISSION_WORDS[ending].toLowerCase() })
+    : MISSION_WORDS[state];
 
 /** A shape for each state, so that colour is never the only sign. */
 const MISSION_SIGNS: Record<MissionState, string> = {
@@ -46,21 +63,45 @@ const MISSION_SIGNS: Record<MissionState, string> = {
 export const missionSign = ({ state, ending }: Stage): string => (ending ? "⌂" : MISSION_SIGNS[state]);
 
 export const WAYPOINT_WORDS: Record<WaypointStatus, string> = {
-  planned: "planned, not sent yet",
-  sent: "sent, not acknowledged yet",
-  acknowledged: "acknowledged",
-  reached: "reached",
-  refused: "refused",
-  missed: "missed its deadline",
+  get planned() {
+    return say("state.plannedNotSentYet");
+  },
+  get sent() {
+    return say("state.sentNotAcknowledgedYet");
+  },
+  get acknowledged() {
+    return say("state.acknowledged");
+  },
+  get reached() {
+    return say("state.reached");
+  },
+  get refused() {
+    return say("state.refused");
+  },
+  get missed() {
+    return say("state.missedItsDeadline");
+  },
 };
 
 export const PHASE_WORDS: Record<Phase, string> = {
-  transit: "in transit",
-  survey: "surveying",
-  surfacing: "surfacing",
-  returning: "returning home",
-  home: "home",
-  stopped: "stopped",
+  get transit() {
+    return say("state.inTransit");
+  },
+  get survey() {
+    return say("state.surveying");
+  },
+  get surfacing() {
+    return say("state.surfacing");
+  },
+  get returning() {
+    return say("state.returningHome");
+  },
+  get home() {
+    return say("state.home");
+  },
+  get stopped() {
+    return say("state.stopped");
+  },
 };
 
 /** How far a mission has come in minutes or kilometres: "12 of 60 min"; null where it is counted in steps. */
@@ -78,19 +119,31 @@ type Progress = Pick<
 >;
 
 const ofWhole = (whole: number, left: number, unit: string): string =>
-  `${Math.max(whole - left, 0).toFixed(whole < 10 ? 1 : 0)} of ${whole} ${unit}`;
+  say("state.of", { whole: fixed(Math.max(whole - left, 0), whole < 10 ? 1 : 0), whole2: whole, unit });
 
 /** How far a mission has come, in the unit of its length. */
 export const lengthWords = (progress: Progress): string =>
-  flownWords(progress) ?? `step ${progress.step} of ${progress.steps}`;
+  flownWords(progress) ?? say("state.stepOf", { step: progress.step, steps: progress.steps });
 
 const LINK_WORDS: Record<LinkState, string> = {
-  unknown: "Never heard",
-  lost: "No contact",
-  expected_offline: "Offline by plan",
-  heard: "Heard, not ready",
-  ready: "Ready",
-  engaged: "Under way",
+  get unknown() {
+    return say("state.neverHeard");
+  },
+  get lost() {
+    return say("state.noContact");
+  },
+  get expected_offline() {
+    return say("state.offlineByPlan");
+  },
+  get heard() {
+    return say("state.heardNotReady");
+  },
+  get ready() {
+    return say("state.ready");
+  },
+  get engaged() {
+    return say("state.underWay");
+  },
 };
 
 export type Tone = "calm" | "good" | "warning" | "alarm";
@@ -133,7 +186,8 @@ interface Told {
 export const failsafeTone = ({ response }: FailsafeView, of: VehicleView): "warning" | "alarm" =>
   response === "warn" || (response === "return" && isHome(of)) ? "warning" : "alarm";
 
-export const failsafeWords = ({ failsafe }: FailsafeView): string => capital(failsafe.replaceAll("_", " "));
+export const failsafeWords = ({ failsafe }: FailsafeView): string =>
+  named("failsafe", failsafe, capital(failsafe.replaceAll("_", " ")));
 
 /** A vehicle's state as one short line and how loud it is. */
 export function vehicleState(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
@@ -144,27 +198,30 @@ export function vehicleState(vehicle: VehicleView, waypoint: WaypointView | unde
 }
 
 function stateOf(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
-  if (!vehicle.active) return { words: "Left the mission", tone: "calm" };
+  if (!vehicle.active) return { words: say("state.leftTheMission"), tone: "calm" };
   if (vehicle.breach) return { words: capital(vehicle.breach), tone: "alarm" };
-  if (isHome(vehicle)) return { words: "Home", tone: "good" };
+  if (isHome(vehicle)) return { words: say("state.home2"), tone: "good" };
   // It is launched when the mission starts and put away when that ends: nothing to worry about.
   if (vehicle.kind === "sim" && vehicle.link === "unknown")
-    return { words: vehicle.lat_deg === null ? "Not launched" : "Simulation over", tone: "calm" };
+    return {
+      words: vehicle.lat_deg === null ? say("state.notLaunched") : say("state.simulationOver"),
+      tone: "calm",
+    };
   const tone = LINK_TONES[vehicle.link];
   if (vehicle.withdrawn && vehicle.phase && vehicle.link !== "lost")
     return { words: capital(PHASE_WORDS[vehicle.phase]), tone };
   if (vehicle.link !== "engaged" || !waypoint) return { words: LINK_WORDS[vehicle.link], tone };
   switch (waypoint.status) {
     case "acknowledged":
-      return { words: `To waypoint ${waypoint.step}`, tone };
+      return { words: say("state.toWaypoint", { step: waypoint.step }), tone };
     case "reached":
-      return { words: `At waypoint ${waypoint.step}`, tone };
+      return { words: say("state.atWaypoint", { step: waypoint.step }), tone };
     case "refused":
-      return { words: `Refused waypoint ${waypoint.step}`, tone: "alarm" };
+      return { words: say("state.refusedWaypoint", { step: waypoint.step }), tone: "alarm" };
     case "missed":
-      return { words: `Missed waypoint ${waypoint.step}`, tone: "warning" };
+      return { words: say("state.missedWaypoint", { step: waypoint.step }), tone: "warning" };
     default:
-      return { words: `Waypoint ${waypoint.step} not acknowledged`, tone: "calm" };
+      return { words: say("state.waypointNotAcknowledged", { step: waypoint.step }), tone: "calm" };
   }
 }
 
@@ -191,7 +248,12 @@ export function sonarWords(
     rate_hz = SPEC["vehicles.sonar.rate_hz"].default,
     range_m = SPEC["vehicles.sonar.range_m"].default,
   } = sonar ?? {};
-  return [`multibeam ${aperture_deg}°`, `${beams} beams`, `${rate_hz} Hz`, `reaches ${range_m} m`];
+  return [
+    say("state.multibeam", { apertureDeg: aperture_deg }),
+    say("state.beams", { beams }),
+    `${rate_hz} Hz`,
+    say("state.reachesM", { rangeM: range_m }),
+  ];
 }
 
 /** What was measured: soundings, and beams where there are any. */
@@ -200,8 +262,11 @@ export const measuredWords = ({
   beams,
 }: Pick<MissionView["progress"], "soundings" | "beams">): string =>
   beams === 0
-    ? `${count(soundings)} soundings`
-    : `${soundings === 0 ? "" : `${count(soundings)} soundings, `}${count(beams)} beams`;
+    ? say("state.soundings", { soundings: count(soundings) })
+    : say("state.beams2", {
+        it: soundings === 0 ? "" : say("state.soundings2", { soundings: count(soundings) }),
+        beams: count(beams),
+      });
 
 type Range = Withdrawn & Pick<VehicleView, "energy_left_s" | "turn_back_at" | "return_needs_s">;
 
@@ -209,13 +274,14 @@ type Range = Withdrawn & Pick<VehicleView, "energy_left_s" | "turn_back_at" | "r
 export function rangeWords(vehicle: Range, now: number): string[] {
   const { energy_left_s, turn_back_at, return_needs_s } = vehicle;
   const parts: string[] = [];
-  if (energy_left_s !== null) parts.push(`${minutes(energy_left_s)} left`);
-  if (return_needs_s !== null && !isThere(vehicle)) parts.push(`way home takes ${minutes(return_needs_s)}`);
+  if (energy_left_s !== null) parts.push(say("state.left", { energyLeftS: minutes(energy_left_s) }));
+  if (return_needs_s !== null && !isThere(vehicle))
+    parts.push(say("state.wayHomeTakes", { returnNeedsS: minutes(return_needs_s) }));
   if (turn_back_at !== null) {
     const at = new Date(turn_back_at);
     const in_s = (at.getTime() - now) / 1000;
-    const when = in_s > 0 ? `in ${minutes(in_s)}` : "now";
-    parts.push(`turn back at ${clock(at, "utc").slice(0, 5)} UTC (${when})`);
+    const when = in_s > 0 ? say("state.in", { inS: minutes(in_s) }) : say("state.now");
+    parts.push(say("state.turnBackAtUtc", { at: clock(at, "utc").slice(0, 5), when }));
   }
   return parts;
 }

@@ -1,6 +1,7 @@
-import { abortVehicle, act } from "../state/session";
+import { abortVehicle, act, actionWords } from "../state/session";
 import { abortDialogOpen, abortOne, mission, type Vehicle, vehicles } from "../state/store";
 import { canReturn, hasEnded } from "../state/words";
+import { say, sayWith } from "../words/say";
 import { Button } from "./Controls";
 import { StopDialog } from "./StopDialog";
 
@@ -9,7 +10,7 @@ export function AbortDialog() {
   const open = abortDialogOpen.value;
   const only = abortOne.value;
   const again = only !== null && mission.value !== null && hasEnded(mission.value);
-  const verb = again ? "Stop" : "Abort";
+  const verb = again ? say("abort.stop") : say("abort.abort");
   const team = open ? vehicles.value.filter((v) => v.view.active) : [];
   const home =
     only === null &&
@@ -29,19 +30,19 @@ export function AbortDialog() {
       name="abort"
       kind="stopping"
       above
-      what={only ? `abort of ${only}` : "abort"}
-      question={`${verb} ${only ?? mission.value?.name ?? "the mission"}?`}
+      what={only ? say("session.abortOf", { name: only }) : actionWords("abort")}
+      question={`${verb} ${only ?? mission.value?.name ?? say("abort.theMission")}?`}
       done={doneTitle(only, again)}
       send={() => (only ? abortVehicle(only) : act("abort"))}
       sendHome={home ? () => act("abort", true) : undefined}
       confirm={(sending) =>
         sending
-          ? "Aborting…"
+          ? say("abort.aborting")
           : only
             ? `${verb} ${only}`
             : home || mission.value?.ending
-              ? "Stop now"
-              : "Abort mission"
+              ? say("abort.stopNow")
+              : say("abort.abortMission")
       }
       confirmId="abort-confirm"
     >
@@ -49,10 +50,7 @@ export function AbortDialog() {
         <>
           <p>{consequence(only, again)}</p>
           {home ? (
-            <p>
-              With <b>Return home</b> they go to their recovery points first, and the mission is aborted once
-              all are there.
-            </p>
+            <p>{sayWith("abort.withTheyGoToTheirRecovery", { b: <b>{say("abort.returnHome")}</b> })}</p>
           ) : null}
           <ul class="receipts" aria-live="polite">
             {asked.map((vehicle) => (
@@ -77,7 +75,7 @@ function Asked({ vehicle, sending, choice }: { vehicle: Vehicle; sending: boolea
     <li class="calm" data-testid={`receipt-${name}`}>
       <span>
         <span aria-hidden="true">{sending ? "…" : "•"}</span> <b>{name}</b>{" "}
-        {sending ? "waiting for its acknowledgement" : ""}
+        {sending ? say("abort.waitingForItsAcknowledgement") : ""}
       </span>
       {choice && !sending ? (
         <Button
@@ -87,7 +85,7 @@ function Asked({ vehicle, sending, choice }: { vehicle: Vehicle; sending: boolea
             abortOne.value = name;
           }}
         >
-          Only {name}…
+          {say("abort.only", { name })}
         </Button>
       ) : null}
     </li>
@@ -96,13 +94,11 @@ function Asked({ vehicle, sending, choice }: { vehicle: Vehicle; sending: boolea
 
 /** `again`: the mission has ended, and a vehicle is told once more. */
 function doneTitle(only: string | null, again: boolean): string {
-  if (only === null) return "Mission aborted";
-  return again ? `${only} was told again` : `${only} was taken out`;
+  if (only === null) return say("abort.missionAborted");
+  return again ? say("abort.wasToldAgain", { only }) : say("abort.wasTakenOut", { only });
 }
 
 function consequence(only: string | null, again: boolean): string {
-  if (again) return "It did not acknowledge its last stop. It is told once more.";
-  return only
-    ? "This vehicle is told to stop and leaves the mission; the others go on. It stays in sight and can be added again."
-    : "Every vehicle is told to stop following its waypoints. An aborted mission cannot be resumed; its map stays.";
+  if (again) return say("abort.itDidNotAcknowledgeItsLast");
+  return only ? say("abort.thisVehicleIsToldToStop") : say("abort.everyVehicleIsToldToStop");
 }

@@ -1,9 +1,10 @@
 import "./Account.css";
 import { useSignal } from "@preact/signals";
 import { ServiceError } from "../api/client";
-import { me, signedOut, signIn, signOut, whyNotCommand } from "../state/access";
+import { me, roleWords, signedOut, signIn, signOut, whyNotCommand } from "../state/access";
 import { said } from "../state/session";
 import { accountOpen } from "../state/store";
+import { say, sayWith } from "../words/say";
 import { Button, sets, Typed } from "./Controls";
 import { Dialog } from "./Dialog";
 
@@ -11,16 +12,18 @@ import { Dialog } from "./Dialog";
 export function AccountButton() {
   const who = me.value;
   if (!who) return null;
-  const words = `${who.name}, role ${who.role}`;
+  const words = say("account.role", { who: who.name, role: roleWords(who.role) });
   return (
     <Button
       id="account"
       kind={`tool account${whyNotCommand.value ? " looks-only" : ""}`}
-      title={`Signed in: ${words}`}
+      title={say("account.signedIn", { words })}
       onClick={sets(accountOpen, true)}
     >
       <span class="account-name">{who.name}</span>
-      <small>{whyNotCommand.value ? `${who.role}: looks only` : who.role}</small>
+      <small>
+        {whyNotCommand.value ? say("account.looksOnly", { role: roleWords(who.role) }) : roleWords(who.role)}
+      </small>
     </Button>
   );
 }
@@ -39,7 +42,7 @@ export function AccountDialog() {
         });
       }}
     >
-      Sign out
+      {say("account.signOut")}
     </Button>
   );
   return (
@@ -47,19 +50,24 @@ export function AccountDialog() {
       open={accountOpen.value}
       onClose={close}
       name="account"
-      heading={who?.local ? "Nobody has to sign in yet" : `Signed in as ${who?.name}`}
+      heading={
+        who?.local ? say("account.nobodyHasToSignInYet") : say("account.signedInAs", { who: who?.name ?? "" })
+      }
       fault={fault.value}
       actions={who?.signed_in ? leaving : null}
     >
       {who?.local ? (
         <p>
-          No access token was made, so whoever runs the service commands it from this machine.{" "}
-          <code>bathyfleet token create NAME --role operator</code> makes one; from then on everybody signs
-          in.
+          {sayWith("account.noAccessTokenWasMadeSo", {
+            code: <code>bathyfleet token create NAME --role operator</code>,
+          })}
         </p>
       ) : (
         <p>
-          Role {who?.role}. {whyNotCommand.value || "This role commands missions."}
+          {say("account.role2", {
+            role: who ? roleWords(who.role) : "",
+            whyNotCommand: whyNotCommand.value || say("account.thisRoleCommandsMissions"),
+          })}
         </p>
       )}
     </Dialog>
@@ -93,17 +101,15 @@ export function SignIn() {
       }}
     >
       <p>
-        <b>Sign in.</b>{" "}
-        {why?.status === 403
-          ? `${why.message}. ${why.remedy}`
-          : "This service asks who you are: enter your access token. Whoever runs the service makes one."}
+        <b>{say("account.signIn")}</b>{" "}
+        {why?.status === 403 ? `${why.message}. ${why.remedy}` : say("account.thisServiceAsksWhoYouAre")}
       </p>
       <label class="field">
-        Access token
+        {say("account.accessToken")}
         <Typed text={text} id="token" type="password" autocomplete="current-password" />
       </label>
       <button type="submit" class="command primary" disabled={sending.value || text.value.trim() === ""}>
-        {sending.value ? "Signing in…" : "Sign in"}
+        {sending.value ? say("account.signingIn") : say("account.signIn2")}
       </button>
       {fault.value ? (
         <p class="fault" role="alert" data-testid="sign-in-fault">

@@ -9,16 +9,22 @@ import { BottomStrip } from "./BottomStrip";
 import { ChartPane } from "./ChartPane";
 import { FinishDialog } from "./FinishDialog";
 import { FleetDialog } from "./FleetDialog";
+import { Heard, Others } from "./Heard";
+import { KeysDialog } from "./KeysDialog";
+import { watchKeys } from "./keys";
 import { Legend } from "./Legend";
 import { LinksDialog } from "./LinksDialog";
 import { MapMenu } from "./MapMenu";
 import { MissionPanel } from "./MissionPanel";
 import { Notices } from "./Notices";
 import { PreflightDialog } from "./PreflightDialog";
+import { watchPrinting } from "./printing";
 import { Readout } from "./Readout";
 import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom } from "./room";
+import { SettingsDialog } from "./SettingsDialog";
 import { SpaceView } from "./SpaceView";
 import { TopBar } from "./TopBar";
+import { Tour } from "./Tour";
 import { VehicleCards } from "./VehicleCards";
 import { DenserQuestion } from "./VehicleOrders";
 
@@ -44,6 +50,8 @@ export function App() {
     return () => watcher.disconnect();
   }, []);
   useEffect(() => (root.current ? watchRoom(root.current) : undefined), []);
+  useEffect(watchKeys, []);
+  useEffect(() => (root.current ? watchPrinting(root.current) : undefined), []);
   // What lies under a dialog is out of reach; the top bar with the stop never is.
   const covered = dialogOpen.value;
   const classes = [
@@ -70,6 +78,8 @@ export function App() {
         <Legend />
         <div class="over-map">
           <Attention />
+          <Others />
+          <Tour />
           <Notices />
           <DenserQuestion />
         </div>
@@ -86,6 +96,9 @@ export function App() {
       <FleetDialog />
       <FinishDialog />
       <AccountDialog />
+      <SettingsDialog />
+      <KeysDialog />
+      <Heard />
     </div>
   );
 }

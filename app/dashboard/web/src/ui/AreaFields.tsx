@@ -4,8 +4,9 @@ import { useEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../api/types";
 import { areasIn, sizeOf } from "../map/area";
 import { centred, cornersOf } from "../state/draft";
-import { distance } from "../state/format";
+import { distance, fixed } from "../state/format";
 import { type Drawing, drawing, drawingReady, editing, editingReady, mapCentre } from "../state/store";
+import { say } from "../words/say";
 import { Button, FileButton } from "./Controls";
 import { Fault, Text, useForm } from "./Fields";
 
@@ -57,37 +58,36 @@ export function AreaFields() {
   };
   return (
     <fieldset>
-      <legend>Area</legend>
+      <legend>{say("area.area")}</legend>
       <div class="draw-buttons">
         <Button
           id="draw-polygon"
           aria-pressed={drawing.value?.shape === "polygon"}
           onClick={() => begin("polygon", take)}
         >
-          Draw corners
+          {say("area.drawCorners")}
         </Button>
         <Button
           id="draw-rectangle"
           aria-pressed={drawing.value?.shape === "rectangle"}
           onClick={() => begin("rectangle", take)}
         >
-          Draw rectangle
+          {say("area.drawRectangle")}
         </Button>
         <FileButton accept=".geojson,.json,.kml" id="area-file" onText={read}>
-          From a file
+          {say("area.fromAFile")}
         </FileButton>
       </div>
       {drawing.value ? (
         <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>
           {drawing.value.shape === "polygon"
-            ? "Click corner after corner on the map; click the first one again to close. Escape ends drawing."
-            : "Click one corner on the map, then the opposite one. Escape ends drawing."}
+            ? say("area.clickCornerAfterCornerOnThe")
+            : say("area.clickOneCornerOnTheMap")}
         </p>
       ) : null}
       {editing.value ? (
         <p class="hint" role="status" data-testid="editing" data-ready={editingReady.value}>
-          Drag a corner on the map to move it, a point between two corners to add one; right-click takes a
-          corner away.
+          {say("area.dragACornerOnTheMap")}
         </p>
       ) : null}
       {note.value ? (
@@ -106,7 +106,7 @@ export function AreaFields() {
                 set({ source: "drawn", ring });
               }}
             >
-              Take the one of {(sizeOf(ring).area_m2 / 1e4).toFixed(2)} ha
+              {say("area.takeTheOneOfHa", { areaM2: fixed(sizeOf(ring).area_m2 / 1e4, 2) })}
             </Button>
           ))}
         </div>
@@ -114,24 +114,28 @@ export function AreaFields() {
       {draft.source === "typed" ? (
         <>
           <div class="pair">
-            <Text field="latitude" label="South-west corner °N" numeric />
-            <Text field="longitude" label="South-west corner °E" numeric />
-            <Text field="east_m" label="To the east, m" numeric />
-            <Text field="north_m" label="To the north, m" numeric />
+            <Text field="latitude" label={say("area.southWestCornerN")} numeric />
+            <Text field="longitude" label={say("area.southWestCornerE")} numeric />
+            <Text field="east_m" label={say("area.toTheEastM")} numeric />
+            <Text field="north_m" label={say("area.toTheNorthM")} numeric />
           </div>
           <Button kind="link-button" onClick={() => set(centred(draft, mapCentre.value))}>
-            Place it in the middle of the map
+            {say("area.placeItInTheMiddleOf")}
           </Button>
         </>
       ) : (
         <Button kind="link-button" onClick={() => set({ source: "typed" })}>
-          Type a rectangle instead
+          {say("area.typeARectangleInstead")}
         </Button>
       )}
       {size && !faults.ring ? (
         <p class="hint" data-testid="area-size">
-          {distance(size.east_m)} x {distance(size.north_m)}, {(size.area_m2 / 1e4).toFixed(2)} ha
-          {draft.source === "drawn" ? `, ${corners.length} corners` : ""}
+          {say("area.xHa", {
+            eastM: distance(size.east_m),
+            northM: distance(size.north_m),
+            areaM2: fixed(size.area_m2 / 1e4, 2),
+            it: draft.source === "drawn" ? say("area.corners", { corners: corners.length }) : "",
+          })}
         </p>
       ) : null}
       <Fault field="ring" />
@@ -141,14 +145,14 @@ export function AreaFields() {
           kind="link-button"
           onClick={() => begin("polygon", (ring) => set({ keepOut: [...draft.keepOut, ring] }))}
         >
-          + Keep-out zone
+          {say("area.keepOutZone")}
         </Button>
         {draft.keepOut.map((zone, i) => (
           <span key={zone.join()} class="zone">
-            Zone {i + 1}
+            {say("area.zone", { i: i + 1 })}
             <Button
               kind="tool small"
-              aria-label={`Remove keep-out zone ${i + 1}`}
+              aria-label={say("area.removeKeepOutZone", { i: i + 1 })}
               onClick={() => set({ keepOut: draft.keepOut.filter((_, k) => k !== i) })}
             >
               ✕

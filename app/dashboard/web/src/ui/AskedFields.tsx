@@ -15,8 +15,9 @@ import {
   withLength,
 } from "../state/draft";
 import { FIELDS } from "../state/fields";
-import { distance, duration, percent } from "../state/format";
+import { distance, duration, fixed, percent } from "../state/format";
 import { fleet } from "../state/store";
+import { say } from "../words/say";
 import { Choice } from "./Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
@@ -25,7 +26,7 @@ import { Forecast } from "./Forecast";
 export function AskedFields() {
   return (
     <fieldset class="asked">
-      <legend>What is asked</legend>
+      <legend>{say("asked.whatIsAsked")}</legend>
       <Quality />
       <Coverage />
       <Length />
@@ -44,11 +45,14 @@ function Quality() {
   return (
     <div class="pair">
       <label class="field">
-        As sure as asked by
+        {say("asked.asSureAsAskedBy")}
         <Choice
           value={order}
-          options={[["", "my own figure"], ...ORDERS.map(([name]) => [name, `S-44 ${name}`] as const)]}
-          title="The largest vertical uncertainty of IHO S-44 where it is strictest, in water of no depth. A map alone claims no order"
+          options={[
+            ["", say("asked.myOwnFigure")],
+            ...ORDERS.map(([name]) => [name, `S-44 ${name}`] as const),
+          ]}
+          title={say("asked.theLargestVertical")}
           id="field-order"
           onChoose={(name) => {
             const asked = ORDERS.find(([known]) => known === name);
@@ -58,7 +62,7 @@ function Quality() {
       </label>
       <Text
         field="accuracy_m"
-        label={`Standard deviation, ${FIELDS.accuracy_m.unit}`}
+        label={say("asked.standardDeviation", { unit: FIELDS.accuracy_m.unit })}
         hint={SPEC.accuracy_m.description}
         numeric
       />
@@ -73,7 +77,7 @@ function Coverage() {
     ([name]) => name === draft.planner || canPlan(name, draft),
   );
   return (
-    <div role="radiogroup" aria-label="Coverage">
+    <div role="radiogroup" aria-label={say("asked.coverage")}>
       {presets.map(([name, { title, words }]) => (
         <label key={name} class="preset">
           <input
@@ -89,7 +93,7 @@ function Coverage() {
         </label>
       ))}
       {draft.planner in PLANNER_PRESETS ? null : (
-        <p class="hint">Planned by {draft.planner}, see expert settings.</p>
+        <p class="hint">{say("asked.plannedBySeeExpertSettings", { planner: draft.planner })}</p>
       )}
       {draft.planner === "swath" ? (
         <div class="pair">
@@ -101,11 +105,11 @@ function Coverage() {
   );
 }
 
-const LENGTHS: readonly (readonly [LengthChoice, string])[] = [
-  ["minutes", "minutes at sea"],
-  ["km_per_vehicle", "kilometres each"],
-  ["spacing_m", "metres between lines"],
-  ["steps", "steps"],
+const lengths = (): readonly (readonly [LengthChoice, string])[] => [
+  ["minutes", say("asked.minutesAtSea")],
+  ["km_per_vehicle", say("asked.kilometresEach")],
+  ["spacing_m", say("asked.metresBetweenLines")],
+  ["steps", say("asked.steps")],
 ];
 
 /** How long the mission is: by a deadline, a way, the distance of lines, or steps. */
@@ -115,15 +119,15 @@ function Length() {
   return (
     <div class="pair">
       {chosen === "spacing_m" ? (
-        <Text field="spacing_m" label="Lines apart, m" numeric />
+        <Text field="spacing_m" label={say("asked.linesApartM")} numeric />
       ) : (
         <Part of="length" />
       )}
       <label class="field">
-        Length in
+        {say("asked.lengthIn")}
         <Choice
           value={chosen}
-          options={LENGTHS}
+          options={lengths()}
           id="field-length"
           onChoose={(choice) => set((present) => withLength(choice, present))}
         />
@@ -142,9 +146,15 @@ function Expected() {
   return (
     <>
       <p class="hint" data-testid="estimate">
-        At most {duration(found.seconds)} and {distance(found.metres)} of tracks, as much as lines{" "}
-        {found.spacing_m.toFixed(1)} m apart.
-        {found.farthest_m === null ? "" : ` Up to ${distance(found.farthest_m)} from the recovery point.`}
+        {say("asked.atMostAndOfTracksAs", {
+          seconds: duration(found.seconds),
+          metres: distance(found.metres),
+          spacingM: fixed(found.spacing_m, 1),
+          it:
+            found.farthest_m === null
+              ? ""
+              : say("asked.upToFromTheRecoveryPoint", { farthestM: distance(found.farthest_m) }),
+        })}
       </p>
       <Shares of={found} />
       {whole ? (
@@ -166,11 +176,13 @@ function Shares({ of: { shares } }: { of: Estimate }) {
     <table class="shares" data-testid="shares">
       <thead>
         <tr>
-          {["Vehicle", "Time", "Length", "Energy"].map((title) => (
-            <th key={title} scope="col">
-              {title}
-            </th>
-          ))}
+          {[say("asked.vehicle"), say("asked.time"), say("asked.length"), say("asked.energy")].map(
+            (title) => (
+              <th key={title} scope="col">
+                {title}
+              </th>
+            ),
+          )}
         </tr>
       </thead>
       <tbody>
@@ -184,10 +196,13 @@ function Shares({ of: { shares } }: { of: Estimate }) {
               <td>{distance(metres)}</td>
               <td>
                 {endurance_s !== null
-                  ? `${full ? "▲ " : ""}${percent(shareOf(seconds, endurance_s))} of its endurance`
+                  ? say("asked.ofItsEndurance", {
+                      it: full ? "▲ " : "",
+                      seconds: percent(shareOf(seconds, endurance_s)),
+                    })
                   : battery_pct !== null
-                    ? `battery ${percent(battery_pct)}`
-                    : "not known"}
+                    ? say("asked.battery", { batteryPct: percent(battery_pct) })
+                    : say("asked.notKnown")}
               </td>
             </tr>
           );

@@ -5,10 +5,11 @@ import { api } from "../api/client";
 import { alarmSound, followAlarms } from "../state/alarmSound";
 import { type Matter, mattersOf, toldWords } from "../state/attention";
 import { clock, minutes } from "../state/format";
-import { said } from "../state/session";
 import { mission, now, openAlarms, replayStep, takenAlarm } from "../state/store";
 import { showWhere } from "../state/whereabouts";
+import { say, sayWith } from "../words/say";
 import { Button, flips } from "./Controls";
+import { take, takeAlarms, takeFault } from "./taking";
 
 const TOLD_PERIOD_MS = 10_000;
 const SHOWN = 2;
@@ -20,25 +21,16 @@ export function Attention() {
     replayStep.value === null ? mattersOf(mission.value, openAlarms.value) : [],
   );
   const open = useSignal(false);
-  const fault = useSignal("");
   useEffect(() => followAlarms(), []);
   const alarms = openAlarms.value;
   const shown = open.value ? matters.value : matters.value.slice(0, alarms.length > 0 ? SHOWN : 1);
   const rest = matters.value.length - shown.length;
   if (shown.length === 0) return <Taken />;
-  const take = async (ids: readonly string[]) => {
-    try {
-      await Promise.all(ids.map((id) => api.acknowledge(id)));
-      fault.value = "";
-    } catch (error) {
-      fault.value = said(error);
-    }
-  };
   return (
     <>
       <section
         class={`attention ${shown[0]?.tone}`}
-        aria-label="Needs attention"
+        aria-label={say("attention.needsAttention")}
         data-testid="attention"
         {...(alarms.length > 0 ? { role: "alert" } : {})}
       >
@@ -47,11 +39,11 @@ export function Attention() {
             <Line key={matter.key} matter={matter} onTake={(id) => void take([id])} />
           ))}
         </ul>
-        {fault.value ? <p class="fault">{fault.value}</p> : null}
+        {takeFault.value ? <p class="fault">{takeFault.value}</p> : null}
         <div class="attention-does">
           {rest > 0 || open.value ? (
             <Button id="attention-more" kind="link-button" aria-expanded={open.value} onClick={flips(open)}>
-              {open.value ? "Less" : `${rest} more`}
+              {open.value ? say("attention.less") : say("attention.more", { rest })}
             </Button>
           ) : null}
           {alarms.length > 0 ? (
@@ -60,18 +52,18 @@ export function Attention() {
                 id="alarm-sound"
                 kind="link-button"
                 aria-pressed={alarmSound.value}
-                title="On this device only"
+                title={say("attention.onThisDeviceOnly")}
                 onClick={flips(alarmSound)}
               >
-                {alarmSound.value ? "Mute" : "Sound on"}
+                {alarmSound.value ? say("attention.mute") : say("attention.soundOn")}
               </Button>
               <Button
                 id="take-alarms"
                 commands
-                title="Say that you see to it: nobody else is called for these alarms"
-                onClick={() => void take(alarms.map(({ id }) => id))}
+                title={say("attention.sayThatYouSeeToIt")}
+                onClick={() => void takeAlarms()}
               >
-                {alarms.length > 1 ? `Take all ${alarms.length}` : "Taken"}
+                {alarms.length > 1 ? say("attention.takeAll", { count: alarms.length }) : say("log.taken")}
               </Button>
             </>
           ) : null}
@@ -91,22 +83,26 @@ function Line({ matter: m, onTake }: { matter: Matter; onTake: (id: string) => v
       <p class="small">
         {m.since === null ? null : (
           <>
-            Since{" "}
-            <time dateTime={new Date(m.since).toISOString()}>
-              {clock(new Date(m.since), "utc").slice(0, 5)}
-            </time>{" "}
-            UTC ({minutes(Math.max(now.value - m.since, 0) / 1000)}).{" "}
+            {sayWith("attention.since", {
+              time: (
+                <time dateTime={new Date(m.since).toISOString()}>
+                  {clock(new Date(m.since), "utc").slice(0, 5)}
+                </time>
+              ),
+              ago: minutes(Math.max(now.value - m.since, 0) / 1000),
+            })}{" "}
           </>
         )}
-        {m.todo === "" ? null : <>What to do: {m.todo}.</>} {m.alarm ? <Told id={m.alarm.id} /> : null}{" "}
+        {m.todo === "" ? null : <>{say("attention.whatToDo", { todo: m.todo })}</>}{" "}
+        {m.alarm ? <Told id={m.alarm.id} /> : null}{" "}
         {m.vehicle ? (
           <Button kind="link-button" onClick={() => void showWhere(m.vehicle as string, m.since)}>
-            Where
+            {say("attention.where")}
           </Button>
         ) : null}{" "}
         {m.alarm ? (
           <Button kind="link-button" commands onClick={() => onTake(m.alarm?.id ?? "")}>
-            Take it
+            {say("attention.takeIt")}
           </Button>
         ) : null}
       </p>
@@ -140,7 +136,11 @@ function Taken() {
   if (!taken?.acknowledged_at) return null;
   return (
     <p class="notice" role="status" data-testid="taken-alarm">
-      {clock(new Date(taken.acknowledged_at), "utc")} UTC: {taken.acknowledged_by} took “{taken.message}”
+      {say("log.utcTook", {
+        it: clock(new Date(taken.acknowledged_at), "utc"),
+        acknowledgedBy: taken.acknowledged_by ?? "",
+        message: taken.message,
+      })}
     </p>
   );
 }

@@ -3,16 +3,17 @@ import type { NewMission } from "../api/types";
 import { kept } from "../kept";
 import { type Draft, faultsOf, toMission } from "../state/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../state/missionFile";
-import { Button, Choice, FileButton, Trouble } from "./Controls";
+import { type Key, say } from "../words/say";
+import { Button, Choice, FileButton, same, Trouble } from "./Controls";
 import { saveText } from "./saving";
 
 /** Templates that were kept on this device. */
 const templates = kept<readonly Template[]>("templates", []);
 
 /** What comes with the page: changes of a draft. */
-const BUILT_IN: Readonly<Record<string, Partial<Draft>>> = {
-  "Single beams or DVL, adaptive": { kind: "survey", planner: "cao", sensor: "dvl" },
-  "Multibeam, full coverage": { kind: "survey", planner: "swath", sensor: "multibeam" },
+const BUILT_IN: Readonly<Partial<Record<Key, Partial<Draft>>>> = {
+  "beginnings.singleBeamsOrDvlAdaptive": { kind: "survey", planner: "cao", sensor: "dvl" },
+  "beginnings.multibeamFullCoverage": { kind: "survey", planner: "swath", sensor: "multibeam" },
 };
 
 /** What a new mission begins with: a template, or a file. */
@@ -29,20 +30,26 @@ export function Beginnings({ draft, onBegin }: { draft: Draft; onBegin: (draft: 
   const choose = (name: string) => {
     const own = templates.value.find((one) => one.name === name);
     if (own) onBegin(withTemplate(own.mission, draft));
-    else if (BUILT_IN[name]) onBegin({ ...draft, ...BUILT_IN[name] });
+    else onBegin({ ...draft, ...BUILT_IN[name as Key] });
   };
-  const names = [...Object.keys(BUILT_IN), ...templates.value.map(({ name }) => name)];
+  const builtIn = (Object.keys(BUILT_IN) as Key[]).map(
+    (key) => [key, say(key as "beginnings.multibeamFullCoverage")] as const,
+  );
   return (
     <div class="beginnings">
       <Choice
         value=""
-        label="Begin with a template"
-        options={[["", "Begin with a template…"], ...names.map((name) => [name, name] as const)]}
+        label={say("beginnings.beginWithATemplate")}
+        options={[
+          ["", say("beginnings.beginWithATemplate2")],
+          ...builtIn,
+          ...same(templates.value.map(({ name }) => name)),
+        ]}
         id="template"
         onChoose={choose}
       />
       <FileButton accept=".json" id="mission-file" onText={read}>
-        Import
+        {say("beginnings.import")}
       </FileButton>
       <Trouble words={fault.value} />
     </div>
@@ -52,7 +59,7 @@ export function Beginnings({ draft, onBegin }: { draft: Draft; onBegin: (draft: 
 /** Keeps what is described: as a file, or as a template for missions elsewhere. */
 export function Keeping({ draft }: { draft: Draft }) {
   const whole = Object.keys(faultsOf(draft)).length === 0;
-  const why = whole ? "" : "Only a description without faults can be kept";
+  const why = whole ? "" : say("beginnings.onlyADescriptionWithout");
   const described = (): NewMission => toMission(draft);
   const mine = templates.value.find(({ name }) => name === draft.name.trim());
   return (
@@ -63,18 +70,18 @@ export function Keeping({ draft }: { draft: Draft }) {
         title={why}
         onClick={() => saveText(fileNameOf(draft.name), missionFile(described(), draft.tide_table))}
       >
-        Export
+        {say("beginnings.export")}
       </Button>
       <Button
         id="keep-template"
         disabled={!whole}
-        title={why || "Keeps all but the places on this device, under the mission's name"}
+        title={why || say("beginnings.keepsAllButThePlacesOn")}
         onClick={() => {
           const others = templates.value.filter((one) => one !== mine);
           templates.value = [...others, { name: draft.name.trim(), mission: described() }];
         }}
       >
-        {mine ? "Renew the template" : "Keep as template"}
+        {mine ? say("beginnings.renewTheTemplate") : say("beginnings.keepAsTemplate")}
       </Button>
       {mine ? (
         <Button
@@ -83,7 +90,7 @@ export function Keeping({ draft }: { draft: Draft }) {
             templates.value = templates.value.filter((one) => one !== mine);
           }}
         >
-          Forget the template
+          {say("beginnings.forgetTheTemplate")}
         </Button>
       ) : null}
     </div>

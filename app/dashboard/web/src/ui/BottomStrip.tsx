@@ -1,15 +1,17 @@
 import "./BottomStrip.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { count, distance, metres, percent } from "../state/format";
+import { count, distance, metres, percent, plain } from "../state/format";
 import { shownStep } from "../state/replay";
 import { mission, replayStep, stripHeight, type Tab, tab, view } from "../state/store";
+import { say } from "../words/say";
 import { Charts } from "./Charts";
 import { Compare } from "./Compare";
 import { Button } from "./Controls";
 import { EventLog } from "./EventLog";
 import { Files } from "./Files";
 import { Grip } from "./Grip";
+import { ProfilePane } from "./ProfilePane";
 import { Review } from "./Review";
 import { paneHeight } from "./room";
 import { TimeSlider } from "./TimeSlider";
@@ -38,50 +40,85 @@ export function BottomStrip() {
   const distance_m = past ? (figures.distance_m ?? null) : p.distance_m;
   const newest = view.value.events.at(-1);
   return (
-    <section ref={strip} class="bottom" aria-label="Progress and log">
+    <section ref={strip} class="bottom" aria-label={say("bottomStrip.progressAndLog")}>
       {tab.value === null ? null : (
-        <Grip what="the pane" size={paneHeight} side="top" least={120} most={900} id="grip-pane" />
+        <Grip
+          what={say("bottomStrip.thePane")}
+          size={paneHeight}
+          side="top"
+          least={120}
+          most={900}
+          id="grip-pane"
+        />
       )}
       {tab.value === "log" ? <EventLog /> : null}
       {tab.value === "files" ? <Files /> : null}
       {tab.value === "charts" ? <Charts /> : null}
       {tab.value === "soundings" ? <Review /> : null}
       {tab.value === "compare" ? <Compare /> : null}
+      {tab.value === "profile" ? <ProfilePane /> : null}
       <TimeSlider />
       <div class="strip">
         <dl class="figures" data-past={past}>
           {p.search && !past ? (
             <>
-              <Figure label="Goal area seen" value={percent(p.search.goal_pct, 1)} id="strip-goal" />
-              <Figure label="Site seen" value={percent(p.search.explored_pct, 1)} id="strip-site" />
+              <Figure
+                label={say("bottomStrip.goalAreaSeen")}
+                value={percent(p.search.goal_pct, 1)}
+                id="strip-goal"
+              />
+              <Figure
+                label={say("bottomStrip.siteSeen")}
+                value={percent(p.search.explored_pct, 1)}
+                id="strip-site"
+              />
             </>
           ) : p.search ? null : p.ensonified_pct !== null && !past ? (
             <>
-              <Figure label="Ensonified" value={percent(p.ensonified_pct, 1)} id="coverage" />
-              <Figure label="Dense (5 and more)" value={percent(p.dense_pct, 1)} id="dense" />
-              <Figure label="Holidays" value={count(p.holidays ?? 0)} id="holidays" />
-              <Figure label="Beams" value={count(p.beams)} id="beams" />
+              <Figure
+                label={say("bottomStrip.ensonified")}
+                value={percent(p.ensonified_pct, 1)}
+                id="coverage"
+              />
+              <Figure label={say("bottomStrip.dense5AndMore")} value={percent(p.dense_pct, 1)} id="dense" />
+              <Figure label={say("bottomStrip.holidays")} value={count(p.holidays ?? 0)} id="holidays" />
+              <Figure label={say("bottomStrip.beams")} value={count(p.beams)} id="beams" />
             </>
           ) : (
             <>
               <Figure
-                label={p.ensonified_pct === null ? `Known to ${present.spec.accuracy_m} m` : "Ensonified"}
+                label={
+                  p.ensonified_pct === null
+                    ? say("bottomStrip.knownToM", { accuracyM: plain(present.spec.accuracy_m) })
+                    : say("bottomStrip.ensonified")
+                }
                 value={percent(coverage_pct, 1)}
                 id="coverage"
               />
-              <Figure label="Mean deviation" value={metres(mean_sd_m, 2)} id="mean-sd" />
+              <Figure label={say("bottomStrip.meanDeviation")} value={metres(mean_sd_m, 2)} id="mean-sd" />
             </>
           )}
           {soundings === 0 && p.beams > 0 && !past ? null : (
-            <Figure label="Soundings" value={soundings === null ? "–" : count(soundings)} id="soundings" />
+            <Figure
+              label={say("bottomStrip.soundings")}
+              value={soundings === null ? "–" : count(soundings)}
+              id="soundings"
+            />
           )}
-          <Figure label="Travelled" value={distance_m === null ? "–" : distance(distance_m)} id="distance" />
+          <Figure
+            label={say("bottomStrip.travelled")}
+            value={distance_m === null ? "–" : distance(distance_m)}
+            id="distance"
+          />
         </dl>
-        <nav class="tabs" aria-label="More about this mission">
-          <Toggle name="charts">Charts</Toggle>
-          <Toggle name="soundings">Rejected{p.rejected ? ` (${count(p.rejected)})` : ""}</Toggle>
-          <Toggle name="files">Files</Toggle>
-          <Toggle name="compare">Compare</Toggle>
+        <nav class="tabs" aria-label={say("bottomStrip.moreAboutThisMission")}>
+          <Toggle name="charts">{say("bottomStrip.charts")}</Toggle>
+          <Toggle name="soundings">
+            {say("bottomStrip.rejected", { it: p.rejected ? ` (${count(p.rejected)})` : "" })}
+          </Toggle>
+          <Toggle name="files">{say("bottomStrip.files")}</Toggle>
+          <Toggle name="profile">{say("profile.profile")}</Toggle>
+          <Toggle name="compare">{say("bottomStrip.compare")}</Toggle>
         </nav>
         <Button
           id="toggle-log"
@@ -89,8 +126,8 @@ export function BottomStrip() {
           aria-expanded={tab.value === "log"}
           onClick={() => toggle("log")}
         >
-          <b>Log {tab.value === "log" ? "▾" : "▴"}</b>{" "}
-          <span class="newest">{newest?.message ?? "nothing yet"}</span>
+          <b>{say("bottomStrip.log", { it: tab.value === "log" ? "▾" : "▴" })}</b>{" "}
+          <span class="newest">{newest?.message ?? say("bottomStrip.nothingYet")}</span>
         </Button>
       </div>
     </section>

@@ -1,5 +1,5 @@
 import "./ChartPane.css";
-import { useSignal } from "@preact/signals";
+import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Chart, GridFrame } from "../map/chart";
 import { latitude, longitude } from "../state/format";
@@ -16,8 +16,11 @@ import {
   picking,
   theme,
 } from "../state/store";
+import { say } from "../words/say";
 import { follow } from "./follow";
+import { fitAsked } from "./keys";
 import { MapTools } from "./MapTools";
+import { shownChart } from "./mapPicture";
 import { overlaid } from "./room";
 
 // Most of the page's code: it is read while the service is asked, not before.
@@ -65,6 +68,7 @@ export function ChartPane() {
           },
         });
         chart.value = made;
+        shownChart.value = made;
         stop = follow(made);
       })
       .catch((error: unknown) => {
@@ -73,19 +77,23 @@ export function ChartPane() {
     return () => {
       ended = true;
       stop();
+      shownChart.value = null;
       chart.peek()?.destroy();
     };
   }, []);
 
+  useSignalEffect(() => {
+    if (fitAsked.value > 0) chart.peek()?.fit(overlaid);
+  });
+
   return (
-    <section class="chart" aria-label="Map" inert={in3d.value}>
+    <section class="chart" aria-label={say("chartPane.map")} inert={in3d.value}>
       <div ref={container} class="chart-canvas" data-testid="map" data-ready={chart.value !== null} />
       {frame.value ? <GridLabels frame={frame.value} /> : null}
       <MapTools onFit={() => chart.value?.fit(overlaid)} />
       {fault.value ? (
         <p class="notice alarm" role="alert">
-          The map cannot be drawn: {fault.value}. It needs WebGL 2: switch on hardware acceleration or use
-          another browser.
+          {say("chartPane.theMapCannotBeDrawnIt", { fault: fault.value })}
         </p>
       ) : null}
     </section>

@@ -5,14 +5,39 @@ import { fetchSteps, fetchTelemetry, noteFault } from "../state/session";
 import { colourOf, isDark, mission, selectedId, steps, telemetry, view } from "../state/store";
 import { figuresOver, type Metric } from "../state/telemetry";
 import { hasEnded } from "../state/words";
+import { say } from "../words/say";
 import { Choice, into, titles } from "./Controls";
 import { Plot } from "./Plot";
 
 const METRICS = {
-  depth_m: { title: "Depth of vehicles", unit: "m", down: true },
-  altitude_m: { title: "Altitude", unit: "m", down: false },
-  battery_pct: { title: "Battery", unit: "%", down: false },
-  age_s: { title: "Seconds since heard", unit: "s", down: false },
+  depth_m: {
+    get title() {
+      return say("charts.depthOfVehicles");
+    },
+    unit: "m",
+    down: true,
+  },
+  altitude_m: {
+    get title() {
+      return say("charts.altitude");
+    },
+    unit: "m",
+    down: false,
+  },
+  battery_pct: {
+    get title() {
+      return say("charts.battery");
+    },
+    unit: "%",
+    down: false,
+  },
+  age_s: {
+    get title() {
+      return say("charts.secondsSinceHeard");
+    },
+    unit: "s",
+    down: false,
+  },
 } as const satisfies Record<Metric, unknown>;
 
 const INKS = ["#1d5c94", "#b8442b", "#2e7d6e", "#8c50b8", "#8a6d00", "#5f6f7a", "#b03a80", "#3b7fd0"];
@@ -46,34 +71,34 @@ export function Charts() {
   return (
     <div class="log charts" data-testid="charts">
       {f.numbers.length === 0 ? (
-        <p class="empty">Charts over steps begin with the first step.</p>
+        <p class="empty">{say("charts.chartsOverStepsBeginWithThe")}</p>
       ) : (
         <>
           <Plot
-            title="Known, and left to be known"
+            title={say("charts.coverageAndRemaining")}
             xs={f.numbers}
             unit="%"
             range={[0, 100]}
             lines={[
-              { label: "covered", colour: colour(0), values: f.coverage },
-              { label: "remaining", colour: colour(1), dash: [6, 4], values: f.remaining },
+              { label: say("charts.covered"), colour: colour(0), values: f.coverage },
+              { label: say("charts.remaining"), colour: colour(1), dash: [6, 4], values: f.remaining },
             ]}
           />
           <Plot
-            title="Mean deviation of the map"
+            title={say("charts.meanDeviationOfTheMap")}
             xs={f.numbers}
             unit="m"
-            lines={[{ label: "deviation", colour: colour(2), values: f.deviation }]}
+            lines={[{ label: say("charts.deviation"), colour: colour(2), values: f.deviation }]}
           />
           <Plot
-            title="What the planner aims at (objective J)"
+            title={say("charts.objectiveJ")}
             xs={f.numbers}
             unit=""
             lines={[{ label: "J", colour: colour(3), values: f.objective }]}
           />
           {f.terms.length > 0 ? (
             <Plot
-              title="The planner's own figures"
+              title={say("charts.itsTerms")}
               xs={f.numbers}
               unit=""
               lines={f.terms.map((t, i) => ({ label: t.label, colour: colour(i), values: t.values }))}
@@ -83,7 +108,7 @@ export function Charts() {
       )}
       <div>
         <label class="metric">
-          <span class="visually-hidden">Figure of the vehicles</span>
+          <span class="visually-hidden">{say("charts.figureOfTheVehicles")}</span>
           <Choice value={metric.value} options={titles(METRICS)} id="metric" onChoose={into(metric)} />
         </label>
         <Plot

@@ -8,6 +8,7 @@ import { figuresOf } from "../state/history";
 import { fetchSteps, noteFault, said } from "../state/session";
 import { mission, missions, seaFloor, steps } from "../state/store";
 import { lengthWords, MISSION_WORDS } from "../state/words";
+import { say } from "../words/say";
 import { Choice } from "./Controls";
 import { Plot } from "./Plot";
 
@@ -42,11 +43,11 @@ export function Compare() {
   return (
     <div class="log compare" data-testid="compare">
       <label class="field">
-        Compare with
+        {say("compare.compareWith")}
         <Choice
           value={chosen.value}
           options={[
-            ["", "Choose a mission"],
+            ["", say("compare.chooseAMission")],
             ...(missions.value ?? [])
               .filter((m) => m.id !== present.id)
               .map(
@@ -92,13 +93,13 @@ type Row = [string, (m: MissionView) => string];
 function coverageRows(missions: readonly MissionView[]): Row[] {
   const swept = ({ progress }: MissionView) => progress.ensonified_pct !== null;
   const known: Row = [
-    "Known to the asked accuracy",
+    say("compare.knownToTheAskedAccuracy"),
     (m) => percent(swept(m) ? null : m.progress.coverage_pct, 1),
   ];
   const ensonified: Row[] = [
-    ["Ensonified", (m) => percent(m.progress.ensonified_pct, 1)],
-    ["Dense", (m) => percent(m.progress.dense_pct, 1)],
-    ["Holidays", (m) => (m.progress.holidays === null ? "–" : count(m.progress.holidays))],
+    [say("bottomStrip.ensonified"), (m) => percent(m.progress.ensonified_pct, 1)],
+    [say("compare.dense"), (m) => percent(m.progress.dense_pct, 1)],
+    [say("bottomStrip.holidays"), (m) => (m.progress.holidays === null ? "–" : count(m.progress.holidays))],
   ];
   return [...(missions.every(swept) ? [] : [known]), ...(missions.some(swept) ? ensonified : [])];
 }
@@ -107,17 +108,17 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
   const two = other.mission;
   const difference = seaFloor.value && other.map ? differenceOf(seaFloor.value, other.map) : null;
   const rows: Row[] = [
-    ["State", (m) => MISSION_WORDS[m.state]],
-    ["Planner", (m) => m.spec.planner.name],
-    ["Vehicles", (m) => String(m.vehicles.length)],
-    ["Length", (m) => lengthWords(m.progress)],
+    [say("compare.state"), (m) => MISSION_WORDS[m.state]],
+    [say("compare.planner"), (m) => m.spec.planner.name],
+    [say("compare.vehicles"), (m) => String(m.vehicles.length)],
+    [say("asked.length"), (m) => lengthWords(m.progress)],
     ...coverageRows([one, two]),
-    ["Remaining landmarks", (m) => percent(m.progress.remaining_pct, 1)],
-    ["Mean deviation", (m) => metres(m.progress.mean_sd_m, 3)],
-    ["Soundings", (m) => count(m.progress.soundings)],
-    ["Rejected", (m) => count(m.progress.rejected)],
-    ["Travelled", (m) => distance(m.progress.distance_m)],
-    ["Time", (m) => duration(m.progress.elapsed_s)],
+    [say("compare.remainingLandmarks"), (m) => percent(m.progress.remaining_pct, 1)],
+    [say("bottomStrip.meanDeviation"), (m) => metres(m.progress.mean_sd_m, 3)],
+    [say("bottomStrip.soundings"), (m) => count(m.progress.soundings)],
+    [say("compare.rejected"), (m) => count(m.progress.rejected)],
+    [say("bottomStrip.travelled"), (m) => distance(m.progress.distance_m)],
+    [say("asked.time"), (m) => duration(m.progress.elapsed_s)],
   ];
   const a = figuresOf(steps.value);
   const b = figuresOf(other.steps);
@@ -127,7 +128,7 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
       <table data-testid="compare-table">
         <thead>
           <tr>
-            <th scope="col">Figure</th>
+            <th scope="col">{say("compare.figure")}</th>
             <th scope="col">{one.name}</th>
             <th scope="col">{two.name}</th>
           </tr>
@@ -144,13 +145,19 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
       </table>
       <p data-testid="compare-maps">
         {difference
-          ? `Where both know the bottom (${count(difference.cells)} cells) the maps differ by ${metres(difference.rmse_m, 3)} RMSE, ` +
-            `${metres(difference.bias_m, 3)} on average, at most ${metres(difference.largest_m, 2)}.`
-          : "The maps do not overlap, or one of them is not there yet."}
+          ? say("compare.whereBothKnowTheBottomCells", {
+              cells: count(difference.cells),
+              rmseM: metres(difference.rmse_m, 3),
+            }) +
+            say("compare.onAverageAtMost", {
+              biasM: metres(difference.bias_m, 3),
+              largestM: metres(difference.largest_m, 2),
+            })
+          : say("compare.theMapsDoNotOverlapOr")}
       </p>
       <div class="charts">
         <Plot
-          title="Remaining landmarks"
+          title={say("compare.remainingLandmarks")}
           xs={xs}
           unit="%"
           range={[0, 100]}
@@ -160,7 +167,7 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
           ]}
         />
         <Plot
-          title="Mean deviation of the map"
+          title={say("charts.meanDeviationOfTheMap")}
           xs={xs}
           unit="m"
           lines={[

@@ -1,7 +1,7 @@
 import "./CrosslinesCard.css";
 import type { AgreementView, AngleAgreementView, CrossingView, CrossoversView } from "../api/types";
 import { aboutCrossing, barsOf, outliersOf, placeOf } from "../map/crossings";
-import { count, distance, metres, percent, place } from "../state/format";
+import { count, distance, fixed, metres, percent, place } from "../state/format";
 import {
   askForCrossovers,
   coordinateFormat,
@@ -9,6 +9,7 @@ import {
   crossoversWanted,
   destination,
 } from "../state/store";
+import { say } from "../words/say";
 import { Button } from "./Controls";
 import { SystematicErrors } from "./SystematicErrors";
 
@@ -23,39 +24,50 @@ export function CrosslinesCard() {
   const found = crossovers.value;
   if (crossoversWanted.value === null) {
     return (
-      <article class="card target crosslines" data-testid="crosslines-card" aria-label="Crosslines">
+      <article
+        class="card target crosslines"
+        data-testid="crosslines-card"
+        aria-label={say("crosslines.crosslines")}
+      >
         <header>
-          <h2>Crosslines</h2>
+          <h2>{say("crosslines.crosslines")}</h2>
         </header>
         <Button id="check-crosslines" onClick={askForCrossovers}>
-          Compare lines where they cross
+          {say("crosslines.compareLinesWhereTheyCross")}
         </Button>
       </article>
     );
   }
   if (!found?.statistics) return null;
   return (
-    <article class="card target crosslines" data-testid="crosslines-card" aria-label="Crosslines">
+    <article
+      class="card target crosslines"
+      data-testid="crosslines-card"
+      aria-label={say("crosslines.crosslines")}
+    >
       <header>
-        <h2>Crosslines</h2>
+        <h2>{say("crosslines.crosslines")}</h2>
       </header>
       <Figures found={found} all={found.statistics} />
       <Differences found={found} />
       <ByAngle bins={found.by_angle} />
       <Agreements
-        title="Vehicles"
+        title={say("compare.vehicles")}
         rows={found.by_vehicles.map((one) => [
           one.vehicles[0] === one.vehicles[1] ? one.vehicles[0] : one.vehicles.join(" – "),
           one,
         ])}
       />
       <details>
-        <summary>By line, worst first</summary>
+        <summary>{say("crosslines.byLineWorstFirst")}</summary>
         <Agreements
-          title="Line"
+          title={say("crosslines.line")}
           rows={found.by_line
             .slice(0, MOST_LISTED)
-            .map((one) => [`${one.vehicle} ${one.line}${one.crossline ? " (crossline)" : ""}`, one])}
+            .map((one) => [
+              `${one.vehicle} ${one.line}${one.crossline ? say("crosslines.crossline") : ""}`,
+              one,
+            ])}
         />
       </details>
       <Outliers found={found} />
@@ -64,38 +76,43 @@ export function CrosslinesCard() {
   );
 }
 
-const ORDER = "Order 1a";
-
 function Figures({ found, all }: { found: CrossoversView; all: AgreementView }) {
   return (
     <>
       <dl class="big">
-        <div title="Places where two lines cross">
-          <dt>Crossings</dt>
+        <div title={say("crosslines.placesWhereTwoLinesCross")}>
+          <dt>{say("crosslines.crossings")}</dt>
           <dd data-testid="crossings">{count(all.count)}</dd>
         </div>
-        <div title={`Share of differences that are not larger than the largest TVU of S-44 ${ORDER}`}>
-          <dt>{ORDER}</dt>
+        <div title={say("crosslines.shareOfDifferencesThatAreNot", { order: say("crosslines.order1a") })}>
+          <dt>{say("crosslines.order1a")}</dt>
           <dd data-testid="crossings-within">{percent(all.within_pct, 1)}</dd>
         </div>
-        <div title="Mean difference; between vehicles the first minus the second, else the later minus the earlier">
-          <dt>Mean</dt>
+        <div title={say("crosslines.meanDifferenceBetween")}>
+          <dt>{say("crosslines.mean")}</dt>
           <dd data-testid="crossings-mean">{metres(all.mean_m, 2)}</dd>
         </div>
-        <div title="Standard deviation of the differences">
-          <dt>Deviation</dt>
+        <div title={say("crosslines.standardDeviationOfThe")}>
+          <dt>{say("crosslines.deviation")}</dt>
           <dd>{metres(all.sd_m, 2)}</dd>
         </div>
       </dl>
       <p class="small" data-testid="crosslines-length">
-        {count(found.crosslines)} {found.crosslines === 1 ? "crossline" : "crosslines"},{" "}
-        {distance(1000 * found.crosslines_km)}: {percent(found.crosslines_pct, 1)} of the way
+        {say("crosslines.crosslineOfTheWay", {
+          crosslines: count(found.crosslines),
+          it2: distance(1000 * found.crosslines_km),
+          crosslinesPct: percent(found.crosslines_pct, 1),
+        })}
       </p>
       {found.at_crosslines ? (
         <p class="small" data-testid="at-crosslines">
-          With main lines: {count(found.at_crosslines.count)} crossings, mean{" "}
-          {metres(found.at_crosslines.mean_m, 2)}, deviation {metres(found.at_crosslines.sd_m, 2)},{" "}
-          {percent(found.at_crosslines.within_pct, 1)} within {ORDER}
+          {say("crosslines.withMainLinesCrossingsMean", {
+            count: count(found.at_crosslines.count),
+            meanM: metres(found.at_crosslines.mean_m, 2),
+            sdM: metres(found.at_crosslines.sd_m, 2),
+            withinPct: percent(found.at_crosslines.within_pct, 1),
+            order: say("crosslines.order1a"),
+          })}
         </p>
       ) : null}
     </>
@@ -106,18 +123,21 @@ function Differences({ found: { histogram } }: { found: CrossoversView }) {
   const [low = 0, high = 0] = [histogram.edges_m[0], histogram.edges_m.at(-1)];
   return (
     <figure>
-      <figcaption>Differences, m</figcaption>
+      <figcaption>{say("crosslines.differencesM")}</figcaption>
       <svg
         viewBox={`0 0 ${WIDTH} ${HEIGHT + 14}`}
         role="img"
-        aria-label={`Histogram of differences from ${low.toFixed(2)} to ${high.toFixed(2)} metres`}
+        aria-label={say("crosslines.histogramOfDifferencesFromTo", {
+          low: fixed(low, 2),
+          high: fixed(high, 2),
+        })}
         data-testid="crossings-histogram"
       >
         {barsOf(histogram.counts, WIDTH, HEIGHT).map((bar) => (
           <rect key={bar.x} class="bar" {...bar} width={bar.width - 0.5} />
         ))}
         <path class="axis" d={`M0,${HEIGHT} H${WIDTH}`} />
-        <Ends low={low.toFixed(2)} middle="0" high={high.toFixed(2)} />
+        <Ends low={fixed(low, 2)} middle="0" high={fixed(high, 2)} />
       </svg>
     </figure>
   );
@@ -131,11 +151,11 @@ function ByAngle({ bins }: { bins: readonly AngleAgreementView[] }) {
   const y = (off_m: number) => (HEIGHT / 2) * (1 + off_m / reach_m);
   return (
     <figure>
-      <figcaption>Beams minus main lines by angle, ± {reach_m.toFixed(2)} m</figcaption>
+      <figcaption>{say("crosslines.beamsMinusMainLinesByAngle", { reachM: fixed(reach_m, 2) })}</figcaption>
       <svg
         viewBox={`0 0 ${WIDTH} ${HEIGHT + 14}`}
         role="img"
-        aria-label="Mean and standard deviation of crosslines' beams by their angle, deeper is lower"
+        aria-label={say("crosslines.meanAndStandardDeviationOf")}
         data-testid="crossings-by-angle"
       >
         <path class="axis" d={`M0,${HEIGHT / 2} H${WIDTH}`} />
@@ -144,8 +164,16 @@ function ByAngle({ bins }: { bins: readonly AngleAgreementView[] }) {
           return (
             <g key={from_deg}>
               <title>
-                {`${middle}°: ${mean_m.toFixed(3)} m, deviation ${metres(sd_m, 3)}, ${count(beams)} beams, ` +
-                  `${percent(within_pct, 1)} within ${ORDER}`}
+                {say("crosslines.mDeviationBeams", {
+                  middle,
+                  meanM: fixed(mean_m, 3),
+                  sdM: metres(sd_m, 3),
+                  beams: count(beams),
+                }) +
+                  say("crosslines.within", {
+                    withinPct: percent(within_pct, 1),
+                    order: say("crosslines.order1a"),
+                  })}
               </title>
               <path
                 class="spread"
@@ -155,7 +183,11 @@ function ByAngle({ bins }: { bins: readonly AngleAgreementView[] }) {
             </g>
           );
         })}
-        <Ends low={`${-widest}° port`} middle="0°" high={`${widest}° starboard`} />
+        <Ends
+          low={say("crosslines.port", { widest: -widest })}
+          middle="0°"
+          high={say("crosslines.starboard", { widest })}
+        />
       </svg>
     </figure>
   );
@@ -187,7 +219,7 @@ function Agreements({
   return (
     <section
       class="rows"
-      aria-label={`Differences by ${title.toLowerCase()}`}
+      aria-label={say("crosslines.differencesBy", { title: title.toLowerCase() })}
       // biome-ignore lint/a11y/noNoninteractiveTabindex: what does not fit is scrolled with the keyboard
       tabIndex={0}
     >
@@ -195,10 +227,10 @@ function Agreements({
         <thead>
           <tr>
             <th scope="col">{title}</th>
-            <th scope="col">Number</th>
-            <th scope="col">Mean</th>
-            <th scope="col">Dev.</th>
-            <th scope="col">In order</th>
+            <th scope="col">{say("crosslines.number")}</th>
+            <th scope="col">{say("crosslines.mean")}</th>
+            <th scope="col">{say("crosslines.dev")}</th>
+            <th scope="col">{say("crosslines.inOrder")}</th>
           </tr>
         </thead>
         <tbody>
@@ -206,8 +238,8 @@ function Agreements({
             <tr key={name}>
               <th scope="row">{name}</th>
               <td>{count(one.count)}</td>
-              <td>{one.mean_m.toFixed(2)}</td>
-              <td>{one.sd_m?.toFixed(2) ?? "–"}</td>
+              <td>{fixed(one.mean_m, 2)}</td>
+              <td>{one.sd_m == null ? "–" : fixed(one.sd_m, 2)}</td>
               <td>{percent(one.within_pct)}</td>
             </tr>
           ))}
@@ -222,7 +254,7 @@ function Outliers({ found }: { found: CrossoversView }) {
   if (shown.length === 0) return null;
   return (
     <>
-      <ol class="holidays" aria-label="Crossings that disagree, worst first">
+      <ol class="holidays" aria-label={say("crosslines.crossingsThatDisagreeWorst")}>
         {shown.map((crossing) => (
           <li key={crossing.number}>
             <Outlier crossing={crossing} />
@@ -230,7 +262,7 @@ function Outliers({ found }: { found: CrossoversView }) {
         ))}
       </ol>
       {found.outliers > shown.length ? (
-        <p class="small">and {count(found.outliers - shown.length)} more</p>
+        <p class="small">{say("crosslines.andMore", { outliers: count(found.outliers - shown.length) })}</p>
       ) : null}
     </>
   );
@@ -243,7 +275,7 @@ function Outlier({ crossing }: { crossing: CrossingView }) {
     <Button
       id={`crossing-${number}`}
       kind="link-button"
-      title={`Show it: ${place(placeOf(crossing), coordinateFormat.value)}`}
+      title={say("crosslines.showIt", { crossing: place(placeOf(crossing), coordinateFormat.value) })}
       onClick={() => {
         destination.value = aboutCrossing(crossing);
       }}

@@ -6,6 +6,7 @@
 import "./Dialog.css";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import { say } from "../words/say";
 import { Button, Trouble } from "./Controls";
 
 interface DialogProps {
@@ -38,7 +39,7 @@ export function Dialog({
   id = `${name}-dialog`,
   heading,
   fault = "",
-  closing = "Close",
+  closing = say("dialog.close"),
   actions,
   kind = "",
   above = false,

@@ -8,19 +8,22 @@ import { vehicleOf } from "../state/placeThen";
 import { said } from "../state/session";
 import { selectedId, view } from "../state/store";
 import { showEvent } from "../state/whereabouts";
+import { say } from "../words/say";
 import { Button, Choice, into, same, Typed } from "./Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
 const MOST_SHOWN = 300;
-const LEAST = [
-  ["all", "All lines"],
-  ["important", "Warnings and alarms"],
-  ["notes", "Notes"],
-] as const;
+/** Which lines are shown. */
+const choices = () =>
+  [
+    ["all", say("log.allLines")],
+    ["important", say("log.warningsAndAlarms")],
+    ["notes", say("log.notes")],
+  ] as const;
 
 /** The mission's log, newest first, with a field for what the next watch should know. */
 export function EventLog() {
-  const least = useSignal<(typeof LEAST)[number][0]>("all");
+  const least = useSignal<ReturnType<typeof choices>[number][0]>("all");
   const kind = useSignal("");
   const words = useSignal("");
   const vehicle = useSignal("");
@@ -39,32 +42,41 @@ export function EventLog() {
       <NoteForm />
       <div class="filters">
         <Choice
-          label="Which lines"
+          label={say("log.whichLines")}
           value={least.value}
-          options={LEAST}
+          options={choices()}
           id="log-level"
           onChoose={into(least)}
         />
         <Choice
-          label="Kind of line"
+          label={say("log.kindOfLine")}
           value={kind.value}
-          options={[["", "Every kind"], ...same(kinds.value)]}
+          options={[["", say("log.everyKind")], ...same(kinds.value)]}
           onChoose={into(kind)}
         />
         <Choice
-          label="Vehicle"
+          label={say("log.vehicle")}
           value={vehicle.value}
-          options={[["", "Every vehicle"], ...same(named.value)]}
+          options={[["", say("log.everyVehicle")], ...same(named.value)]}
           id="log-vehicle"
           onChoose={into(vehicle)}
         />
-        <Typed text={words} type="search" label="Words in the line" placeholder="Words" id="log-words" />
+        <Typed
+          text={words}
+          type="search"
+          label={say("log.wordsInTheLine")}
+          placeholder={say("log.words")}
+          id="log-words"
+        />
       </div>
-      {lines.length === 0 ? <p class="empty">No line is like that.</p> : null}
-      <ol aria-label="Log, newest first">
+      {lines.length === 0 ? <p class="empty">{say("log.noLineIsLikeThat")}</p> : null}
+      <ol aria-label={say("log.logNewestFirst")}>
         {lines.reverse().map((event) => (
           <li key={event.id} class={`${event.level}${event.kind === "note" ? " note" : ""}`}>
-            <time dateTime={event.time} title={`${clock(new Date(event.time), "local")} local`}>
+            <time
+              dateTime={event.time}
+              title={say("log.local", { it: clock(new Date(event.time), "local") })}
+            >
               {clock(new Date(event.time), "utc")}
             </time>
             <span aria-hidden="true">{SIGNS[event.level]}</span>
@@ -74,7 +86,7 @@ export function EventLog() {
                 <Button
                   kind="log-line"
                   id={`where-${event.id}`}
-                  title="Show on the map where that was"
+                  title={say("log.showOnTheMap")}
                   onClick={() => void showEvent(event)}
                 >
                   {event.message}
@@ -121,8 +133,8 @@ function NoteForm() {
     >
       <Typed
         text={text}
-        label="Note for the log"
-        placeholder="Note for the next watch"
+        label={say("log.noteForTheLog")}
+        placeholder={say("log.noteForTheNextWatch")}
         maxLength={2000}
         id="note"
       />
@@ -132,7 +144,7 @@ function NoteForm() {
         disabled={sending.value || text.value.trim() === "" || whyNotCommand.value !== ""}
         title={whyNotCommand.value}
       >
-        Write down
+        {say("log.writeDown")}
       </button>
       {fault.value ? (
         <span class="fault" role="alert">

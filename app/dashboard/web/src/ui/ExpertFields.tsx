@@ -2,7 +2,9 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { PlannerView } from "../api/types";
+import { pointed } from "../state/format";
 import { said } from "../state/session";
+import { say } from "../words/say";
 import { Choice, same } from "./Controls";
 import { Part, useForm } from "./Fields";
 
@@ -11,14 +13,14 @@ export function ExpertFields() {
   const { draft } = useForm();
   return (
     <details data-testid="expert">
-      <summary>Expert settings</summary>
+      <summary>{say("expert.expertSettings")}</summary>
       <div class="expert">
-        <h3>Limits and grid</h3>
+        <h3>{say("expert.limitsAndGrid")}</h3>
         <Part of="limits" explained />
         {draft.kind === "survey" ? (
           <>
             <Algorithm />
-            <h3>Uncertainty of swath sonars</h3>
+            <h3>{say("expert.uncertaintyOfSwathSonars")}</h3>
             <Part of="uncertainty" explained />
           </>
         ) : null}
@@ -47,9 +49,9 @@ function Algorithm() {
   const chosen = usable.find((p) => p.name === draft.planner);
   return (
     <>
-      <h3>Planner</h3>
+      <h3>{say("compare.planner")}</h3>
       <label class="field">
-        Planner
+        {say("compare.planner")}
         <Choice
           value={draft.planner}
           options={same(usable.length > 0 ? usable.map((p) => p.name) : [draft.planner])}
@@ -64,7 +66,7 @@ function Algorithm() {
       </label>
       {broken.map((p) => (
         <small key={p.name} class="fault" data-testid={`broken-planner-${p.name}`}>
-          ▲ {p.name} of {p.package} cannot be used: {p.problem}
+          {say("expert.ofCannotBeUsed", { p: p.name, package: p.package, problem: p.problem })}
         </small>
       ))}
       <Options schema={chosen?.options} />
@@ -111,9 +113,9 @@ function Options({ schema }: { schema: Record<string, unknown> | undefined }) {
               id={`option-${name}`}
               type="text"
               inputMode="decimal"
-              placeholder={option.default === null ? "automatic" : String(option.default)}
+              placeholder={option.default === null ? say("expert.automatic") : String(option.default)}
               onInput={(event) => {
-                const text = event.currentTarget.value.trim();
+                const text = pointed(event.currentTarget.value.trim());
                 change(name, text === "" || !Number.isFinite(Number(text)) ? undefined : Number(text));
               }}
             />

@@ -4,9 +4,11 @@ import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Draft, Faults } from "../state/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../state/fields";
+import { pointed } from "../state/format";
 import { typedPlace } from "../state/place";
 import { picking } from "../state/store";
-import { Button, Choice, same } from "./Controls";
+import { named, say } from "../words/say";
+import { Button, Choice } from "./Controls";
 
 export interface FormState {
   draft: Draft;
@@ -48,7 +50,7 @@ export function Text({ field, label, placeholder = "", numeric = false, hint = "
         title={hint}
         aria-invalid={faults[field] ? "true" : "false"}
         data-testid={`field-${field}`}
-        onInput={(event) => set({ [field]: event.currentTarget.value })}
+        onInput={({ currentTarget: { value } }) => set({ [field]: numeric ? pointed(value) : value })}
       />
       <Fault field={field} />
     </label>
@@ -76,7 +78,7 @@ export function Place({ id, label, text, onText, placeholder, invalid = false, c
           type="text"
           autocomplete="off"
           value={text}
-          placeholder={placeholder ?? "latitude, longitude"}
+          placeholder={placeholder ?? say("fields.latitudeLongitude")}
           aria-invalid={invalid ? "true" : "false"}
           data-testid={`field-${id}`}
           onInput={(event) => onText(event.currentTarget.value)}
@@ -90,7 +92,7 @@ export function Place({ id, label, text, onText, placeholder, invalid = false, c
           picking.value = waiting ? null : { what: id, onPicked: (at) => onText(typedPlace(at)) };
         }}
       >
-        {waiting ? "Click on the map…" : "Pick"}
+        {waiting ? say("fields.clickOnTheMap") : say("fields.pick")}
       </Button>
     </div>
   );
@@ -136,7 +138,11 @@ function Reason({ field }: { field: Field }) {
     <small>
       {description}
       {usual
-        ? `${description ? ". " : ""}Usual: ${usual}${field.unit && startOf(field, draft.kind) ? ` ${field.unit}` : ""}`
+        ? say("fields.usual", {
+            it: description ? ". " : "",
+            usual,
+            it2: field.unit && startOf(field, draft.kind) ? ` ${field.unit}` : "",
+          })
         : ""}
     </small>
   );
@@ -164,7 +170,12 @@ function Plain({ name, field }: { name: FieldName; field: Field }) {
     return (
       <label class="field" title={description}>
         {label}
-        <Choice value={draft[name]} options={same(choices)} id={`field-${name}`} onChoose={change} />
+        <Choice
+          value={draft[name]}
+          options={choices.map((one) => [one, named("choice", one, one)] as const)}
+          id={`field-${name}`}
+          onChoose={change}
+        />
       </label>
     );
   }

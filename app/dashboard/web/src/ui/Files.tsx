@@ -2,9 +2,11 @@ import "./Files.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { api, ServiceError } from "../api/client";
 import type { ProductView, QualityView } from "../api/types";
-import { duration, megabytes } from "../state/format";
+import { duration, fixed, megabytes } from "../state/format";
 import { now, selectedId, view } from "../state/store";
+import { say } from "../words/say";
 import { Button } from "./Controls";
+import { mapPicture, type PictureKind, shownChart } from "./mapPicture";
 import { save } from "./saving";
 
 /** A file that is on its way. */
@@ -12,6 +14,7 @@ interface Making {
   since: number;
   /** Bytes that have come; 0 while the service makes it. */
   received: number;
+  stop: AbortController;
 }
 
 /** What can be downloaded of the mission, and what may be said of its map's uncertainty. */
@@ -49,20 +52,31 @@ export function Files() {
   });
 
   const download = async (product: ProductView) => {
+    const stop = new AbortController();
+    const since = Date.now();
     const note = (received: number) => {
-      const since = making.peek()[product.name]?.since ?? Date.now();
-      making.value = { ...making.peek(), [product.name]: { since, received } };
+      making.value = { ...making.peek(), [product.name]: { since, received, stop } };
     };
     note(0);
     fault.value = "";
     try {
-      const file = await api.file(product.href, note);
+      const file = await api.file(product.href, note, stop.signal);
       save(file.name, file.content);
     } catch (error) {
-      fault.value = `${product.name}: ${said(error)}`;
+      if (!stop.signal.aborted) fault.value = `${product.name}: ${said(error)}`;
     } finally {
       const { [product.name]: _, ...others } = making.peek();
       making.value = others;
+    }
+  };
+
+  const picture = async (kind: PictureKind) => {
+    fault.value = "";
+    try {
+      const file = await mapPicture(kind);
+      save(file.name, file.content);
+    } catch (error) {
+      fault.value = said(error);
     }
   };
 
@@ -75,6 +89,14 @@ export function Files() {
       ) : null}
       <Quality found={quality.value} />
       <ul>
+        {(["png", "pdf"] as const).map((kind) => (
+          <li key={kind}>
+            <Button id={`picture-${kind}`} disabled={!shownChart.value} onClick={() => void picture(kind)}>
+              {`map.${kind}`}
+            </Button>
+            <span>{say("picture.asShown")}</span>
+          </li>
+        ))}
         {products.value.map((product) => (
           <li key={product.name}>
             <Button
@@ -85,22 +107,36 @@ export function Files() {
               {product.name}
             </Button>
             <span>{product.title}</span>
-            {making.value[product.name] ? <Progress making={making.value[product.name] as Making} /> : null}
+            {making.value[product.name] ? (
+              <Progress making={making.value[product.name] as Making} name={product.name} />
+            ) : null}
           </li>
         ))}
       </ul>
-      {hasMap.value ? null : <p class="empty">Files of the map follow with the first accepted sounding.</p>}
+      {hasMap.value ? null : <p class="empty">{say("files.filesOfTheMapFollowWith")}</p>}
     </div>
   );
 }
 
 /** How a file comes along: how long the service has been making it, then how much has come. */
-function Progress({ making: { since, received } }: { making: Making }) {
+function Progress({ making: { since, received, stop }, name }: { making: Making; name: string }) {
   const seconds = Math.max(0, (now.value - since) / 1000);
   return (
-    <small role="status" data-testid="making">
-      {received === 0 ? `being made, ${duration(seconds)}` : `${megabytes(received)} received`}
-    </small>
+    <>
+      <small role="status" data-testid="making">
+        {received === 0
+          ? say("files.beingMade", { seconds: duration(seconds) })
+          : say("files.received", { received: megabytes(received) })}
+      </small>
+      <Button
+        id={`stop-${name}`}
+        kind="link-button"
+        aria-label={say("files.cancelFile", { name })}
+        onClick={() => stop.abort()}
+      >
+        {say("mission.cancel")}
+      </Button>
+    </>
   );
 }
 
@@ -108,7 +144,7 @@ function Quality({ found }: { found: QualityView | null }) {
   if (!found) return null;
   return (
     <div data-testid="quality">
-      <p>Depths are below {found.vertical_datum}.</p>
+      <p>{say("files.depthsAreBelow", { verticalDatum: found.vertical_datum })}</p>
       <ul class="statements">
         {found.tvu.map((one) => (
           <li key={one.order}>{one.statement}</li>
@@ -116,8 +152,11 @@ function Quality({ found }: { found: QualityView | null }) {
       </ul>
       {found.difference ? (
         <p>
-          Difference to the reference grid: RMSE {found.difference.rmse_m.toFixed(2)} m, bias{" "}
-          {found.difference.bias_m.toFixed(2)} m, 95 % within {found.difference.p95_m.toFixed(2)} m.
+          {say("files.differenceToTheReferenceGrid", {
+            rmseM: fixed(found.difference.rmse_m, 2),
+            biasM: fixed(found.difference.bias_m, 2),
+            p95M: fixed(found.difference.p95_m, 2),
+          })}
         </p>
       ) : null}
     </div>

@@ -2,9 +2,10 @@ import "./FinishDialog.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import SPEC from "../api/mission.json";
-import { act } from "../state/session";
+import { act, actionWords } from "../state/session";
 import { finishOpen, mission } from "../state/store";
 import { canReturn, capital, lengthWords } from "../state/words";
+import { say } from "../words/say";
 import { sets } from "./Controls";
 import { StopDialog } from "./StopDialog";
 
@@ -39,29 +40,42 @@ export function FinishDialog() {
       onClose={sets(finishOpen, false)}
       name="finish"
       kind="finishing"
-      what="finish"
-      question={present?.ending ? "Stop the vehicles now?" : `Finish ${present?.name ?? ""} early?`}
-      done="Mission finished"
+      what={actionWords("finish")}
+      question={
+        present?.ending
+          ? say("finish.stopTheVehiclesNow")
+          : say("finish.finishEarly", { present: present?.name ?? "" })
+      }
+      done={say("finish.missionFinished")}
       send={() => act("finish", returns)}
-      confirm={(sending) => (sending ? "Finishing…" : present?.ending ? "Stop now" : "Finish mission")}
+      confirm={(sending) =>
+        sending
+          ? say("finish.finishing")
+          : present?.ending
+            ? say("abort.stopNow")
+            : say("finish.finishMission")
+      }
       confirmId="confirm-finish"
     >
       {() => (
         <>
           <p>
-            {present ? `${capital(lengthWords(present.progress))} is under way. ` : ""}
-            {home ? "" : "The vehicles are stopped where they are. "}A finished mission cannot be resumed. Its
-            map and files stay.
+            {say("finish.aFinishedMissionCannotBe", {
+              it: present
+                ? say("finish.isUnderWay", { progress: capital(lengthWords(present.progress)) })
+                : "",
+              it2: home ? "" : say("finish.theVehiclesAreStoppedWhere"),
+            })}
           </p>
           {home ? (
-            <fieldset class="how" aria-label="What the vehicles do">
+            <fieldset class="how" aria-label={say("finish.whatTheVehiclesDo")}>
               {choice(
                 true,
-                "Return home first",
-                "It is finished once all are at their recovery points.",
+                say("finish.returnHomeFirst"),
+                say("finish.itIsFinishedOnceAllAre"),
                 "finish-return",
               )}
-              {choice(false, "Stop where they are", "It is finished now.", "finish-stop")}
+              {choice(false, say("finish.stopWhereTheyAre"), say("finish.itIsFinishedNow"), "finish-stop")}
             </fieldset>
           ) : null}
         </>

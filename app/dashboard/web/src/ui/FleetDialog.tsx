@@ -1,8 +1,9 @@
 import "./FleetDialog.css";
 import type { VehicleView } from "../api/types";
-import { age, metres, place } from "../state/format";
+import { age, metres, place, speed } from "../state/format";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../state/store";
 import { batteryWords, vehicleState } from "../state/words";
+import { say } from "../words/say";
 import { sets } from "./Controls";
 import { Dialog } from "./Dialog";
 
@@ -11,12 +12,9 @@ export function FleetDialog() {
   const open = fleetOpen.value;
   const close = sets(fleetOpen, false);
   return (
-    <Dialog open={open} onClose={close} name="fleet" heading="Fleet" kind="fleet">
+    <Dialog open={open} onClose={close} name="fleet" heading={say("fleet.fleet")} kind="fleet">
       {fleet.value.length === 0 ? (
-        <p class="empty">
-          No vehicle was heard yet. Switch one on within reach of this network; the link check says what is
-          missing.
-        </p>
+        <p class="empty">{say("fleet.noVehicleWasHeardYetSwitch")}</p>
       ) : (
         // biome-ignore lint/a11y/noNoninteractiveTabindex: a table wider than the window is scrolled with the keyboard
         <div class="fleet-scroll" tabIndex={0}>
@@ -24,16 +22,16 @@ export function FleetDialog() {
             <thead>
               <tr>
                 {[
-                  "Vehicle",
-                  "State",
-                  "Mission",
-                  "Heard",
-                  "Battery",
-                  "Depth",
-                  "Altitude",
-                  "Speed",
-                  "Place",
-                  "Link",
+                  say("asked.vehicle"),
+                  say("compare.state"),
+                  say("fleet.mission"),
+                  say("fleet.heard"),
+                  say("charts.battery"),
+                  say("fleet.depth"),
+                  say("charts.altitude"),
+                  say("fleet.speed"),
+                  say("fleet.place"),
+                  say("fleet.link"),
                 ].map((title) => (
                   <th key={title} scope="col">
                     {title}
@@ -65,13 +63,17 @@ function Line({ vehicle: v }: { vehicle: VehicleView }) {
         {v.reason ? <small>{v.reason}</small> : null}
       </td>
       <td>
-        {v.mission_id === null ? "free" : <a href={`#/missions/${v.mission_id}`}>{name ?? "shown below"}</a>}
+        {v.mission_id === null ? (
+          say("fleet.free")
+        ) : (
+          <a href={`#/missions/${v.mission_id}`}>{name ?? say("fleet.shownBelow")}</a>
+        )}
       </td>
       <td>{age(v.age_s)}</td>
       <td>{batteryWords(v)}</td>
       <td>{metres(v.depth_m)}</td>
       <td>{metres(v.altitude_m)}</td>
-      <td>{v.speed_mps === null ? "–" : `${v.speed_mps.toFixed(1)} m/s`}</td>
+      <td>{v.speed_mps === null ? "–" : speed(v.speed_mps)}</td>
       <td>
         {v.lon_deg === null || v.lat_deg === null
           ? "–"

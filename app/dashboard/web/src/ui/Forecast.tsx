@@ -4,6 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { ForecastView } from "../api/types";
 import { distance, duration, metres, percent } from "../state/format";
 import { said } from "../state/session";
+import { say } from "../words/say";
 import { Button } from "./Controls";
 
 /**
@@ -51,19 +52,19 @@ export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => 
       ) : null}
       {waiting.value ? (
         <p class="hint">
-          Simulating the mission over several floors, half a minute or so…{" "}
+          {say("forecast.simulatingTheMissionOver")}{" "}
           <Button
             onClick={() => {
               request.current?.abort();
               waiting.value = false;
             }}
           >
-            Stop
+            {say("abort.stop")}
           </Button>
         </p>
       ) : view ? null : (
         <Button id="ask-forecast" onClick={() => void start()}>
-          Forecast by a quick simulation
+          {say("forecast.forecastByAQuickSimulation")}
         </Button>
       )}
     </section>
@@ -74,29 +75,32 @@ export function Forecast({ of, ask }: { of: string; ask: (gone: AbortSignal) => 
 function between(range: { low: number; high: number } | null, shown: (value: number) => string): string {
   if (range === null) return "–";
   const [low, high] = [shown(range.low), shown(range.high)];
-  return low === high ? low : `${low} to ${high}`;
+  return low === high ? low : say("forecast.to", { low, high });
 }
 
 function Found({ view }: { view: ForecastView }) {
-  const simulated = view.steps_simulated < view.steps ? ` after ${view.steps_simulated} steps` : "";
+  const simulated =
+    view.steps_simulated < view.steps
+      ? say("forecast.afterSteps", { stepsSimulated: view.steps_simulated })
+      : "";
   return (
     <>
-      <h3>Forecast, not measured</h3>
+      <h3>{say("forecast.forecastNotMeasured")}</h3>
       <dl class="figures">
         <div class="figure">
-          <dt>Duration</dt>
+          <dt>{say("forecast.duration")}</dt>
           <dd data-testid="forecast-duration">{between(view.duration_s_range, duration)}</dd>
         </div>
         <div class="figure">
-          <dt>Well known{simulated}</dt>
+          <dt>{say("forecast.wellKnown", { simulated })}</dt>
           <dd data-testid="forecast-coverage">{between(view.coverage_pct_range, percent)}</dd>
         </div>
         <div class="figure">
-          <dt>Landmarks left{simulated}</dt>
+          <dt>{say("forecast.landmarksLeft", { simulated })}</dt>
           <dd>{between(view.remaining_pct_range, percent)}</dd>
         </div>
         <div class="figure">
-          <dt>Mean deviation{simulated}</dt>
+          <dt>{say("forecast.meanDeviation", { simulated })}</dt>
           <dd>{between(view.mean_sd_m_range, (sd) => metres(sd, 2))}</dd>
         </div>
       </dl>

@@ -1,6 +1,7 @@
 import "./Grip.css";
 import type { Signal } from "@preact/signals";
 import { useRef } from "preact/hooks";
+import { say } from "../words/say";
 
 interface GripProps {
   /** What is made larger and smaller. */
@@ -38,13 +39,13 @@ export function Grip({ what, size, side, least, most, id }: GripProps) {
       ref={grip}
       class={`grip ${side}`}
       tabIndex={0}
-      aria-label={`Size of ${what}`}
+      aria-label={say("grip.sizeOf", { what })}
       aria-orientation={upright ? "vertical" : "horizontal"}
       aria-valuemin={least}
       aria-valuemax={most}
       aria-valuenow={size.value ?? least}
-      aria-valuetext={size.value === null ? "as usual" : `${size.value} pixels`}
-      title={`Drag to change the size of ${what}; a double click takes it back`}
+      aria-valuetext={size.value === null ? say("grip.asUsual") : say("grip.pixels", { size: size.value })}
+      title={say("grip.dragToChangeTheSizeOf", { what })}
       data-testid={id}
       onPointerDown={(event) => {
         event.currentTarget.setPointerCapture(event.pointerId);

@@ -3,11 +3,12 @@ import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { LayerView } from "../api/types";
-import { LANDMARK_COLOURS, LANDMARK_WORDS, landmarkShares } from "../map/landmarks";
+import { LANDMARK_COLOURS, landmarkShares, landmarkWords } from "../map/landmarks";
 import { classShares, paletteOf, type Range, rangeFault, shareOutside, symbolOf } from "../map/layers";
 import { colourAt, DEPTH_PALETTES, type Palette, type Rgb } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
 import { SITE_COLOURS, SITE_WORDS } from "../map/site";
+import { fixed, pointed } from "../state/format";
 import {
   depthPalette,
   fixedRanges,
@@ -26,6 +27,8 @@ import {
   showSite,
   site,
 } from "../state/store";
+import { PHASE_WORDS } from "../state/words";
+import { named, say } from "../words/say";
 import { Button, Choice, flips, into, titles } from "./Controls";
 import { STAGES, VehicleShape } from "./marks";
 
@@ -37,12 +40,17 @@ export function Legend() {
   if (!mission.value || !shown) return null;
   const palette = paletteOf(shown, depthPalette.value);
   return (
-    <section class={`legend${legendOpen.value ? "" : " folded"}`} aria-label="Map layer and legend">
+    <section
+      class={`legend${legendOpen.value ? "" : " folded"}`}
+      aria-label={say("legend.mapLayerAndLegend")}
+    >
       <label class="layer-choice">
-        <span class="visually-hidden">Layer</span>
+        <span class="visually-hidden">{say("legend.layer")}</span>
         <Choice
           value={layer.value}
-          options={layers.value.filter(({ scale }) => scale !== null).map(({ name, title }) => [name, title])}
+          options={layers.value
+            .filter(({ scale }) => scale !== null)
+            .map(({ name, title }) => [name, named("layer", name, title)])}
           title={sentence(shown.meaning)}
           id="layer"
           onChoose={into(layer)}
@@ -60,23 +68,23 @@ export function Legend() {
           <Scale shown={shown} palette={palette} range={range} />
         ) : (
           <Classes
-            words={LANDMARK_WORDS}
+            words={landmarkWords()}
             colours={LANDMARK_COLOURS}
             shares={landmarkShares(map) ?? []}
             id="landmarks"
           />
         )
       ) : (
-        <p class="empty">{map ? missing(map, shown) : "The sea floor appears with the first soundings"}</p>
+        <p class="empty">{map ? missing(map, shown) : say("legend.theSeaFloorAppearsWithThe")}</p>
       )}
       <Button
         id="toggle-legend"
         kind="fold"
         aria-expanded={legendOpen.value}
-        title={legendOpen.value ? "Show only the scale" : "Colours, light, contours, and what signs mean"}
+        title={legendOpen.value ? say("legend.showOnlyTheScale") : say("legend.coloursLightContoursAndWhat")}
         onClick={flips(legendOpen)}
       >
-        {legendOpen.value ? "Less ▴" : "More ▾"}
+        {legendOpen.value ? say("legend.less") : say("legend.more")}
       </Button>
       {legendOpen.value ? (
         <>
@@ -90,7 +98,7 @@ export function Legend() {
 }
 
 function missing(map: SeaFloor, { name, absence, remedy }: LayerView): string {
-  return absence && map.layers[name] ? `${sentence(absence)}. ${remedy}` : "This layer is on its way";
+  return absence && map.layers[name] ? `${sentence(absence)}. ${remedy}` : say("legend.thisLayerIsOnItsWay");
 }
 
 const sentence = (words: string) => words.charAt(0).toUpperCase() + words.slice(1);
@@ -110,7 +118,12 @@ function Scale({ shown, palette, range }: { shown: LayerView; palette: Palette; 
           <div
             class="scale"
             role="img"
-            aria-label={`${shown.title} from ${range.low} to ${range.high} ${unit}`}
+            aria-label={say("legend.fromTo", {
+              title: named("layer", shown.name, shown.title),
+              low: range.low,
+              high: range.high,
+              unit,
+            })}
             style={{
               background: `linear-gradient(to right, ${palette.css})`,
             }}
@@ -121,16 +134,16 @@ function Scale({ shown, palette, range }: { shown: LayerView; palette: Palette; 
       <span class="range-kind">
         {fixed ? (
           <Button id="range-fit" kind="link-button" onClick={() => setRange(undefined)}>
-            Fit to data
+            {say("legend.fitToData")}
           </Button>
         ) : (
           <Button
             id="range-fix"
             kind="link-button"
-            title="The colours follow the data now. Keep them, so that a colour goes on meaning the same value"
+            title={say("legend.theColoursFollowTheDataNow")}
             onClick={() => setRange(range)}
           >
-            Keep range
+            {say("legend.keepRange")}
           </Button>
         )}
         {fixed && map ? <Outside share={shareOutside(map, shown, range)} /> : null}
@@ -154,7 +167,7 @@ function Classes({ words, colours, shares, id }: ClassesProps) {
       {words.map((one, i) => (
         <li key={one}>
           <span class="swatch" style={{ background: `rgb(${colours[i]?.join(" ")})` }} /> {one}
-          {shares.length > 0 ? ` ${((shares[i] ?? 0) * 100).toFixed(0)} %` : ""}
+          {shares.length > 0 ? ` ${fixed((shares[i] ?? 0) * 100, 0)} %` : ""}
         </li>
       ))}
     </ul>
@@ -182,7 +195,8 @@ function Stages() {
     <ul class="landmarks stages" data-testid="stage-legend">
       {STAGES.map((stage) => (
         <li key={stage}>
-          <VehicleShape stage={stage} colour="#8a9ca8" heading_deg={0} size={18} /> {stage}
+          <VehicleShape stage={stage} colour="#8a9ca8" heading_deg={0} size={18} />{" "}
+          {PHASE_WORDS[stage === "surveying" ? "survey" : stage]}
         </li>
       ))}
     </ul>
@@ -191,9 +205,9 @@ function Stages() {
 
 /** Sides that light can come from. */
 const SIDES = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"] as const;
-const LIGHTS: readonly (readonly [value: string, words: string])[] = [
-  ...SIDES.map((side, i) => [String((i * 360) / SIDES.length), `Light from ${side}`] as const),
-  ["none", "No light and shadow"],
+const lights = (): readonly (readonly [value: string, words: string])[] => [
+  ...SIDES.map((side, i) => [String((i * 360) / SIDES.length), say("legend.lightFrom", { side })] as const),
+  ["none", say("legend.noLightAndShadow")],
 ];
 
 function Options({ shown }: { shown: LayerView }) {
@@ -202,20 +216,20 @@ function Options({ shown }: { shown: LayerView }) {
       {shown.palette === "deep" ? (
         <>
           <label>
-            <span class="visually-hidden">Colours of depths</span>
+            <span class="visually-hidden">{say("legend.coloursOfDepths")}</span>
             <Choice
               value={depthPalette.value}
               options={titles(DEPTH_PALETTES)}
-              title="Colours of depths"
+              title={say("legend.coloursOfDepths")}
               id="palette"
               onChoose={into(depthPalette)}
             />
           </label>
           <Choice
             value={lightFrom.value === null ? "none" : String(lightFrom.value)}
-            options={LIGHTS}
-            label="Where light comes from"
-            title="Heights are exaggerated until they show. Light from the north-west is usual on charts"
+            options={lights()}
+            label={say("legend.whereLightComesFrom")}
+            title={say("legend.heightsAreExaggeratedUntil")}
             id="light"
             onChoose={(side) => {
               lightFrom.value = side === "none" ? null : Number(side);
@@ -224,10 +238,10 @@ function Options({ shown }: { shown: LayerView }) {
         </>
       ) : null}
       <Check signal={showContours} id="contours">
-        contours
+        {say("legend.contours")}
       </Check>
       <Check signal={sharpCells} id="sharp-cells">
-        sharp cells
+        {say("legend.sharpCells")}
       </Check>
       {shown.of_depths ? <Guesses /> : null}
     </>
@@ -240,11 +254,14 @@ function Guesses() {
   return (
     <>
       <Check signal={showHatching} id="hatching">
-        <span class="hatch-sample" aria-hidden="true" /> guessed
+        <span class="hatch-sample" aria-hidden="true" /> {say("legend.guessed")}
       </Check>
       {certainty ? (
         <span class="certainty" data-testid="certainty">
-          fades from ±{round(certainty.full_m)} m, nothing from ±{round(certainty.none_m)} m
+          {say("legend.fadesFromMNothingFromM", {
+            fullM: round(certainty.full_m),
+            noneM: round(certainty.none_m),
+          })}
         </span>
       ) : null}
     </>
@@ -310,7 +327,7 @@ function RangeInputs({ range, onChange, children }: RangeProps) {
       data-testid={name}
       value={value.value}
       onInput={(event) => {
-        value.value = event.currentTarget.value;
+        value.value = pointed(event.currentTarget.value);
       }}
       onBlur={commit}
     />
@@ -324,21 +341,23 @@ function RangeInputs({ range, onChange, children }: RangeProps) {
         commit();
       }}
     >
-      {end(low, "Lower end of the colour range", "range-low")}
+      {end(low, say("legend.lowerEndOfTheColourRange"), "range-low")}
       {children}
-      {end(high, "Upper end of the colour range", "range-high")}
+      {end(high, say("legend.upperEndOfTheColourRange"), "range-high")}
       {fault ? (
         <span class="fault range-fault" role="alert" data-testid="range-fault">
           ▲ {fault}
         </span>
       ) : null}
       <button type="submit" class="visually-hidden" tabIndex={-1}>
-        Set the range
+        {say("legend.setTheRange")}
       </button>
     </form>
   );
 }
 
 function Outside({ share }: { share: number }) {
-  return share > 0 ? <small>{(share * 100).toFixed(share < 0.1 ? 1 : 0)} % outside</small> : null;
+  return share > 0 ? (
+    <small>{say("legend.outside", { share: fixed(share * 100, share < 0.1 ? 1 : 0) })}</small>
+  ) : null;
 }

@@ -7,6 +7,7 @@ import { clock } from "../state/format";
 import { said } from "../state/session";
 import { linksOpen } from "../state/store";
 import { FINDING_SIGNS, FINDING_TONES } from "../state/words";
+import { say } from "../words/say";
 import { sets } from "./Controls";
 import { Dialog } from "./Dialog";
 
@@ -40,7 +41,7 @@ export function LinksDialog() {
       open={open}
       onClose={close}
       name="links"
-      heading="Links to IMC vehicles"
+      heading={say("links.linksToImcVehicles")}
       fault={trouble.value}
       kind="links"
     >
@@ -64,7 +65,7 @@ function Vehicle({ vehicle }: { vehicle: VehicleDiagnosis }) {
       </h3>
       <Findings findings={vehicle.findings} />
       <details>
-        <summary>How its link changed</summary>
+        <summary>{say("links.howItsLinkChanged")}</summary>
         <ol class="small">
           {vehicle.history.map((record) => (
             <li key={`${record.at}${record.state}${record.reason}`}>

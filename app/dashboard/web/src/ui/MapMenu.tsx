@@ -5,6 +5,7 @@ import { distance, place } from "../state/format";
 import { drawDenser, goVehicle, mapMenu, repeatLine } from "../state/orders";
 import { nearestTo } from "../state/orderWords";
 import { coordinateFormat, marked, measured, mission } from "../state/store";
+import { say } from "../words/say";
 
 const WIDTH_PX = 250;
 const LINE_PX = 40;
@@ -62,27 +63,27 @@ export function MapMenu() {
       class="map-menu"
       role="menu"
       tabIndex={-1}
-      aria-label="What to do here"
+      aria-label={say("mapMenu.whatToDoHere")}
       data-testid="map-menu"
       style={{ left: `${left}px`, top: `${top}px` }}
       onKeyDown={step}
     >
       <p>{place(menu.at, coordinateFormat.value)}</p>
       {able.map(({ name, away_m }) =>
-        item(`go-${name}`, `Send ${name} here (${distance(away_m)})`, () => void goVehicle(name, menu.at)),
-      )}
-      {able.map(({ name }) =>
         item(
-          `repeat-${name}`,
-          `The line nearest to here again: ${name}`,
-          () => void repeatLine(name, menu.at),
+          `go-${name}`,
+          say("mapMenu.sendHere", { name, away: distance(away_m) }),
+          () => void goVehicle(name, menu.at),
         ),
       )}
-      {able.length > 0 ? item("denser", "Survey a part denser: draw it…", drawDenser) : null}
-      {item("measure", "Measure from here", () => {
+      {able.map(({ name }) =>
+        item(`repeat-${name}`, say("mapMenu.lineAgain", { name }), () => void repeatLine(name, menu.at)),
+      )}
+      {able.length > 0 ? item("denser", say("mapMenu.denser"), drawDenser) : null}
+      {item("measure", say("mapMenu.measure"), () => {
         measured.value = [menu.at];
       })}
-      {item("mark", "Mark this place", () => {
+      {item("mark", say("mapMenu.mark"), () => {
         marked.value = menu.at;
       })}
     </div>

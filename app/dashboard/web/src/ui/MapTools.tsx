@@ -5,7 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";
 import { followOwn, ownFault, whyNoPosition } from "../state/own";
-import { PLACE_SAMPLE, placeOf } from "../state/place";
+import { placeOf, placeSample } from "../state/place";
 import {
   coordinateFormat,
   crossovers,
@@ -24,7 +24,9 @@ import {
   showSite,
   showTargets,
   showTracks,
+  tab,
 } from "../state/store";
+import { say, sayWith } from "../words/say";
 import { Button, flips, sets } from "./Controls";
 
 /** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
@@ -32,12 +34,12 @@ export function MapTools({ onFit }: { onFit: () => void }) {
   const measuring = measured.value !== null;
   return (
     <>
-      <div class="map-tools" role="toolbar" aria-label="Map tools">
-        <Tool label="Show the whole area" onClick={onFit}>
+      <div class="map-tools" role="toolbar" aria-label={say("mapTools.mapTools")}>
+        <Tool label={say("mapTools.showTheWholeArea")} onClick={onFit}>
           <path d="M2,7 V2 H7 M13,2 H18 V7 M18,13 V18 H13 M7,18 H2 V13" />
         </Tool>
         <Tool
-          label={measuring ? "Stop measuring" : "Measure distances: click corner after corner"}
+          label={measuring ? say("mapTools.stopMeasuring") : say("mapTools.measureDistancesClickCorner")}
           pressed={measuring}
           id="measure"
           onClick={() => {
@@ -47,7 +49,7 @@ export function MapTools({ onFit }: { onFit: () => void }) {
           <path d="M2,14 L14,2 L18,6 L6,18 Z M6,10 l2,2 M9,7 l2,2 M12,4 l2,2" />
         </Tool>
         <Tool
-          label={goingTo.value ? "Close the field for a position" : "Go to a position"}
+          label={goingTo.value ? say("mapTools.closeTheFieldForAPosition") : say("mapTools.goToAPosition")}
           pressed={goingTo.value}
           id="go-to"
           onClick={flips(goingTo)}
@@ -56,7 +58,8 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         </Tool>
         <Tool
           label={
-            whyNoPosition() || (followOwn.value ? "Hide where this device is" : "Show where this device is")
+            whyNoPosition() ||
+            (followOwn.value ? say("mapTools.hideWhereThisDeviceIs") : say("mapTools.showWhereThisDeviceIs"))
           }
           pressed={followOwn.value}
           id="own-position"
@@ -65,41 +68,46 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         >
           <path d="M10,1 V5 M10,15 V19 M1,10 H5 M15,10 H19 M10,5 a5,5 0 1 1 -0.01,0" />
         </Tool>
-        <Shown what="Tracks" signal={showTracks}>
+        <Shown what={say("mapTools.tracks")} signal={showTracks}>
           <path d="M3,17 C3,9 10,13 10,8 S17,9 17,3" />
         </Shown>
         {mission.value?.spec.search ? (
-          <Shown what="What was looked at" signal={showSite} id="show-site">
+          <Shown what={say("mapTools.whatWasLookedAt")} signal={showSite} id="show-site">
             <path d="M2,10 C5,4 15,4 18,10 C15,16 5,16 2,10 M10,7.5 a2.5,2.5 0 1 1 -0.01,0" />
           </Shown>
         ) : null}
         {mission.value?.targets.length ? (
-          <Shown what="Targets" signal={showTargets} id="show-targets">
+          <Shown what={say("mapTools.targets")} signal={showTargets} id="show-targets">
             <path d="M10,2 v4 M10,14 v4 M2,10 h4 M14,10 h4 M10,6 a4,4 0 1 1 -0.01,0" />
           </Shown>
         ) : null}
         {ships.value ? (
-          <Shown what="Ships" signal={showShips} id="show-ships">
+          <Shown what={say("mapTools.ships")} signal={showShips} id="show-ships">
             <path d="M10,2 L15,17 H5 Z" />
           </Shown>
         ) : null}
         {mission.value?.progress.holidays != null ? (
-          <Shown what="Holidays" signal={showHolidays} id="show-holidays">
+          <Shown what={say("bottomStrip.holidays")} signal={showHolidays} id="show-holidays">
             <path d="M4,4 H16 V16 H4 Z M4,10 L10,4 M4,16 L16,4 M10,16 L16,10" />
           </Shown>
         ) : null}
         {crossovers.value?.outliers ? (
-          <Shown what="Crossings that disagree" signal={showCrossings} id="show-crossings">
+          <Shown what={say("mapTools.crossingsThatDisagree")} signal={showCrossings} id="show-crossings">
             <path d="M5,5 L15,15 M15,5 L5,15" />
           </Shown>
         ) : null}
         {mission.value?.spec.limits.com_range_m ? (
-          <Shown what="Communication range" signal={showRanges}>
+          <Shown what={say("mapTools.communicationRange")} signal={showRanges}>
             <path d="M10,10 h0.01 M6,14 a6,6 0 1 1 8,0 M3,17 a10,10 0 1 1 14,0" />
           </Shown>
         ) : null}
         <Tool
-          label={`Positions in ${coordinateFormat.value === "decimal" ? "decimal degrees" : "degrees and minutes"}`}
+          label={say("mapTools.positionsIn", {
+            it:
+              coordinateFormat.value === "decimal"
+                ? say("mapTools.decimalDegrees")
+                : say("mapTools.degreesAndMinutes"),
+          })}
           pressed={coordinateFormat.value === "minutes"}
           id="coordinates"
           onClick={() => {
@@ -110,7 +118,7 @@ export function MapTools({ onFit }: { onFit: () => void }) {
           <path d="M14,4 v5 M4,12 h12 M4,17 h12" />
         </Tool>
         <Tool
-          label="Look at the sea floor in space"
+          label={say("mapTools.lookAtTheSeaFloorIn")}
           id="open-3d"
           disabled={!seaFloor.value}
           onClick={sets(in3d, true)}
@@ -143,7 +151,7 @@ function GoTo() {
   const go = (event: SubmitEvent) => {
     event.preventDefault();
     const at = placeOf(text.value);
-    fault.value = at ? "" : `Type a position such as ${PLACE_SAMPLE}`;
+    fault.value = at ? "" : say("mapTools.typeAPositionSuchAs", { sample: placeSample() });
     if (!at) return;
     marked.value = at;
     destination.value = [at[0] - ABOUT, at[1] - ABOUT, at[0] + ABOUT, at[1] + ABOUT];
@@ -153,8 +161,8 @@ function GoTo() {
       <input
         ref={field}
         type="text"
-        aria-label="Position to go to"
-        placeholder="41°11.112′ N 8°42.276′ W"
+        aria-label={say("mapTools.positionToGoTo")}
+        placeholder={say("mapTools.sample")}
         aria-invalid={fault.value !== ""}
         value={text.value}
         data-testid="go-to-position"
@@ -163,11 +171,11 @@ function GoTo() {
         }}
       />
       <button type="submit" class="command" data-testid="go">
-        Go
+        {say("mapTools.go")}
       </button>
       {marked.value ? (
         <Button kind="link-button" onClick={sets(marked, null)}>
-          Unmark
+          {say("mapTools.unmark")}
         </Button>
       ) : null}
       {fault.value ? (
@@ -188,23 +196,40 @@ function Measured() {
       {last ? (
         <>
           <span>
-            Last <b>{distance(last.metres, 1)}</b> at {last.bearing_deg.toFixed(0).padStart(3, "0")}°
+            {sayWith("mapTools.lastAt", {
+              b: <b>{distance(last.metres, 1)}</b>,
+              bearingDeg: last.bearing_deg.toFixed(0).padStart(3, "0"),
+            })}
           </span>
           <span>
-            Altogether{" "}
-            <b data-testid="measured-all">
-              {distance(
-                legs.reduce((sum, leg) => sum + leg.metres, 0),
-                1,
-              )}
-            </b>
+            {sayWith("mapTools.altogether", {
+              b: (
+                <b data-testid="measured-all">
+                  {distance(
+                    legs.reduce((sum, leg) => sum + leg.metres, 0),
+                    1,
+                  )}
+                </b>
+              ),
+            })}
           </span>
           <Button kind="link-button" onClick={sets(measured, [])}>
-            Anew
+            {say("mapTools.anew")}
           </Button>
+          {mission.value ? (
+            <Button
+              id="measured-profile"
+              kind="link-button"
+              onClick={() => {
+                tab.value = "profile";
+              }}
+            >
+              {say("profile.profile")}
+            </Button>
+          ) : null}
         </>
       ) : (
-        <span>Click on the map, corner after corner.</span>
+        <span>{say("mapTools.clickOnTheMapCornerAfter")}</span>
       )}
     </output>
   );
@@ -227,7 +252,7 @@ function Shown({
 }: { what: string; signal: Signal<boolean> } & Pick<ToolProps, "id" | "children">) {
   return (
     <Tool
-      label={`${what}: ${signal.value ? "shown" : "hidden"}`}
+      label={`${what}: ${signal.value ? say("mapTools.shown") : say("mapTools.hidden")}`}
       pressed={signal.value}
       onClick={flips(signal)}
       {...rest}

@@ -2,6 +2,7 @@ import "./MissionPanel.css";
 import { useSignal } from "@preact/signals";
 import type { MissionSummary, NewMission } from "../api/types";
 import { whyNotCommand } from "../state/access";
+import { dayAndTime } from "../state/format";
 import { fileNameOf, missionFile } from "../state/missionFile";
 import { deleteMission, selectMission } from "../state/session";
 import {
@@ -15,6 +16,7 @@ import {
   serviceFault,
 } from "../state/store";
 import { capital, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
+import { say, sayWith } from "../words/say";
 import { Button, sets } from "./Controls";
 import { Grip } from "./Grip";
 import { NewMissionForm } from "./NewMissionForm";
@@ -23,9 +25,16 @@ import { saveText } from "./saving";
 
 export function MissionPanel() {
   return (
-    <aside class="panel missions" id="missions" aria-label="Missions">
+    <aside class="panel missions" id="missions" aria-label={say("missions.missions")}>
       <div class="panel-scroll">{describing.value ? <NewMissionForm /> : <MissionList />}</div>
-      <Grip what="the missions" size={panelWidth} side="right" least={240} most={640} id="grip-missions" />
+      <Grip
+        what={say("missions.theMissions")}
+        size={panelWidth}
+        side="right"
+        least={240}
+        most={640}
+        id="grip-missions"
+      />
     </aside>
   );
 }
@@ -35,19 +44,18 @@ function MissionList() {
   return (
     <>
       <header class="panel-head">
-        <h2>Missions</h2>
+        <h2>{say("missions.missions")}</h2>
         <Button id="open-fleet" onClick={sets(fleetOpen, true)}>
-          Fleet
+          {say("fleet.fleet")}
         </Button>
         <Button id="new-mission" commands onClick={sets(describing, true)}>
-          + New
+          {say("missions.new")}
         </Button>
       </header>
-      {list === null && !serviceFault.value ? <p class="empty">Asking the service…</p> : null}
+      {list === null && !serviceFault.value ? <p class="empty">{say("missions.askingTheService")}</p> : null}
       {list?.length === 0 ? (
         <p class="empty">
-          No mission yet. <b>+ New</b> describes one: an area, vehicles, and how long it is. Without a vehicle
-          at hand choose simulated ones.
+          {sayWith("missions.noMissionYetDescribesOneAn", { b: <b>{say("missions.new")}</b> })}
         </p>
       ) : null}
       <ul class="mission-list">
@@ -66,9 +74,7 @@ function MissionList() {
               <small>
                 {capital(lengthWords(m.progress))} · {measuredWords(m.progress)}
               </small>
-              <small>
-                {new Date(m.created_at).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" })}
-              </small>
+              <small>{dayAndTime(new Date(m.created_at))}</small>
             </a>
             {m.id === selectedId.value ? <Actions of={m} /> : null}
           </li>
@@ -89,53 +95,53 @@ function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
       <Button
         id="copy-mission"
         disabled={forbidden !== "" || mission.value?.id !== id}
-        title={forbidden || "Describe a new mission that begins as a copy of this one"}
+        title={forbidden || say("missions.describeANewMissionThat")}
         onClick={() => {
           copied.value = mission.value;
           describing.value = true;
         }}
       >
-        Same again
+        {say("missions.sameAgain")}
       </Button>
       {empty && (state === "draft" || state === "ready") ? (
         <Button
           id="edit-mission"
           disabled={forbidden !== "" || mission.value?.id !== id}
-          title={forbidden || "Change the description, as long as nothing was flown"}
+          title={forbidden || say("missions.changeTheDescriptionAsLongAs")}
           onClick={() => {
             editedMission.value = mission.value;
             describing.value = true;
           }}
         >
-          Edit
+          {say("missions.edit")}
         </Button>
       ) : null}
       <Button
         id="export-mission"
         disabled={mission.value?.id !== id}
-        title="The mission's description as one file, for another service or another day"
+        title={say("missions.theMissionSDescriptionAsOne")}
         onClick={() => {
           const shown = mission.value;
           if (shown) saveText(fileNameOf(shown.name), missionFile(shown.spec as unknown as NewMission));
         }}
       >
-        Export
+        {say("beginnings.export")}
       </Button>
       {asked.value ? (
         <>
           <Button id="confirm-delete" onClick={() => void deleteMission(id)}>
-            Delete it for good
+            {say("missions.deleteItForGood")}
           </Button>
-          <Button onClick={sets(asked, false)}>Keep it</Button>
+          <Button onClick={sets(asked, false)}>{say("missions.keepIt")}</Button>
         </>
       ) : (
         <Button
           id="delete-mission"
           disabled={forbidden !== "" || !empty || atSea}
-          title={forbidden || (empty && !atSea ? "" : "What was measured is kept")}
+          title={forbidden || (empty && !atSea ? "" : say("missions.whatWasMeasuredIsKept"))}
           onClick={sets(asked, true)}
         >
-          Delete…
+          {say("missions.delete")}
         </Button>
       )}
     </div>

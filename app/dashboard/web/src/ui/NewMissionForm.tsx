@@ -20,6 +20,7 @@ import {
 import { placeOf } from "../state/place";
 import { createMission, describeMission, said } from "../state/session";
 import { copied, describing, draftShapes, drawing, editedMission, mapCentre, picking } from "../state/store";
+import { say } from "../words/say";
 import { AreaFields } from "./AreaFields";
 import { AskedFields } from "./AskedFields";
 import { Beginnings, Keeping } from "./Beginnings";
@@ -95,7 +96,7 @@ export function NewMissionForm() {
       if (draft.value.tide_table) {
         await api.setTide(id, {
           table: draft.value.tide_table,
-          source: draft.value.tide_source || "tide table",
+          source: draft.value.tide_source || say("mission.tideTable"),
         });
       }
       close();
@@ -105,7 +106,10 @@ export function NewMissionForm() {
       for (const { field, message, expected } of error.faults) {
         const own = fieldOf(field);
         if (own)
-          faults.value = { ...faults.value, [own]: [message, expected].filter(Boolean).join("; expected ") };
+          faults.value = {
+            ...faults.value,
+            [own]: [message, expected].filter(Boolean).join(say("mission.expected")),
+          };
       }
     } finally {
       sending.value = false;
@@ -120,18 +124,21 @@ export function NewMissionForm() {
         data-testid="mission-form"
       >
         <header class="panel-head">
-          <h2>{edited ? "Edit a mission" : original ? "Same again" : "New mission"}</h2>
-          <Button onClick={close}>Cancel</Button>
+          <h2>
+            {edited
+              ? say("mission.editAMission")
+              : original
+                ? say("missions.sameAgain")
+                : say("mission.newMission")}
+          </h2>
+          <Button onClick={close}>{say("mission.cancel")}</Button>
         </header>
         {edited ? (
-          <p class="hint">
-            It keeps its number and its log. One that was given depths or a tide table for its area is copied
-            instead.
-          </p>
+          <p class="hint">{say("mission.itKeepsItsNumber")}</p>
         ) : (
           <Beginnings draft={draft.value} onBegin={begin} />
         )}
-        <Text field="name" label="Name" placeholder="Leixões quay" />
+        <Text field="name" label={say("mission.name")} placeholder={say("mission.leixEsQuay")} />
         <Kind />
         {draft.value.kind === "survey" ? <AskedFields /> : null}
         <AreaFields />
@@ -141,19 +148,21 @@ export function NewMissionForm() {
         <RecoveryFields />
         <ExpertFields />
         <details>
-          <summary>Tide</summary>
+          <summary>{say("mission.tide")}</summary>
           <div class="pair">
             <Part of="tide" />
-            <Text field="tide_source" label="From where" placeholder="gauge" />
+            <Text field="tide_source" label={say("mission.fromWhere")} placeholder={say("mission.gauge")} />
           </div>
           <FileButton
             accept=".tid,.txt"
             id="tide-file"
             onText={(name, text) => set({ tide_table: text, tide_source: name })}
           >
-            {draft.value.tide_table ? `Table: ${draft.value.tide_source}` : "Table (.tid)"}
+            {draft.value.tide_table
+              ? say("mission.table", { tideSource: draft.value.tide_source })
+              : say("mission.tableTid")}
           </FileButton>
-          <p class="hint">Tides can be set and changed at any time; soundings keep their raw values.</p>
+          <p class="hint">{say("mission.tidesCanBeSetAndChanged")}</p>
         </details>
         {refused.value ? (
           <p class="reason alarm" role="alert">
@@ -166,7 +175,11 @@ export function NewMissionForm() {
           disabled={sending.value}
           data-testid="create-mission"
         >
-          {sending.value ? "One moment…" : edited ? "Save mission" : "Create mission"}
+          {sending.value
+            ? say("mission.oneMoment")
+            : edited
+              ? say("mission.saveMission")
+              : say("mission.createMission")}
         </button>
         <Keeping draft={draft.value} />
       </form>
@@ -193,9 +206,9 @@ function Kind() {
   );
   return (
     <fieldset class="planner">
-      <legend>What for</legend>
-      {choice("survey", "Survey", "Map the sea floor of the area.")}
-      {choice("search", "Search", "Look for something in a partly known site, and be back in time.")}
+      <legend>{say("mission.whatFor")}</legend>
+      {choice("survey", say("mission.survey"), say("mission.mapTheSeaFloorOfThe"))}
+      {choice("search", say("mission.search"), say("mission.lookForSomethingInAPartly"))}
     </fieldset>
   );
 }
@@ -214,9 +227,16 @@ function draftMarks(draft: Draft): PlaceMark[] {
   return [
     ...homes,
     ...(goal
-      ? [{ words: "Goal", sign: "goal" as const, at: goal, radius_m: length_m(draft.goal_radius_m) }]
+      ? [
+          {
+            words: say("mission.goal"),
+            sign: "goal" as const,
+            at: goal,
+            radius_m: length_m(draft.goal_radius_m),
+          },
+        ]
       : []),
-    ...(entry ? [{ words: "Entry", sign: "entry" as const, at: entry, radius_m: 0 }] : []),
+    ...(entry ? [{ words: say("mission.entry"), sign: "entry" as const, at: entry, radius_m: 0 }] : []),
   ];
 }
 
@@ -225,10 +245,10 @@ function RecoveryFields() {
   const { draft } = useForm();
   return (
     <fieldset>
-      <legend>Recovery</legend>
-      <PlaceField field="recovery" label="Recovery point" />
+      <legend>{say("mission.recovery")}</legend>
+      <PlaceField field="recovery" label={say("mission.recoveryPoint")} />
       {draft.recovery.trim() === "" ? (
-        <p class="hint">Without one vehicles stop and come up where they are.</p>
+        <p class="hint">{say("mission.withoutOneVehiclesStopAnd")}</p>
       ) : (
         <div class="pair">
           <Part of="recovery" />

@@ -16,8 +16,10 @@ import {
   serviceFault,
   socketStatus,
 } from "../state/store";
+import { say, sayWith } from "../words/say";
 import { SignIn } from "./Account";
 import { Button, sets } from "./Controls";
+import { beginTour } from "./Tour";
 
 /** What stands in the middle when there is nothing to show, or something is wrong: always with what to do next. */
 export function Notices() {
@@ -28,16 +30,20 @@ export function Notices() {
       {signedOut.value ? <SignIn /> : null}
       {fault && !signedOut.value ? (
         <p class="notice alarm" role="alert" data-testid="service-fault">
-          <b>✕ {fault.message}.</b> {fault.remedy} This page connects again by itself
-          {mission.value ? "; what is shown is old." : "."}
+          {sayWith("notices.thisPageConnectsAgainBy", {
+            b: <b>✕ {fault.message}.</b>,
+            remedy: fault.remedy,
+            it: mission.value ? say("notices.whatIsShownIsOld") : ".",
+          })}
         </p>
       ) : null}
-      {refused && !/^(abort|finish)/.test(refused.what) && !preflightOpen.value ? (
+      {refused && !refused.inDialog && !preflightOpen.value ? (
         <div class="notice alarm" role="alert" data-testid="refusal">
           <p>
-            <b>✕ {refused.what} was refused:</b> {refused.error.message}. {refused.error.remedy}
+            <b>{say("notices.wasRefused", { what: refused.what })}</b> {refused.error.message}.{" "}
+            {refused.error.remedy}
           </p>
-          <Button onClick={sets(refusal, null)}>Taken</Button>
+          <Button onClick={sets(refusal, null)}>{say("log.taken")}</Button>
         </div>
       ) : null}
       <Guide />
@@ -52,7 +58,9 @@ function Guide() {
   if (!mission.value && !known && socketStatus.value?.kind !== "open") {
     return (
       <p class="notice" data-testid="unknown-mission">
-        <b>There is no mission {selectedId.value}.</b> Choose one from the list on the left.
+        {sayWith("notices.chooseOneFromTheListOn", {
+          b: <b>{say("notices.thereIsNoMission", { selectedId: selectedId.value })}</b>,
+        })}
       </p>
     );
   }
@@ -67,7 +75,7 @@ function NoMission({ none }: { none: boolean }) {
     try {
       const draft = {
         ...emptyDraft(mapCentre.value),
-        name: "Trial with two simulated vehicles",
+        name: say("notices.trialWithTwoSimulated"),
         steps: "60",
       };
       await createMission(toMission(draft));
@@ -76,14 +84,19 @@ function NoMission({ none }: { none: boolean }) {
       fault.value = said(error);
     }
   };
+  const guide = async () => {
+    try {
+      await beginTour();
+    } catch (error) {
+      fault.value = said(error);
+    }
+  };
   return (
     <div class="notice" data-testid="no-mission">
       <p>
-        <b>No mission is shown.</b>{" "}
-        {none ? "Describe the first one." : "Choose one from the list, or describe a new one."}{" "}
-        {heard > 0
-          ? `${heard} vehicle${heard > 1 ? "s are" : " is"} heard.`
-          : "No vehicle is heard yet: switch one on within reach, see Links for what is missing, or try it with simulated ones."}
+        <b>{say("notices.noMissionIsShown")}</b>{" "}
+        {none ? say("notices.describeTheFirstOne") : say("notices.chooseOneFromTheListOr")}{" "}
+        {heard > 0 ? say("notices.vehicleIsHeard", { heard }) : say("notices.noVehicleIsHeardYetSwitch")}
       </p>
       <Button
         kind="command primary"
@@ -92,12 +105,15 @@ function NoMission({ none }: { none: boolean }) {
           describing.value = none;
         }}
       >
-        {none ? "New mission" : "Show missions"}
+        {none ? say("mission.newMission") : say("notices.showMissions")}
       </Button>
       <Button id="try" commands onClick={() => void tryIt()}>
-        Try with two simulated vehicles
+        {say("notices.tryWithTwoSimulatedVehicles")}
       </Button>
-      <Button onClick={sets(linksOpen, true)}>Links</Button>
+      <Button id="begin-tour" commands onClick={() => void guide()}>
+        {say("tour.begin")}
+      </Button>
+      <Button onClick={sets(linksOpen, true)}>{say("notices.links")}</Button>
       {fault.value ? <p class="fault">{fault.value}</p> : null}
     </div>
   );

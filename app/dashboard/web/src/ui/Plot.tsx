@@ -3,8 +3,9 @@ import "uplot/dist/uPlot.min.css";
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
-import { clock } from "../state/format";
+import { clock, plain } from "../state/format";
 import { csvOf, digits, fileNameOf, lineWords } from "../state/plotFile";
+import { language, say } from "../words/say";
 import { Button, flips } from "./Controls";
 import { save } from "./saving";
 
@@ -48,7 +49,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
   const large = useSignal(false);
   const zoomed = useSignal(false);
   const height = large.value ? LARGE_HEIGHT : HEIGHT;
-  const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down} ${large.value}`;
+  const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down} ${large.value} ${language.value}`;
 
   // A new chart only where its lines are others; new values are set below.
   useEffect(() => {
@@ -84,10 +85,14 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
         },
         axes: [
           { ...axis, space: 70, ...(time ? { values: (_, ticks) => ticks.map(clockWords) } : {}) },
-          { ...axis, size: 46, values: (_, ticks) => ticks.map((v) => `${v}${unit === "%" ? " %" : ""}`) },
+          {
+            ...axis,
+            size: 46,
+            values: (_, ticks) => ticks.map((v) => `${plain(v)}${unit === "%" ? " %" : ""}`),
+          },
         ],
         series: [
-          { label: time ? "UTC" : "step" },
+          { label: time ? "UTC" : say("plot.step") },
           ...lines.map((l) => ({
             label: l.label,
             stroke: l.colour,
@@ -153,7 +158,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
         {unit && unit !== "%" ? <small> {unit}</small> : null}
         <span class="plot-does">
           <Button kind="link-button" aria-pressed={large.value} onClick={flips(large)}>
-            {large.value ? "Smaller" : "Larger"}
+            {large.value ? say("plot.smaller") : say("plot.larger")}
           </Button>
           {zoomed.value ? (
             <Button
@@ -163,20 +168,20 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
                 chart.current?.setData(chart.current.data, true);
               }}
             >
-              Show all
+              {say("plot.showAll")}
             </Button>
           ) : null}
           <Button
             kind="link-button"
-            title="What it shows, as a table"
+            title={say("plot.asATable")}
             onClick={() =>
               save(`${fileNameOf(title)}.csv`, new Blob([csvOf(xs, lines, unit, time)], { type: "text/csv" }))
             }
           >
-            CSV
+            {"CSV"}
           </Button>
-          <Button kind="link-button" title="What it shows, as a picture" onClick={savePicture}>
-            PNG
+          <Button kind="link-button" title={say("plot.asAPicture")} onClick={savePicture}>
+            {"PNG"}
           </Button>
         </span>
       </figcaption>

@@ -3,8 +3,9 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { CheckStatus, PreflightView } from "../api/types";
-import { act, busyWith, refusal, said } from "../state/session";
+import { act, actionWords, busyWith, refusal, said } from "../state/session";
 import { mission, preflightOpen, selectedId } from "../state/store";
+import { say } from "../words/say";
 import { Button, sets } from "./Controls";
 import { Dialog } from "./Dialog";
 import { Forecast } from "./Forecast";
@@ -50,7 +51,7 @@ export function PreflightDialog() {
   };
   const view = found.value;
   const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
-  const refused = refusal.value?.what === "start" ? refusal.value.error : null;
+  const refused = refusal.value?.what === actionWords("start") ? refusal.value.error : null;
   const starting = (
     <Button
       id="confirm-start"
@@ -60,10 +61,10 @@ export function PreflightDialog() {
       onClick={() => void start()}
     >
       {busyWith.value === "start"
-        ? "Starting…"
+        ? say("preflight.starting")
         : problems > 0
-          ? `${problems} problem${problems > 1 ? "s" : ""} to solve first`
-          : "Start mission"}
+          ? say("preflight.problemToSolveFirst", { problems })
+          : say("preflight.startMission")}
     </Button>
   );
   return (
@@ -72,14 +73,14 @@ export function PreflightDialog() {
       onClose={close}
       name="preflight"
       id="preflight"
-      heading={`Start ${mission.value?.name ?? "the mission"}?`}
+      heading={say("preflight.start", { mission: mission.value?.name ?? say("abort.theMission") })}
       fault={refused ? said(refused) : fault.value}
-      closing="Not yet"
+      closing={say("preflight.notYet")}
       actions={starting}
       kind="preflight"
       data={{ "data-ready": view?.ready ?? "unknown" }}
     >
-      {view ? null : <p>Looking at the vehicles…</p>}
+      {view ? null : <p>{say("preflight.lookingAtTheVehicles")}</p>}
       <ul class="checklist">
         {view?.checks.map((check) => (
           <li key={check.id} data-testid={`check-${check.id}`} data-status={check.status}>

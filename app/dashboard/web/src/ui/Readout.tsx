@@ -1,7 +1,8 @@
 import "./Readout.css";
 import { type CellReading, readCell } from "../map/seafloor";
-import { metres, place } from "../state/format";
+import { fixed, metres, place } from "../state/format";
 import { coordinateFormat, cursor, seaFloor, shownCertainty } from "../state/store";
+import { say } from "../words/say";
 
 /** What lies under the cursor. */
 export function Readout() {
@@ -12,18 +13,16 @@ export function Readout() {
     <output class="readout" data-testid="readout">
       <span>{place(at, coordinateFormat.value)}</span>
       {cell ? (
-        <span>
-          E {cell.east_m.toFixed(1)} m, N {cell.north_m.toFixed(1)} m
-        </span>
+        <span>{say("readout.eMNM", { eastM: fixed(cell.east_m, 1), northM: fixed(cell.north_m, 1) })}</span>
       ) : null}
       {cell && cell.depth_m !== null && isUnknown(cell) ? (
-        <span>not known: a guess would be ±{metres(cell.sd_m, 1)}</span>
+        <span>{say("readout.notKnownAGuessWouldBe", { sdM: metres(cell.sd_m, 1) })}</span>
       ) : cell && cell.depth_m !== null ? (
         <span>
           <b>{metres(cell.depth_m, 2)}</b> ± {metres(cell.sd_m, 2)} · {origin(cell)}
         </span>
       ) : cell ? (
-        <span>not mapped yet</span>
+        <span>{say("readout.notMappedYet")}</span>
       ) : null}
     </output>
   );
@@ -36,6 +35,6 @@ function isUnknown({ sd_m, sounded, imported }: CellReading): boolean {
 }
 
 function origin(cell: { sounded: boolean; imported: boolean; count: number }): string {
-  if (cell.sounded) return `${cell.count} sounding${cell.count === 1 ? "" : "s"}`;
-  return cell.imported ? "imported" : "guessed";
+  if (cell.sounded) return say("readout.sounding", { count: cell.count });
+  return cell.imported ? say("readout.imported") : say("readout.guessed");
 }

@@ -6,14 +6,25 @@ import type { SoundingState, SoundingView } from "../api/types";
 import { metres } from "../state/format";
 import { said } from "../state/session";
 import { chosenSounding, reviewed, selectedId, view } from "../state/store";
+import { say } from "../words/say";
 import { Button, Choice, into, Typed } from "./Controls";
 
 const WORDS: Record<SoundingState, string> = {
-  used: "used",
-  restored: "restored",
-  rejected: "kept out by the gate",
-  doubted: "left out by the map",
-  withdrawn: "kept out by an operator",
+  get used() {
+    return say("review.used");
+  },
+  get restored() {
+    return say("review.restored");
+  },
+  get rejected() {
+    return say("review.keptOutByTheGate");
+  },
+  get doubted() {
+    return say("review.leftOutByTheMap");
+  },
+  get withdrawn() {
+    return say("review.keptOutByAnOperator");
+  },
 };
 
 /** Soundings that are not in the map, with the reason; an operator may let them count, and take that back. */
@@ -72,10 +83,10 @@ export function Review() {
     <div class="log review" data-testid="review">
       <div class="filters">
         <Choice
-          label="Which soundings"
+          label={say("review.whichSoundings")}
           value={filter.value}
           options={[
-            ["", "Everything that is not simply used"],
+            ["", say("review.everythingThatIsNotSimply")],
             ...(["rejected", "doubted", "withdrawn", "restored", "used"] as const).map(
               (state) => [state, WORDS[state]] as const,
             ),
@@ -85,27 +96,27 @@ export function Review() {
         />
         <Typed
           text={note}
-          label="Why: kept in the log"
-          placeholder="Why (kept in the log)"
+          label={say("review.whyKeptInTheLog")}
+          placeholder={say("review.whyKeptInTheLog2")}
           maxLength={500}
           id="review-note"
         />
-        <span>
-          {total.value} sounding{total.value === 1 ? "" : "s"}
-        </span>
+        <span>{say("review.sounding", { total: total.value })}</span>
       </div>
       {fault.value ? (
         <p class="alarm" role="alert" data-testid="review-fault">
           ✕ {fault.value}
         </p>
       ) : null}
-      {items.length === 0 ? <p class="empty">Every sounding so far is in the map.</p> : null}
-      <ol aria-label="Soundings">
+      {items.length === 0 ? <p class="empty">{say("review.everySoundingSoFarIsIn")}</p> : null}
+      <ol aria-label={say("bottomStrip.soundings")}>
         {items.map((s) => (
           <Row key={s.id} sounding={s} busy={busy.value === s.id} onRule={rule} />
         ))}
       </ol>
-      {next.value !== null ? <Button onClick={() => load(next.value ?? 0)}>More</Button> : null}
+      {next.value !== null ? (
+        <Button onClick={() => load(next.value ?? 0)}>{say("review.more")}</Button>
+      ) : null}
     </div>
   );
 }
@@ -130,7 +141,7 @@ function Row({ sounding: s, busy, onRule }: RowProps) {
     >
       <Button
         kind="link-button"
-        title="Show it on the map"
+        title={say("review.showItOnTheMap")}
         onClick={() => {
           chosenSounding.value = s.id;
         }}
@@ -142,8 +153,13 @@ function Row({ sounding: s, busy, onRule }: RowProps) {
         {WORDS[s.state]}
         {s.reason ? <small>: {s.reason}</small> : null}
       </span>
-      <Button id={`rule-${s.id}`} disabled={busy} onClick={() => onRule(s, counts ? "reject" : "restore")}>
-        {busy ? "…" : counts ? "Reject" : "Restore"}
+      <Button
+        id={`rule-${s.id}`}
+        commands
+        disabled={busy}
+        onClick={() => onRule(s, counts ? "reject" : "restore")}
+      >
+        {busy ? "…" : counts ? say("review.reject") : say("review.restore")}
       </Button>
     </li>
   );

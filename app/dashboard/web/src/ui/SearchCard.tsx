@@ -1,6 +1,7 @@
 import { duration, percent } from "../state/format";
 import { mission } from "../state/store";
 import { hasEnded, type Tone } from "../state/words";
+import { say } from "../words/say";
 
 /** Time is short below this share of the window. */
 const SHORT = 0.15;
@@ -21,33 +22,37 @@ export function SearchCard() {
     search.began_at !== null,
   );
   return (
-    <article class={`card target ${tone}`} data-testid="search-card" aria-label="Search">
+    <article class={`card target ${tone}`} data-testid="search-card" aria-label={say("mission.search")}>
       <header>
-        <h2>Search</h2>
+        <h2>{say("mission.search")}</h2>
         <span class={`tone ${tone}`} data-testid="search-state">
           <span aria-hidden="true">{sign}</span> {words}
         </span>
       </header>
       <dl class="big">
         <div>
-          <dt>Goal area</dt>
+          <dt>{say("search.goalArea")}</dt>
           <dd data-testid="goal-seen">{percent(search.goal_pct)}</dd>
         </div>
         <div>
-          <dt>Site</dt>
+          <dt>{say("search.site")}</dt>
           <dd data-testid="site-seen">{percent(search.explored_pct)}</dd>
         </div>
         <div>
-          <dt>{search.left_s < 0 ? "Late by" : "Time left"}</dt>
+          <dt>{search.left_s < 0 ? say("search.lateBy") : say("search.timeLeft")}</dt>
           <dd data-testid="time-left">{ended ? "–" : duration(Math.abs(search.left_s))}</dd>
         </div>
       </dl>
       <p class="small">
         {[
-          `${search.back.length} of ${vehicles} at the entry`,
-          search.out_of_contact.length > 0 ? `out of contact: ${search.out_of_contact.join(", ")}` : null,
-          `${search.version} scans`,
-          search.found_cells > 0 ? `obstacles found on ${search.found_cells} cells` : null,
+          say("search.ofAtTheEntry", { back: search.back.length, vehicles }),
+          search.out_of_contact.length > 0
+            ? say("search.outOfContact", { outOfContact: search.out_of_contact.join(", ") })
+            : null,
+          say("search.scans", { version: search.version }),
+          search.found_cells > 0
+            ? say("search.obstaclesFoundOnCells", { foundCells: search.found_cells })
+            : null,
         ]
           .filter((part) => part !== null)
           .join(" · ")}
@@ -65,11 +70,12 @@ function verdict(
 ): { words: string; sign: string; tone: Tone } {
   if (ended) {
     return allBack
-      ? { words: "Everybody is back", sign: "●", tone: "good" }
-      : { words: "Not everybody is back", sign: "✕", tone: "alarm" };
+      ? { words: say("search.everybodyIsBack"), sign: "●", tone: "good" }
+      : { words: say("search.notEverybodyIsBack"), sign: "✕", tone: "alarm" };
   }
-  if (!begun) return { words: "Not begun", sign: "◌", tone: "calm" };
-  if (left_s < 0 && !allBack) return { words: "Too late", sign: "✕", tone: "alarm" };
-  if (left_s < SHORT * window_s && !allBack) return { words: "Time is short", sign: "▲", tone: "warning" };
-  return { words: "In time", sign: "●", tone: "good" };
+  if (!begun) return { words: say("search.notBegun"), sign: "◌", tone: "calm" };
+  if (left_s < 0 && !allBack) return { words: say("search.tooLate"), sign: "✕", tone: "alarm" };
+  if (left_s < SHORT * window_s && !allBack)
+    return { words: say("search.timeIsShort"), sign: "▲", tone: "warning" };
+  return { words: say("search.inTime"), sign: "●", tone: "good" };
 }

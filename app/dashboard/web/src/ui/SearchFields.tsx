@@ -1,5 +1,6 @@
 import { useSignal } from "@preact/signals";
 import { areasIn } from "../map/area";
+import { say } from "../words/say";
 import { Button, FileButton } from "./Controls";
 import { Fault, Part, PlaceField, useForm } from "./Fields";
 
@@ -12,29 +13,29 @@ export function SearchFields() {
       const { area, keepOut, others } = areasIn(name, text);
       const obstacles = [area, ...keepOut, ...others];
       set({ obstacles: [...draft.obstacles, ...obstacles] });
-      note.value = `${name}: ${obstacles.length} obstacle${obstacles.length === 1 ? "" : "s"}`;
+      note.value = say("search.obstacle", { name, obstacles: obstacles.length });
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
     }
   };
   return (
     <fieldset>
-      <legend>Search</legend>
-      <PlaceField field="goal" label="Goal" />
-      <PlaceField field="entry" label="Entry and exit" />
+      <legend>{say("mission.search")}</legend>
+      <PlaceField field="goal" label={say("mission.goal")} />
+      <PlaceField field="entry" label={say("search.entryAndExit")} />
       <div class="pair">
         <Part of="search" />
         <Part of="quality" />
       </div>
       <FileButton accept=".geojson,.json,.kml" id="obstacles-file" onText={read}>
-        Known obstacles from a file
+        {say("search.knownObstaclesFromAFile")}
       </FileButton>
       {draft.obstacles.length > 0 ? (
         <span class="zone">
-          {draft.obstacles.length} known
+          {say("search.known", { obstacles: draft.obstacles.length })}
           <Button
             kind="tool small"
-            aria-label="Forget the known obstacles"
+            aria-label={say("search.forgetTheKnownObstacles")}
             onClick={() => set({ obstacles: [] })}
           >
             ✕

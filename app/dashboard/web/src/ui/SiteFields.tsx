@@ -4,11 +4,11 @@ import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../api/client";
 import type { ChangesView, SiteView, SurveyView } from "../api/types";
 import { areaOf } from "../state/draft";
+import { day, fixed } from "../state/format";
 import { said } from "../state/session";
+import { say, sayWith } from "../words/say";
 import { Button, Choice } from "./Controls";
 import { Fault, useForm } from "./Fields";
-
-const DAY = new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeZone: "UTC" });
 
 /** Which site a survey belongs to, and what is known of it: its surveys, and what changed between the last two. */
 export function SiteFields() {
@@ -28,7 +28,7 @@ export function SiteFields() {
   const describe = async () => {
     const area = areaOf(draft);
     if (!area || !draft.name.trim()) {
-      note.value = "Give the mission a name and an area first: the site gets both";
+      note.value = say("site.giveTheMissionANameAnd");
       return;
     }
     try {
@@ -40,23 +40,26 @@ export function SiteFields() {
       note.value = said(error);
     }
   };
-  const options = [["", "None"] as const, ...sites.value.map(({ id, name }) => [id, name] as const)];
+  const options = [
+    ["", say("site.none")] as const,
+    ...sites.value.map(({ id, name }) => [id, name] as const),
+  ];
   return (
     <details class="site" open={draft.site !== ""}>
-      <summary>Site that is surveyed again</summary>
+      <summary>{say("site.siteThatIsSurveyedAgain")}</summary>
       <div class="pair">
         <label class="field">
-          Site
+          {say("search.site")}
           <Choice
             id="site"
             value={draft.site}
             options={options}
             onChoose={(site: string) => set({ site })}
-            label="Site"
+            label={say("search.site")}
           />
         </label>
         <Button kind="tool" id="make-site" onClick={() => void describe()}>
-          Make a site of this area
+          {say("site.makeASiteOfThisArea")}
         </Button>
       </div>
       {note.value ? (
@@ -102,27 +105,31 @@ function Known({ site }: { site: string }) {
   const known = surveys.value?.filter((survey) => survey.surveyed) ?? [];
   return (
     <>
-      {surveys.value && known.length === 0 ? <p class="hint">No survey of it has ended yet.</p> : null}
+      {surveys.value && known.length === 0 ? <p class="hint">{say("site.noSurveyOfItHasEnded")}</p> : null}
       <ul class="surveys" data-testid="surveys">
         {known.map((survey) => (
           <li key={survey.mission_id}>
-            <b>{survey.name}</b> {survey.ended_at ? DAY.format(new Date(survey.ended_at)) : ""},{" "}
-            {survey.share_pct.toFixed(0)} % of the site
-            {survey.median_sd_m === null ? "" : `, ± ${survey.median_sd_m.toFixed(2)} m`}
-            {survey.left_out ? <small> left out: {survey.left_out}</small> : null}
+            {sayWith("site.ofTheSite", {
+              b: <b>{survey.name}</b>,
+              it: survey.ended_at ? day(new Date(survey.ended_at)) : "",
+              sharePct: fixed(survey.share_pct, 0),
+              it2:
+                survey.median_sd_m === null ? "" : say("site.m", { medianSdM: fixed(survey.median_sd_m, 2) }),
+            })}
+            {survey.left_out ? <small> {say("site.leftOut", { leftOut: survey.left_out })}</small> : null}
           </li>
         ))}
       </ul>
-      {known.length > 0 ? <p class="hint">The mission begins with these depths.</p> : null}
+      {known.length > 0 ? <p class="hint">{say("site.theMissionBeginsWithThese")}</p> : null}
       {changes.value ? <Changes found={changes.value} /> : null}
       {known.length > 0 ? (
         <div class="row">
           <Button kind="tool small" onClick={() => void download("map.tif")}>
-            Map as GeoTIFF
+            {say("site.mapAsGeotiff")}
           </Button>
           {changes.value ? (
             <Button kind="tool small" id="changes-file" onClick={() => void download("changes.tif")}>
-              Changes as GeoTIFF
+              {say("site.changesAsGeotiff")}
             </Button>
           ) : null}
         </div>
@@ -138,11 +145,17 @@ function Known({ site }: { site: string }) {
 
 /** What changed between the last two surveys, in words. */
 function Changes({ found }: { found: ChangesView }) {
-  const volume = ({ m3, sd_m3 }: ChangesView["lost"]) => `${m3.toFixed(0)} ± ${sd_m3.toFixed(0)} m³`;
+  const volume = ({ m3, sd_m3 }: ChangesView["lost"]) => `${fixed(m3, 0)} ± ${fixed(sd_m3, 0)} m³`;
   return (
     <p class="changes" data-testid="changes">
-      From {found.earlier.name} to {found.later.name}: {found.significant_pct.toFixed(1)} % changed (
-      {found.expected_pct.toFixed(0)} % is chance); {volume(found.lost)} went, {volume(found.gained)} came.
+      {say("site.fromToChangedIsChanceWent", {
+        earlier: found.earlier.name,
+        later: found.later.name,
+        significantPct: fixed(found.significant_pct, 1),
+        expectedPct: fixed(found.expected_pct, 0),
+        lost: volume(found.lost),
+        gained: volume(found.gained),
+      })}
     </p>
   );
 }

@@ -15,6 +15,7 @@ import {
   vehicles,
   view,
 } from "../state/store";
+import { say } from "../words/say";
 import { Button, sets } from "./Controls";
 
 /** The sea floor in space over the whole map. */
@@ -69,11 +70,11 @@ export function SpaceView() {
   }, []);
 
   return (
-    <section class="space" aria-label="Sea floor in space" data-testid="space">
-      <canvas ref={canvas} tabIndex={0} aria-label="Sea floor; drag to turn it, arrow keys move it" />
+    <section class="space" aria-label={say("space.seaFloorInSpace")} data-testid="space">
+      <canvas ref={canvas} tabIndex={0} aria-label={say("space.seaFloorDragToTurnIt")} />
       <div class="space-tools">
         <label class="field">
-          Heights x {exaggeration.value}
+          {say("space.heightsX", { exaggeration: exaggeration.value })}
           <input
             type="range"
             min={1}
@@ -85,14 +86,14 @@ export function SpaceView() {
             }}
           />
         </label>
-        <Button onClick={() => reset.current()}>From the south</Button>
+        <Button onClick={() => reset.current()}>{say("space.fromTheSouth")}</Button>
         <Button id="close-3d" kind="command primary" onClick={sets(in3d, false)}>
-          Back to the map
+          {say("space.backToTheMap")}
         </Button>
       </div>
       {fault.value ? (
         <p class="notice alarm" role="alert">
-          It cannot be shown in space: {fault.value}
+          {say("space.itCannotBeShownInSpace", { fault: fault.value })}
         </p>
       ) : null}
     </section>

@@ -5,6 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { ActionView, StopView } from "../api/types";
 import { refusal, said } from "../state/session";
 import { MISSION_WORDS } from "../state/words";
+import { say } from "../words/say";
 import { Button } from "./Controls";
 import { Dialog } from "./Dialog";
 
@@ -68,7 +69,7 @@ export function StopDialog({
           disabled={sending.value !== null}
           onClick={() => void ask("home", sendHome)}
         >
-          Return home
+          {say("abort.returnHome")}
         </Button>
       ) : null}
       <Button
@@ -87,15 +88,14 @@ export function StopDialog({
       {...frame}
       open={open}
       name={name}
-      heading={ending ? "Returning home" : answer.value ? done : question}
+      heading={ending ? say("stop.returningHome") : answer.value ? done : question}
       fault={refusal.value?.what === what ? said(refusal.value.error) : ""}
-      closing={answer.value ? "Close" : "Keep going"}
+      closing={answer.value ? say("dialog.close") : say("stop.keepGoing")}
       actions={answer.value ? null : confirming}
     >
       {ending ? (
         <p data-testid={`${name}-returning`}>
-          The vehicles are on their way home; the mission is {MISSION_WORDS[ending].toLowerCase()} once all
-          are there. Stop now, above, stops them where they are.
+          {say("stop.theVehiclesAreOnTheirWay", { becomes: MISSION_WORDS[ending].toLowerCase() })}
         </p>
       ) : answer.value ? (
         <Receipts stops={answer.value.stops} />
@@ -119,18 +119,15 @@ function Receipts({ stops }: { stops: readonly StopView[] }) {
           >
             <span>
               <span aria-hidden="true">{stop.acknowledged ? "✓" : "✕"}</span> <b>{stop.vehicle}</b>{" "}
-              {stop.acknowledged ? "acknowledged the stop" : "did not acknowledge"}
+              {stop.acknowledged ? say("stop.acknowledgedTheStop") : say("stop.didNotAcknowledge")}
               {stop.detail ? `: ${stop.detail}` : ""}
             </span>
           </li>
         ))}
       </ul>
-      {stops.length === 0 ? <p>No vehicle was under way.</p> : null}
+      {stops.length === 0 ? <p>{say("stop.noVehicleWasUnderWay")}</p> : null}
       {stops.some((stop) => !stop.acknowledged) ? (
-        <p class="reason alarm">
-          A vehicle that did not acknowledge may go on until its own time-out. Watch it, and stop it from its
-          console if it does not surface.
-        </p>
+        <p class="reason alarm">{say("stop.aVehicleThatDidNot")}</p>
       ) : null}
     </>
   );

@@ -2,6 +2,7 @@ import "./SwathCard.css";
 import { aboutHoliday } from "../map/swath";
 import { area, count, percent, place } from "../state/format";
 import { coordinateFormat, destination, holidays, mission } from "../state/store";
+import { say } from "../words/say";
 import { Button } from "./Controls";
 
 /** More are on the map and in the file. */
@@ -13,26 +14,26 @@ export function SwathCard() {
   if (!progress || progress.holidays === null) return null;
   const found = holidays.value?.features ?? [];
   return (
-    <article class="card target" data-testid="swath-card" aria-label="Swath coverage">
+    <article class="card target" data-testid="swath-card" aria-label={say("swath.swathCoverage")}>
       <header>
-        <h2>Swath coverage</h2>
+        <h2>{say("swath.swathCoverage")}</h2>
       </header>
       <dl class="big">
-        <div title="Share of the area's cells that a beam met">
-          <dt>Ensonified</dt>
+        <div title={say("swath.shareOfTheAreaSCells")}>
+          <dt>{say("bottomStrip.ensonified")}</dt>
           <dd>{percent(progress.ensonified_pct, 1)}</dd>
         </div>
-        <div title="Share of the area's cells with at least five soundings">
-          <dt>Dense</dt>
+        <div title={say("swath.shareOfTheAreaSCells2")}>
+          <dt>{say("compare.dense")}</dt>
           <dd>{percent(progress.dense_pct, 1)}</dd>
         </div>
-        <div title="Ground of at least three by three cells that was missed inside of what was swept">
-          <dt>Holidays</dt>
+        <div title={say("swath.groundOfAtLeastThreeBy")}>
+          <dt>{say("bottomStrip.holidays")}</dt>
           <dd data-testid="holiday-count">{count(progress.holidays)}</dd>
         </div>
       </dl>
       {found.length > 0 ? (
-        <ol class="holidays" aria-label="Holidays, largest first">
+        <ol class="holidays" aria-label={say("swath.holidaysLargestFirst")}>
           {found.slice(0, MOST_LISTED).map((holiday) => {
             const { number, area_m2, lon_deg, lat_deg } = holiday.properties;
             return (
@@ -40,12 +41,12 @@ export function SwathCard() {
                 <Button
                   id={`holiday-${number}`}
                   kind="link-button"
-                  title={`Show it: ${place([lon_deg, lat_deg], coordinateFormat.value)}`}
+                  title={say("swath.showIt", { it: place([lon_deg, lat_deg], coordinateFormat.value) })}
                   onClick={() => {
                     destination.value = aboutHoliday(holiday);
                   }}
                 >
-                  <span>Holiday {number}</span> <span>{area(area_m2)}</span>
+                  <span>{say("swath.holiday", { number })}</span> <span>{area(area_m2)}</span>
                 </Button>
               </li>
             );
@@ -53,7 +54,7 @@ export function SwathCard() {
         </ol>
       ) : null}
       {found.length > MOST_LISTED ? (
-        <p class="small">and {count(found.length - MOST_LISTED)} smaller ones</p>
+        <p class="small">{say("swath.andSmallerOnes", { found: count(found.length - MOST_LISTED) })}</p>
       ) : null}
     </article>
   );

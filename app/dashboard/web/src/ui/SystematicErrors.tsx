@@ -4,13 +4,22 @@ import type { SystematicErrorsView, SystematicErrorView } from "../api/types";
 import { quantity } from "../state/format";
 import { said } from "../state/session";
 import { selectedId } from "../state/store";
+import { say } from "../words/say";
 import { Button } from "./Controls";
 
 const WORDS: Record<SystematicErrorView["kind"], string> = {
-  depth: "depths too large by",
-  water_level: "water level higher by up to",
-  roll_offset: "sonar to starboard by",
-  sound_speed: "sound at the sonar faster by",
+  get depth() {
+    return say("systematicErrors.depthsTooLargeBy");
+  },
+  get water_level() {
+    return say("systematicErrors.waterLevelHigherByUpTo");
+  },
+  get roll_offset() {
+    return say("systematicErrors.sonarToStarboardBy");
+  },
+  get sound_speed() {
+    return say("systematicErrors.soundAtTheSonarFasterBy");
+  },
 };
 
 /** What is always wrong with sonars and water levels, as the survey shows it, to be taken out by a click. */
@@ -45,33 +54,38 @@ export function SystematicErrors() {
   const proposal = found?.proposal;
   const applied = found ? Object.keys(found.applied.vehicles).length + found.applied.water_level.length : 0;
   return (
-    <section class="systematic" aria-label="Systematic errors">
-      <h3>Systematic errors</h3>
+    <section class="systematic" aria-label={say("systematicErrors.systematicErrors")}>
+      <h3>{say("systematicErrors.systematicErrors")}</h3>
       {found ? (
         <>
           <ul class="small" data-testid="systematic-errors">
             {found.errors.map((error) => (
               <li key={`${error.kind} ${error.vehicle}`} class={error.proposed ? "" : "quiet"}>
-                {error.vehicle ?? "All"}: {WORDS[error.kind]} {quantity(error.found, error.unit)} ±{" "}
-                {quantity(error.sd, error.unit).slice(1)}
+                {error.vehicle ?? say("systematicErrors.all")}: {WORDS[error.kind]}{" "}
+                {quantity(error.found, error.unit)} ± {quantity(error.sd, error.unit).slice(1)}
                 <br />
-                {error.proposed ? "Can be taken out" : "Left in"}: {error.why}
+                {error.proposed ? say("systematicErrors.canBeTakenOut") : say("systematicErrors.leftIn")}:{" "}
+                {error.why}
               </li>
             ))}
             {found.unknown.map((text) => (
               <li key={text} class="quiet">
-                Not known: {text}
+                {say("systematicErrors.notKnown", { text })}
               </li>
             ))}
           </ul>
           {applied > 0 ? (
-            <p class="small">Some are taken out already ({found.applied.source || "by hand"}).</p>
+            <p class="small">
+              {say("systematicErrors.someAreTakenOutAlready", {
+                source: found.applied.source || say("systematicErrors.byHand"),
+              })}
+            </p>
           ) : null}
         </>
       ) : null}
       <p class="row">
         <Button id="look-for-errors" disabled={busy.value} onClick={() => look()}>
-          {found ? "Look again" : "Look for systematic errors"}
+          {found ? say("systematicErrors.lookAgain") : say("systematicErrors.lookForSystematicErrors")}
         </Button>
         {proposal ? (
           <Button
@@ -80,7 +94,7 @@ export function SystematicErrors() {
             disabled={busy.value}
             onClick={() => look((id) => api.setSystematicErrors(id, proposal))}
           >
-            Take out what is proposed
+            {say("systematicErrors.takeOutWhatIsProposed")}
           </Button>
         ) : null}
         {applied > 0 ? (
@@ -90,7 +104,7 @@ export function SystematicErrors() {
             disabled={busy.value}
             onClick={() => look(api.deleteSystematicErrors)}
           >
-            Take nothing out
+            {say("systematicErrors.takeNothingOut")}
           </Button>
         ) : null}
       </p>

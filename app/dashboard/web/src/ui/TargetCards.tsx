@@ -1,13 +1,38 @@
 import type { TargetState, TargetView } from "../api/types";
-import { age, metres } from "../state/format";
+import { age, fixed, metres, speed } from "../state/format";
 import { mission } from "../state/store";
 import type { Tone } from "../state/words";
+import { say } from "../words/say";
 
 const WORDS: Record<TargetState, { words: string; sign: string; tone: Tone }> = {
-  unheard: { words: "Not heard yet", sign: "◌", tone: "calm" },
-  searching: { words: "Several places possible", sign: "?", tone: "warning" },
-  uncertain: { words: "Not known well enough", sign: "▲", tone: "warning" },
-  accurate: { words: "Known well", sign: "●", tone: "good" },
+  unheard: {
+    get words() {
+      return say("targets.notHeardYet");
+    },
+    sign: "◌",
+    tone: "calm",
+  },
+  searching: {
+    get words() {
+      return say("targets.severalPlacesPossible");
+    },
+    sign: "?",
+    tone: "warning",
+  },
+  uncertain: {
+    get words() {
+      return say("targets.notKnownWellEnough");
+    },
+    sign: "▲",
+    tone: "warning",
+  },
+  accurate: {
+    get words() {
+      return say("targets.knownWell");
+    },
+    sign: "●",
+    tone: "good",
+  },
 };
 
 /** One card per moving target of the mission. */
@@ -26,7 +51,7 @@ function TargetCard({ target }: { target: TargetView }) {
       class={`card target ${tone}`}
       data-testid={`target-${target.name}`}
       data-state={target.state}
-      aria-label={`Target ${target.name}`}
+      aria-label={say("targets.target", { target: target.name })}
     >
       <header>
         <h2>{target.name}</h2>
@@ -36,28 +61,38 @@ function TargetCard({ target }: { target: TargetView }) {
       </header>
       <dl class="big">
         <div>
-          <dt>Known to</dt>
+          <dt>{say("targets.knownTo")}</dt>
           <dd data-testid={`target-sd-${target.name}`}>{worst === null ? "–" : `± ${metres(worst)}`}</dd>
         </div>
         <div>
-          <dt>Depth</dt>
+          <dt>{say("fleet.depth")}</dt>
           <dd>{metres(target.depth_m)}</dd>
         </div>
         <div>
-          <dt>Heard</dt>
+          <dt>{say("fleet.heard")}</dt>
           <dd>{age(target.age_s)}</dd>
         </div>
       </dl>
       <p class="small">
         {[
-          "target",
-          asked === undefined ? null : `asked ± ${asked} m`,
-          target.in_area === null ? null : target.in_area ? "over the area" : "outside the area",
+          say("targets.target2"),
+          asked === undefined ? null : say("targets.askedM", { asked }),
+          target.in_area === null
+            ? null
+            : target.in_area
+              ? say("targets.overTheArea")
+              : say("targets.outsideTheArea"),
           target.speed_mps === null
             ? null
-            : `${target.speed_mps.toFixed(1)} m/s to ${(target.course_deg ?? 0).toFixed(0)}°`,
-          `${target.ranges} ranges${target.rejected > 0 ? `, ${target.rejected} not used` : ""}`,
-          target.pursued_by === null ? null : `${target.pursued_by} goes for it`,
+            : say("targets.speedTo", {
+                speed: speed(target.speed_mps),
+                courseDeg: fixed(target.course_deg ?? 0, 0),
+              }),
+          say("targets.ranges", {
+            ranges: target.ranges,
+            it: target.rejected > 0 ? say("targets.notUsed", { rejected: target.rejected }) : "",
+          }),
+          target.pursued_by === null ? null : say("targets.goesForIt", { pursuedBy: target.pursued_by }),
         ]
           .filter((part) => part !== null)
           .join(" · ")}

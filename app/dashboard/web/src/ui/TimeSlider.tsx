@@ -3,6 +3,7 @@ import { clock } from "../state/format";
 import { pace, playing, replay, showPresent } from "../state/replay";
 import { finishOpen, mission, replayStep, steps } from "../state/store";
 import { flownWords, hasEnded, isAllowed } from "../state/words";
+import { say, sayWith } from "../words/say";
 import { Button, sets } from "./Controls";
 
 /** How far the mission has come, and back to any step of it. */
@@ -17,15 +18,17 @@ export function TimeSlider() {
   return (
     <div class={`timeline${shown === null ? "" : " past"}`}>
       <span class="steps">
-        Step <b data-testid="step">{shown ?? last}</b>
-        {flown === null ? ` of ${shown === null ? planned : last}` : ` · ${flown}`}
+        {sayWith("time.step", {
+          b: <b data-testid="step">{shown ?? last}</b>,
+          it: flown === null ? say("time.of", { planned: shown === null ? planned : last }) : ` · ${flown}`,
+        })}
       </span>
       <Button
         id="play"
         kind="tool"
         disabled={last === 0}
-        title={playing.value ? "Stop the replay" : "Replay the mission"}
-        aria-label={playing.value ? "Stop the replay" : "Replay the mission"}
+        title={playing.value ? say("time.stopTheReplay") : say("time.replayTheMission")}
+        aria-label={playing.value ? say("time.stopTheReplay") : say("time.replayTheMission")}
         onClick={async () => {
           if (playing.value) {
             playing.value = false;
@@ -43,8 +46,8 @@ export function TimeSlider() {
         max={Math.max(1, last)}
         value={shown ?? last}
         disabled={last === 0}
-        aria-label="Step that is shown"
-        aria-valuetext={shown === null ? "the present" : `step ${shown} of ${last}`}
+        aria-label={say("time.stepThatIsShown")}
+        aria-valuetext={shown === null ? say("time.thePresent") : say("time.stepOf", { shown, last })}
         data-testid="slider"
         onInput={(event) => {
           playing.value = false;
@@ -53,26 +56,28 @@ export function TimeSlider() {
       />
       {shown === null ? (
         <>
-          <span class="when">{over ? "as it ended" : "live"}</span>
+          <span class="when">{over ? say("time.asItEnded") : say("time.live")}</span>
           {isAllowed("finish", present) ? (
             <Button
               id="finish"
               kind="command finish"
               commands
-              title="End the mission before its last step"
+              title={say("time.endTheMissionBeforeItsLast")}
               onClick={sets(finishOpen, true)}
             >
-              Finish early…
+              {say("time.finishEarly")}
             </Button>
           ) : null}
         </>
       ) : (
         <>
           <span class="when" data-testid="replayed-at" role="status">
-            Replay{past ? `, ${clock(new Date(past.committed_at), "utc")} UTC` : ""}
+            {say("time.replay", {
+              it: past ? say("time.utc", { it: clock(new Date(past.committed_at), "utc") }) : "",
+            })}
           </span>
           <label class="pace">
-            <span class="visually-hidden">Pace of the replay</span>
+            <span class="visually-hidden">{say("time.paceOfTheReplay")}</span>
             <select
               value={pace.value}
               onChange={(event) => {
@@ -81,13 +86,13 @@ export function TimeSlider() {
             >
               {[1, 4, 10, 25].map((n) => (
                 <option key={n} value={n}>
-                  {n} steps/s
+                  {say("time.stepsS", { n })}
                 </option>
               ))}
             </select>
           </label>
           <Button id="to-present" kind="command primary" onClick={showPresent}>
-            {over ? "To the end" : "Live"}
+            {over ? say("time.toTheEnd") : say("time.live2")}
           </Button>
         </>
       )}

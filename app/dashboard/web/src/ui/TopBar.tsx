@@ -3,7 +3,7 @@ import type { MissionAction } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { age, clock, duration } from "../state/format";
 import { elapsedThen } from "../state/replay";
-import { act, busyWith } from "../state/session";
+import { act, askAbort, busyWith } from "../state/session";
 import {
   abortDialogOpen,
   abortOne,
@@ -14,13 +14,14 @@ import {
   panelOpen,
   preflightOpen,
   replayStep,
+  settingsOpen,
   socketStatus,
-  theme,
   vehicles,
   view,
 } from "../state/store";
 import { decidingFor } from "../state/waiting";
 import { isAllowed, MISSION_WORDS, missionSign, missionWords, type Tone } from "../state/words";
+import { say } from "../words/say";
 import { AccountButton } from "./Account";
 import { Button, flips, sets } from "./Controls";
 
@@ -32,8 +33,8 @@ export function TopBar() {
       <Button
         id="toggle-missions"
         kind="tool"
-        title="Missions"
-        aria-label="Missions"
+        title={say("missions.missions")}
+        aria-label={say("missions.missions")}
         aria-expanded={panelOpen.value}
         aria-controls="missions"
         onClick={flips(panelOpen)}
@@ -43,38 +44,50 @@ export function TopBar() {
       <Button
         id="open-links"
         kind="tool"
-        title="Links: what is missing"
-        aria-label="Links to vehicles"
+        title={say("topBar.linksWhatIsMissing")}
+        aria-label={say("topBar.linksToVehicles")}
         onClick={sets(linksOpen, true)}
       >
         ⇄
       </Button>
       <div class="title">
         <h1 data-testid="mission-name">{present?.name ?? "bathyfleet"}</h1>
-        {present ? <MissionLine /> : <p class="state">No mission chosen</p>}
+        {present ? <MissionLine /> : <p class="state">{say("topBar.noMissionChosen")}</p>}
       </div>
       <dl class="figures">
         {present ? (
           <>
-            <Figure label={past ? "Elapsed then" : "Elapsed"} value={duration(elapsed())} id="elapsed" />
+            <Figure
+              label={past ? say("topBar.elapsedThen") : say("topBar.elapsed")}
+              value={duration(elapsed())}
+              id="elapsed"
+            />
             {present.ending ? null : (
               <Figure
-                label="Remaining"
+                label={say("topBar.remaining")}
                 value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
               />
             )}
           </>
         ) : null}
         <LinkSummary />
-        <Figure label="UTC" value={clock(new Date(now.value), "utc")} minor />
-        <Figure label="Local" value={clock(new Date(now.value), "local")} minor />
+        <Figure label={say("topBar.utc")} value={clock(new Date(now.value), "utc")} minor />
+        <Figure label={say("topBar.local")} value={clock(new Date(now.value), "local")} minor />
       </dl>
-      <ThemeSwitch />
+      <Button
+        id="open-settings"
+        kind="tool settings"
+        title={say("settings.settings")}
+        aria-label={say("settings.settings")}
+        onClick={sets(settingsOpen, true)}
+      >
+        ⚙
+      </Button>
       <AccountButton />
       <div class="commands">
-        <Command action="start" label="Start" />
-        {present?.ending ? null : <Command action="pause" label="Pause" />}
-        <Command action="resume" label="Resume" />
+        <Command action="start" label={say("topBar.start")} />
+        {present?.ending ? null : <Command action="pause" label={say("topBar.pause")} />}
+        <Command action="resume" label={say("topBar.resume")} />
         <StopNow />
       </div>
       <Button
@@ -83,19 +96,18 @@ export function TopBar() {
         disabled={!present || !isAllowed("abort", present) || whyNotCommand.value !== ""}
         title={
           !present
-            ? "No mission is chosen"
+            ? say("topBar.noMissionIsChosen")
             : whyNotCommand.value
               ? whyNotCommand.value
               : isAllowed("abort", present)
-                ? "Stop every vehicle of this mission"
-                : `This mission is over: ${MISSION_WORDS[present.state].toLowerCase()}`
+                ? say("topBar.stopEveryVehicleOfThis")
+                : say("topBar.thisMissionIsOver", {
+                    becomes: MISSION_WORDS[present.state].toLowerCase(),
+                  })
         }
-        onClick={() => {
-          abortOne.value = null;
-          abortDialogOpen.value = true;
-        }}
+        onClick={() => askAbort(null)}
       >
-        Abort all
+        {say("topBar.abortAll")}
       </Button>
     </header>
   );
@@ -117,12 +129,14 @@ function MissionLine() {
       title={present.reason}
     >
       <span aria-hidden="true">{live ? missionSign(present) : "?"}</span>{" "}
-      {live ? words : `${words} when last heard`}
+      {live ? words : say("topBar.whenLastHeard", { words })}
       {live && waiting !== null ? (
         <span class="reason" data-testid="deciding">
           {" "}
-          · planning step {present.progress.step + 1} for {duration(waiting)}, vehicles wait at their
-          waypoints
+          {say("topBar.planningStepForVehiclesWait", {
+            step: present.progress.step + 1,
+            waiting: duration(waiting),
+          })}
         </span>
       ) : null}
       {present.reason ? <span class="reason"> · {present.reason}</span> : null}
@@ -167,22 +181,24 @@ function LinkSummary() {
   let words: string;
   let tone: Tone = "warning";
   if (status.kind === "open" && mission.value) {
-    words = `Live · ${heard} of ${all} vehicles`;
+    words = say("topBar.liveOfVehicles", { heard, all });
     tone = heard < all ? "warning" : "good";
   } else if (status.kind === "waiting") {
     const wait = Math.max(0, Math.ceil((status.retryAt - now.value) / 1000));
-    const old = view.value.vehiclesAt ? `, data ${age((now.value - view.value.vehiclesAt) / 1000)} old` : "";
-    words = `Service gone${old}; trying again in ${wait} s`;
+    const old = view.value.vehiclesAt
+      ? say("topBar.dataOld", { now: age((now.value - view.value.vehiclesAt) / 1000) })
+      : "";
+    words = say("topBar.serviceGoneTryingAgainInS", { old, wait });
     tone = "alarm";
   } else if (status.kind === "refused") {
-    words = "Not signed in";
+    words = say("topBar.notSignedIn");
     tone = "alarm";
   } else {
-    words = "Connecting…";
+    words = say("topBar.connecting");
   }
   return (
     <div class="figure">
-      <dt>Link</dt>
+      <dt>{say("fleet.link")}</dt>
       <dd class={`link ${tone}`}>
         <span aria-hidden="true">{tone === "good" ? "●" : tone === "alarm" ? "✕" : "◐"}</span>{" "}
         <span role="status" data-testid="link" data-status={status.kind}>
@@ -221,7 +237,7 @@ function StopNow() {
       id="stop-now"
       kind="command stop-now"
       commands
-      title="Stop the vehicles where they are, and end the mission now"
+      title={say("topBar.stopTheVehiclesWhereTheyAre")}
       onClick={() => {
         if (ending === "finished") finishOpen.value = true;
         else {
@@ -230,27 +246,7 @@ function StopNow() {
         }
       }}
     >
-      Stop now
-    </Button>
-  );
-}
-
-const NEXT_THEME = { system: "light", light: "dark", dark: "contrast", contrast: "system" } as const;
-const THEME_SIGNS = { system: "◐", light: "☀", dark: "☾", contrast: "◼" } as const;
-
-function ThemeSwitch() {
-  const words = `Colours: ${theme.value}. Change to ${NEXT_THEME[theme.value]}`;
-  return (
-    <Button
-      id="theme"
-      kind="tool theme"
-      title={words}
-      aria-label={words}
-      onClick={() => {
-        theme.value = NEXT_THEME[theme.value];
-      }}
-    >
-      {THEME_SIGNS[theme.value]}
+      {say("abort.stopNow")}
     </Button>
   );
 }

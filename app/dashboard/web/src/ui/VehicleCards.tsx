@@ -1,6 +1,6 @@
 import "./VehicleCards.css";
 import type { VehicleView } from "../api/types";
-import { age, clock, distance, metres, percent } from "../state/format";
+import { age, clock, distance, metres, percent, speed } from "../state/format";
 import { localizationWords } from "../state/localization";
 import { replayed } from "../state/replay";
 import { bringHome, holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../state/session";
@@ -30,6 +30,7 @@ import {
   vehicleState,
   WAYPOINT_WORDS,
 } from "../state/words";
+import { say, sayWith } from "../words/say";
 import { Button, flips } from "./Controls";
 import { CrosslinesCard } from "./CrosslinesCard";
 import { Grip } from "./Grip";
@@ -44,10 +45,9 @@ export function VehicleCards() {
   const present = mission.value;
   if (!present) return null;
   return (
-    <div class="cards-column">
+    <aside class="cards-column" aria-label={say("compare.vehicles")}>
       <section
         class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
-        aria-label="Vehicles"
         // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
         tabIndex={0}
       >
@@ -56,18 +56,17 @@ export function VehicleCards() {
             id="fold-cards"
             kind="fold"
             aria-pressed={shownFolded.value}
-            title={shownFolded.value ? "Show whole cards" : "Show only what one has to know of each vehicle"}
+            title={shownFolded.value ? say("cards.showWholeCards") : say("cards.showOnlyWhatOneHasTo")}
             onClick={flips(cardsFolded)}
           >
-            {shownFolded.value ? "◂ Whole cards" : "Fold cards ▸"}
+            {shownFolded.value ? say("cards.wholeCards") : say("cards.foldCards")}
           </Button>
         </div>
         <SearchCard />
         <SwathCard />
         {vehicles.value.length === 0 ? (
           <p class="empty">
-            No vehicle takes part yet. Switch one on within reach of this network, or create a mission with
-            simulated vehicles. If a vehicle is on but missing here, run <code>bathyfleet doctor</code>.
+            {sayWith("cards.noVehicleTakesPartYetSwitch", { code: <code>bathyfleet doctor</code> })}
           </p>
         ) : (
           vehicles.value.map((vehicle) => <Card key={vehicle.view.name} vehicle={vehicle} />)
@@ -76,9 +75,16 @@ export function VehicleCards() {
         <CrosslinesCard />
       </section>
       {shownFolded.value ? null : (
-        <Grip what="the cards" size={cardsWidth} side="left" least={250} most={520} id="grip-cards" />
+        <Grip
+          what={say("cards.theCards")}
+          size={cardsWidth}
+          side="left"
+          least={250}
+          most={520}
+          id="grip-cards"
+        />
       )}
-    </div>
+    </aside>
   );
 }
 
@@ -96,7 +102,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
       style={{ "--vehicle": vehicle.colour }}
       data-testid={`card-${v.name}`}
       data-link={v.link}
-      aria-label={`Vehicle ${v.name}`}
+      aria-label={say("cards.vehicle", { v: v.name })}
     >
       <header>
         <h2>{v.name}</h2>
@@ -107,21 +113,21 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
       </header>
       <dl class="big">
         <div>
-          <dt>Depth</dt>
+          <dt>{say("fleet.depth")}</dt>
           <dd data-testid={`depth-${v.name}`}>{metres(v.depth_m)}</dd>
         </div>
         <div>
-          <dt>Altitude</dt>
+          <dt>{say("charts.altitude")}</dt>
           <dd>{metres(v.altitude_m)}</dd>
         </div>
         <div class={v.battery ?? ""}>
-          <dt>{byEndurance ? "Energy" : "Battery"}</dt>
+          <dt>{byEndurance ? say("asked.energy") : say("charts.battery")}</dt>
           <dd data-testid={`energy-${v.name}`}>
             {byEndurance ? percent(v.energy_left_pct) : batteryWords(v)}
           </dd>
         </div>
         <div class={vehicle.stale && !away ? "late" : ""}>
-          <dt>Heard</dt>
+          <dt>{say("fleet.heard")}</dt>
           <dd>{age(vehicle.age_s)}</dd>
         </div>
       </dl>
@@ -133,10 +139,10 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             ? `IMC${v.imc_id === null ? "" : ` 0x${v.imc_id.toString(16).padStart(4, "0")}`}`
             : v.kind,
           v.address,
-          v.speed_mps === null ? null : `${v.speed_mps.toFixed(1)} m/s`,
+          v.speed_mps === null ? null : speed(v.speed_mps),
           ...sonarWords(v, mission.value?.spec.vehicles),
           ...localizationWords(v),
-          v.pursuing === null ? null : `goes for ${v.pursuing}`,
+          v.pursuing === null ? null : say("cards.goesFor", { pursuing: v.pursuing }),
         ]
           .filter((part) => part !== null)
           .map((part) => part?.replaceAll(" ", "\u00a0"))
@@ -146,24 +152,28 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         <p class="small" data-testid={`flown-${v.name}`}>
           {[
             ...(v.active && !ended ? [capital(PHASE_WORDS[v.phase])] : []),
-            `${distance(v.flown_m)} flown`,
-            `${Math.round(v.idle_s)} s idle`,
+            say("cards.flown", { flownM: distance(v.flown_m) }),
+            say("cards.sIdle", { idleS: Math.round(v.idle_s) }),
           ].join(" · ")}
         </p>
       ) : null}
       {vehicle.waypoint && v.active ? (
         <p class="small waypoint-line">
           <WaypointShape status={vehicle.waypoint.status} colour={vehicle.colour} />
-          Waypoint {vehicle.waypoint.step} at {metres(vehicle.waypoint.depth_m)} depth,{" "}
-          {WAYPOINT_WORDS[vehicle.waypoint.status]}
+          {say("cards.waypointAtDepth", {
+            step: vehicle.waypoint.step,
+            depthM: metres(vehicle.waypoint.depth_m),
+            status: WAYPOINT_WORDS[vehicle.waypoint.status],
+          })}
         </p>
       ) : null}
       <OrderLine of={v} />
       {v.active ? <Orders of={v} ended={ended} /> : null}
       {v.active ? null : (
         <p class="small left-at" data-testid={`left-${v.name}`}>
-          Left{v.left_at ? ` at ${clock(new Date(v.left_at), "utc")} UTC` : ""}; it is shown where it was
-          last.
+          {say("cards.leftItIsShownWhereIt", {
+            it: v.left_at ? say("cards.atUtc", { it: clock(new Date(v.left_at), "utc") }) : "",
+          })}
         </p>
       )}
       {!v.active && !ended ? (
@@ -172,20 +182,20 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             id={`rejoin-${v.name}`}
             kind="command again"
             commands
-            title="Let it take part again, as it was described"
+            title={say("cards.letItTakePartAgainAs")}
             onClick={() => void rejoin(v.name)}
           >
-            Add again
+            {say("cards.addAgain")}
           </Button>
           {mission.value?.state === "running" && v.recovery_point !== null ? (
             <Button
               id={`bring-home-${v.name}`}
               kind="command again"
               commands
-              title="Take it back and send it to its recovery point"
+              title={say("cards.takeItBackAndSendIt")}
               onClick={() => void bringHome(v.name)}
             >
-              Bring home
+              {say("cards.bringHome")}
             </Button>
           ) : null}
         </div>
@@ -220,7 +230,7 @@ function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; t
       ) : null}
       {v.withdrawn && v.active && !(over && plain) && !isSaid(v.withdrawn, v) ? (
         <p class="reason" data-testid={`withdrawn-${v.name}`}>
-          Surveys no more: {v.withdrawn}
+          {say("cards.surveysNoMore", { withdrawn: v.withdrawn })}
         </p>
       ) : null}
       {v.reason && !isSaid(v.reason, v) ? <p class={`reason ${tone}`}>{v.reason}</p> : null}
@@ -241,8 +251,8 @@ function Range({ of: v }: { of: VehicleView }) {
         <div
           class="energy-bar"
           role="img"
-          aria-label={`Energy of ${v.name}: ${percent(left_pct)}`}
-          title={needs_pct === null ? "" : "The mark is what its way home needs"}
+          aria-label={say("cards.energyOf", { v: v.name, leftPct: percent(left_pct) })}
+          title={needs_pct === null ? "" : say("cards.theMarkIsWhatItsWay")}
         >
           <i style={{ width: `${left_pct}%` }} />
           {needs_pct === null ? null : <b style={{ left: `${Math.min(needs_pct, 100)}%` }} />}
@@ -265,20 +275,20 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
         <Button
           id={`return-${v.name}`}
           commands
-          title="Send it home to its recovery point; the others go on"
+          title={say("cards.sendItHomeToItsRecovery")}
           onClick={() => void returnVehicle(v.name)}
         >
-          Bring home
+          {say("cards.bringHome")}
         </Button>
       ) : null}
       {led && v.withdrawn === "" ? (
         <Button
           id={`hold-${v.name}`}
           commands
-          title="Let it wait where it is until it is resumed; the others go on"
+          title={say("cards.letItWaitWhereItIs")}
           onClick={() => void holdVehicle(v.name)}
         >
-          Hold
+          {say("cards.hold")}
         </Button>
       ) : null}
       <LineOrders of={v} />
@@ -286,10 +296,10 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
         <Button
           id={`resume-${v.name}`}
           commands
-          title="Let it survey again, for example with a new battery"
+          title={say("cards.letItSurveyAgainForExample")}
           onClick={() => void resumeVehicle(v.name)}
         >
-          Resume survey
+          {say("cards.resumeSurvey")}
         </Button>
       ) : null}
       <Button
@@ -301,7 +311,7 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
           abortDialogOpen.value = true;
         }}
       >
-        {ended ? `Stop ${v.name} again` : `Abort ${v.name}`}
+        {ended ? say("cards.stopAgain", { v: v.name }) : say("cards.abort", { v: v.name })}
       </Button>
     </div>
   );
@@ -316,22 +326,26 @@ function PastCard({ vehicle, depth_m }: { vehicle: Vehicle; depth_m: number | nu
       class="card calm past"
       style={{ "--vehicle": vehicle.colour }}
       data-testid={`card-${name}`}
-      aria-label={`Vehicle ${name} at step ${replayStep.value}`}
+      aria-label={say("cards.vehicleAtStep", { name, replayStep: replayStep.value ?? 0 })}
     >
       <header>
         <h2>{name}</h2>
-        <span class="tone calm">At step {replayStep.value}</span>
+        <span class="tone calm">{say("cards.atStep", { replayStep: replayStep.value ?? 0 })}</span>
       </header>
       <dl class="big">
         <div>
-          <dt>Depth</dt>
+          <dt>{say("fleet.depth")}</dt>
           <dd data-testid={`depth-${name}`}>{metres(depth_m)}</dd>
         </div>
       </dl>
       {waypoint ? (
         <p class="small waypoint-line">
           <WaypointShape status={waypoint.status} colour={vehicle.colour} />
-          Waypoint {waypoint.step} at {metres(waypoint.depth_m)} depth, {WAYPOINT_WORDS[waypoint.status]}
+          {say("cards.waypointAtDepth", {
+            step: waypoint.step,
+            depthM: metres(waypoint.depth_m),
+            status: WAYPOINT_WORDS[waypoint.status],
+          })}
         </p>
       ) : null}
     </article>

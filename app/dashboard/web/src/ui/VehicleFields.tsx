@@ -1,27 +1,29 @@
 import type { Sensor, VehicleSpec, VehicleView } from "../api/types";
 import { type Own, sensorOf, simulatedNames, vehicleNames } from "../state/draft";
 import { SENSORS, schemaOf, vehicleFieldsOf } from "../state/fields";
+import { pointed } from "../state/format";
 import { fleet } from "../state/store";
 import { batteryWords, vehicleState } from "../state/words";
+import { named, say } from "../words/say";
 import { Button, Choice } from "./Controls";
 import { Fault, Place, Text, useForm } from "./Fields";
 
-const SENSOR_WORDS = SENSORS.map((sensor) => [sensor, sensor.replaceAll("_", " ")] as const);
+const sensorWords = () => SENSORS.map((sensor) => [sensor, named("sensor", sensor, sensor)] as const);
 
 /** Who takes part: real vehicles that are free, simulated ones, and what each has of its own. */
 export function VehicleFields() {
   const { draft, set } = useForm();
   return (
     <fieldset>
-      <legend>Vehicles</legend>
+      <legend>{say("compare.vehicles")}</legend>
       <FleetChoice />
       <div class="pair">
-        <Text field="simulated" label="Simulated vehicles" numeric />
+        <Text field="simulated" label={say("vehicles.simulatedVehicles")} numeric />
         <label class="field">
-          Their sensor
+          {say("vehicles.theirSensor")}
           <Choice
             value={draft.sensor}
-            options={SENSOR_WORDS}
+            options={sensorWords()}
             id="field-sensor"
             onChoose={(sensor) => set({ sensor })}
           />
@@ -56,7 +58,7 @@ function SimulatedNames() {
           key={i}
           type="text"
           autocomplete="off"
-          aria-label={`Name of simulated vehicle ${i + 1}`}
+          aria-label={say("vehicles.nameOfSimulatedVehicle", { i: i + 1 })}
           value={name}
           data-testid={`sim-name-${i + 1}`}
           onChange={(event) => {
@@ -79,16 +81,16 @@ function Singles() {
     set(({ own }) => ({ own: { ...own, [name]: { ...own[name], [field]: text } } }));
   return (
     <details>
-      <summary>Single vehicles: speed, endurance, height above the bottom, sensor, recovery point</summary>
+      <summary>{say("vehicles.singleVehiclesSpeedEndurance")}</summary>
       {names.map((name) => (
         <fieldset key={name} class="single-vehicle">
           <legend>{name}</legend>
           <div class="pair">
             <label class="field">
-              Sensor
+              {say("vehicles.sensor")}
               <Choice
                 value={sensorOf(draft, name)}
-                options={SENSOR_WORDS}
+                options={sensorWords()}
                 id={`sensor-${name}`}
                 onChoose={(sensor) => change(name, "sensor", sensor)}
               />
@@ -106,19 +108,19 @@ function Singles() {
                       ? draft.speed_mps
                       : String(
                           schemaOf({ path }).default ??
-                            (field === "altitude_m" ? "keeps its depth" : "not known"),
+                            (field === "altitude_m" ? say("vehicles.keepsItsDepth") : say("asked.notKnown")),
                         )
                   }
                   data-testid={`${field}-${name}`}
-                  onInput={(event) => change(name, field, event.currentTarget.value)}
+                  onInput={(event) => change(name, field, pointed(event.currentTarget.value))}
                 />
               </label>
             ))}
           </div>
           <Place
             id={`recovery_point-${name}`}
-            label="Its own recovery point"
-            placeholder="the mission's"
+            label={say("vehicles.itsOwnRecoveryPoint")}
+            placeholder={say("vehicles.theMissionS")}
             text={draft.own[name]?.recovery_point ?? ""}
             onText={(text) => change(name, "recovery_point", text)}
           />
@@ -137,7 +139,7 @@ function FleetChoice() {
   // Of a copy: as they are described there, heard or not.
   const described = draft.chosen.filter((spec) => !free.some((v) => v.name === spec.name));
   if (free.length === 0 && described.length === 0) {
-    return <p class="empty">No real vehicle is heard. Switch one on, or simulate some:</p>;
+    return <p class="empty">{say("vehicles.noRealVehicleIsHeardSwitch")}</p>;
   }
   const toggle = (vehicle: VehicleView, on: boolean) =>
     set({
@@ -161,7 +163,7 @@ function FleetChoice() {
               {[
                 v.kind === "imc" ? "IMC" : v.kind,
                 vehicleState(v, undefined).words,
-                v.battery_pct === null ? null : `battery ${batteryWords(v)}`,
+                v.battery_pct === null ? null : say("vehicles.battery", { v: batteryWords(v) }),
               ]
                 .filter((part) => part !== null)
                 .join(" · ")}
@@ -188,13 +190,17 @@ function Described({ spec }: { spec: VehicleSpec }) {
     <div class="chosen-vehicle field">
       <input
         type="text"
-        aria-label={`Name of ${spec.name}`}
+        aria-label={say("vehicles.nameOf", { spec: spec.name })}
         value={spec.name}
         data-testid={`vehicle-${spec.name}`}
         onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
       />
       <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
-      <Button kind="tool small" aria-label={`Leave ${spec.name} out`} onClick={() => change([])}>
+      <Button
+        kind="tool small"
+        aria-label={say("vehicles.leaveOut", { spec: spec.name })}
+        onClick={() => change([])}
+      >
         ✕
       </Button>
     </div>

@@ -1,6 +1,7 @@
 import "./VehicleOrders.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import type { VehicleView } from "../api/types";
+import { distance } from "../state/format";
 import {
   denserRing,
   goVehicle,
@@ -11,9 +12,10 @@ import {
   typingFor,
 } from "../state/orders";
 import { lengthOf, orderWords, takesOrders } from "../state/orderWords";
-import { PLACE_SAMPLE, placeOf } from "../state/place";
+import { placeOf, placeSample } from "../state/place";
 import { resumeVehicle } from "../state/session";
 import { describing, drawing, drawingReady, mission, picking, vehicles } from "../state/store";
+import { say } from "../words/say";
 import { Button, Choice, into, sets, Typed, useEscape } from "./Controls";
 
 /** What a vehicle was ordered, with the way back to its part. */
@@ -26,10 +28,10 @@ export function OrderLine({ of: v }: { of: VehicleView }) {
         id={`end-order-${v.name}`}
         kind="link-button"
         commands
-        title="End this order: it goes on with its part of the survey now"
+        title={say("orders.endIt")}
         onClick={() => void resumeVehicle(v.name)}
       >
-        Go on with its part
+        {say("orders.goOn")}
       </Button>
     </p>
   );
@@ -46,30 +48,30 @@ export function LineOrders({ of: v }: { of: VehicleView }) {
         id={`go-${v.name}`}
         commands
         aria-expanded={typing}
-        title="Send it to a place now: click on the map or type a position; then it goes on with its part"
+        title={say("orders.sendItTo")}
         onClick={() => {
           typingFor.value = typing ? null : v.name;
           if (typing) picking.value = null;
           else pickPlaceFor(v.name);
         }}
       >
-        Go there…
+        {say("orders.goThere")}
       </Button>
       <Button
         id={`skip-${v.name}`}
         commands
-        title="Leave out the rest of the line that it is on; what it leaves out counts as not surveyed"
+        title={say("orders.leaveOut")}
         onClick={() => void skipLine(v.name)}
       >
-        Skip line
+        {say("orders.skip")}
       </Button>
       <Button
         id={`repeat-${v.name}`}
         commands
-        title="Fly the line that it is on once more, from its beginning to here"
+        title={say("orders.flyAgain")}
         onClick={() => void repeatLine(v.name)}
       >
-        Line again
+        {say("orders.again")}
       </Button>
       {typing ? <TypedPlace name={v.name} /> : null}
     </>
@@ -89,7 +91,7 @@ function TypedPlace({ name }: { name: string }) {
   const go = async (event: SubmitEvent) => {
     event.preventDefault();
     const at = placeOf(text.value);
-    fault.value = at ? "" : `Type a position such as ${PLACE_SAMPLE}, or click on the map`;
+    fault.value = at ? "" : say("orders.typeAPosition", { sample: placeSample() });
     if (at && (await goVehicle(name, at))) {
       typingFor.value = null;
       picking.value = null;
@@ -99,12 +101,12 @@ function TypedPlace({ name }: { name: string }) {
     <form class="typed-place" onSubmit={(event) => void go(event)}>
       <Typed
         text={text}
-        label={`Where ${name} goes`}
-        placeholder="Click on the map, or type"
+        label={say("orders.whereGoes", { name })}
+        placeholder={say("orders.clickOrType")}
         id={`go-place-${name}`}
       />
       <button type="submit" class="command" data-testid={`go-send-${name}`}>
-        Send
+        {say("orders.send")}
       </button>
       {fault.value ? (
         <span class="fault" role="alert">
@@ -127,8 +129,7 @@ export function DenserQuestion() {
   if (drawing.value && drawingReady.value && !describing.value && present)
     return (
       <p class="notice" role="status" data-testid="draws-denser">
-        Click corner after corner of the part to survey denser, the first one again at the end. Escape leaves
-        it.
+        {say("orders.clickCorners")}
       </p>
     );
   if (!ring || !present) return null;
@@ -136,24 +137,23 @@ export function DenserQuestion() {
   const send = async (event: SubmitEvent) => {
     event.preventDefault();
     const spacing_m = spacing.value.trim() === "" ? null : Number(spacing.value);
-    fault.value = spacing_m !== null && !(spacing_m >= 0.5) ? "Type metres, 0.5 or more, or nothing" : "";
+    fault.value = spacing_m !== null && !(spacing_m >= 0.5) ? say("orders.typeMetres") : "";
     if (fault.value === "" && (await surveyDenser(ring, spacing_m, who.value || null)))
       denserRing.value = null;
   };
   return (
     <form class="notice denser" onSubmit={(event) => void send(event)} data-testid="denser">
       <p>
-        <b>Survey this part denser?</b> Its outline is{" "}
-        {Math.round(lengthOf([...ring, ring[0] as (typeof ring)[0]]))} m long. The vehicle flies it after the
-        legs that it has, then goes on with its part.
+        <b>{say("orders.denserQuestion")}</b>{" "}
+        {say("orders.denserHint", { length: distance(lengthOf([...ring, ring[0] as (typeof ring)[0]])) })}
       </p>
       <label>
-        Lines apart, m{" "}
+        {say("orders.linesApart")}{" "}
         <input
           type="text"
           inputMode="decimal"
           size={5}
-          placeholder="half"
+          placeholder={say("orders.half")}
           value={spacing.value}
           data-testid="denser-spacing"
           onInput={(event) => {
@@ -162,16 +162,16 @@ export function DenserQuestion() {
         />
       </label>
       <Choice
-        label="Who flies it"
+        label={say("orders.whoFliesIt")}
         value={who.value}
-        options={[["", "Nearest vehicle"], ...able.map(({ name }) => [name, name] as const)]}
+        options={[["", say("orders.nearest")], ...able.map(({ name }) => [name, name] as const)]}
         id="denser-vehicle"
         onChoose={into(who)}
       />
       <button type="submit" class="command primary" data-testid="denser-send">
-        Survey it
+        {say("orders.surveyIt")}
       </button>
-      <Button onClick={sets(denserRing, null)}>Leave it</Button>
+      <Button onClick={sets(denserRing, null)}>{say("orders.leaveIt")}</Button>
       {fault.value ? (
         <span class="fault" role="alert">
           ▲ {fault.value}

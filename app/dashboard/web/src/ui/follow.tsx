@@ -19,7 +19,7 @@ import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
-import { place } from "../state/format";
+import { place, units } from "../state/format";
 import { ownPosition } from "../state/own";
 import { replayed } from "../state/replay";
 import {
@@ -67,6 +67,7 @@ import {
   view,
 } from "../state/store";
 import { tilesAddress } from "../state/tiles";
+import { say } from "../words/say";
 import { VehicleMark, WaypointMark } from "./marks";
 import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./room";
 
@@ -75,7 +76,7 @@ function markOnce(name: string): void {
   if (performance.getEntriesByName(name).length === 0) performance.mark(name);
 }
 
-const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
+export const look = (): Look => (theme.value === "contrast" ? "contrast" : isDark.value ? "dark" : "light");
 
 const homesOf = (spec: MissionView["spec"]) => recoveryMarks(spec, SPEC["recovery.radius_m"].default);
 
@@ -169,6 +170,7 @@ export function follow(chart: Chart): () => void {
       ),
     ),
     effect(() => chart.setMeasure(measured.value ?? [])),
+    effect(() => chart.setUnits(units.value)),
   ];
   return () => {
     for (const stop of stops) stop();
@@ -189,7 +191,9 @@ function pointedOut(): PlaceMark[] {
           },
         ]
       : []),
-    ...(own ? [{ words: "here", sign: "own" as const, at: own.at, radius_m: own.accuracy_m }] : []),
+    ...(own
+      ? [{ words: say("follow.here"), sign: "own" as const, at: own.at, radius_m: own.accuracy_m }]
+      : []),
   ];
 }
 

@@ -5,7 +5,8 @@ import type { LngLat, VehicleView, WaypointStatus, WaypointView } from "../api/t
 import { wayBetween } from "../map/geo";
 import { age } from "../state/format";
 import type { Vehicle } from "../state/store";
-import { WAYPOINT_WORDS } from "../state/words";
+import { PHASE_WORDS, WAYPOINT_WORDS } from "../state/words";
+import { say } from "../words/say";
 
 /** A vehicle as it was: its heading is that of its last way. */
 interface Past {
@@ -33,7 +34,7 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
       left={!active}
       alarm={breach}
       age={old ? age(vehicle.age_s) : ""}
-      title={`${name}${vehicle.stale ? `, last heard ${age(vehicle.age_s)} ago` : ""}`}
+      title={`${name}${vehicle.stale ? say("marks.lastHeardAgo", { ageS: age(vehicle.age_s) }) : ""}`}
     />
   );
 }
@@ -104,9 +105,9 @@ function Mark({
       <VehicleShape stage={stage} colour={colour} heading_deg={heading_deg} />
       <span class="mark-label">
         {name}
-        {left ? " left" : ""}
-        {stage === "surveying" ? "" : ` ${stage}`}
-        {old ? <b> {old} old</b> : null}
+        {left ? say("marks.left") : ""}
+        {stage === "surveying" ? "" : ` ${PHASE_WORDS[stage]}`}
+        {old ? <b> {say("marks.old", { old })}</b> : null}
         {alarm ? <b> ✕ {alarm}</b> : null}
       </span>
     </div>
@@ -160,7 +161,11 @@ function shape(status: WaypointStatus, colour: string) {
 }
 
 export function WaypointMark({ waypoint, colour }: { waypoint: WaypointView; colour: string }) {
-  const words = `Waypoint ${waypoint.step} of ${waypoint.vehicle}: ${WAYPOINT_WORDS[waypoint.status]}`;
+  const words = say("marks.waypointOf", {
+    step: waypoint.step,
+    vehicle: waypoint.vehicle,
+    status: WAYPOINT_WORDS[waypoint.status],
+  });
   return (
     <div
       class="waypoint-mark"
