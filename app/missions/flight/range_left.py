@@ -124,7 +124,7 @@ class RangeLeft:
         return max(over_s * speed_mps, 0.0) if math.isfinite(over_s) else 0.0
 
     def turn_back(self, member: Member) -> FloatArray | None:
-        """Return where on its planned legs a vehicle has to turn back at the latest, (2,); None: nowhere, or unknown."""
+        """Return where on its planned legs it has to turn back at the latest, (2,); None: nowhere, or unknown."""
         home_m, left = home_of(member, self._live.spec), member.energy.left
         if home_m is None or left is None or member.report is None or member.withdrawal is not None:
             return None
