@@ -153,6 +153,8 @@ class Member:
     """How long its way home takes from where it is; None: it has none, or it is not known yet."""
     way_home_m: NDArray[np.float64] | None = None
     """The corners of its way home from about where it is, (n, 2); None: it has none, or it is not known yet."""
+    turn_back_m: NDArray[np.float64] | None = None
+    """Where on its planned legs it has to turn back at the latest, (2,); None: on none of them, or not known."""
     failsafes: list[Active] = field(default_factory=list)
     """What is in force for it, the strongest response first."""
     asked: OperatorOrder | None = None
@@ -229,6 +231,13 @@ class Member:
         if ends and self.report is not None:
             ends.insert(0, self.place_m(frame))
         return sum(float(np.hypot(*(b - a))) for a, b in pairwise(ends))
+
+    def legs_ahead_m(self) -> NDArray[np.float64]:
+        """Return where what it has been sent to and the legs after that end, (n, 2), first to last."""
+        ends = [leg.target_m for leg in self.ahead]
+        if self.ordered and self.target_m is not None:
+            ends.insert(0, self.target_m)
+        return np.array(ends).reshape(-1, 2)
 
     def cruise_depth_m(self, limits: Limits) -> float:
         """Return the depth it travels at where the bottom leaves room: as asked for, or its place in the stack."""

@@ -119,6 +119,8 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     await until_step(service, mission.id, 2)
     live = await service.get(mission.id)
     await call_home(live, "a", "Ana")
+    on_its_way = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
+    assert on_its_way.way_home[-1] == pytest.approx(OUTSIDE, abs=1e-6)
     with pytest.raises(ConflictError, match="called home by Ana"):
         await call_home(live, "a", "Ana")
 
@@ -126,6 +128,8 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
         return await phase_of(service, mission, "a") is Phase.HOME
 
     await until(is_home, "a is home")
+    there = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
+    assert (there.way_home, there.turn_back_point) == ([], None)
     before, other = live.team.members["a"].legs, live.team.members["b"].legs
     await until(lambda: live.team.members["b"].legs > other + 2, "b goes on meanwhile")
     assert live.team.members["a"].legs == before

@@ -78,6 +78,7 @@ class FailsafeWatch:
         for member in self._live.team:
             member.way_home_m = self._range.way(member)
             member.return_needs_s = self._range.needs_s(member)
+            member.turn_back_m = self._range.turn_back(member)
             over = member.withdrawal is not None and member.withdrawal.over
             detected = {} if over else self._detected(member) | too_close.get(member.name, {})
             # Who waits at the surface to be taken out of the water is in ships' way, too.

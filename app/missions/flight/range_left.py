@@ -12,6 +12,7 @@ from app.missions import safety
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import with_reserve_s
+from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
 
@@ -121,6 +122,20 @@ class RangeLeft:
         speed_mps = self._live.spec.speed_of(member.spec)
         over_s = left.safe_s - self._until_end_s(member) - with_reserve_s(self._needs_from_s(member, end_m, home_m))
         return max(over_s * speed_mps, 0.0) if math.isfinite(over_s) else 0.0
+
+    def turn_back(self, member: Member) -> FloatArray | None:
+        """Return where on its planned legs it has to turn back at the latest, (2,); None: nowhere, or unknown."""
+        home_m, left = home_of(member, self._live.spec), member.energy.left
+        if home_m is None or left is None or member.report is None or member.withdrawal is not None:
+            return None
+        return turn_back_place(
+            member.place_m(self._live.frame),
+            member.legs_ahead_m(),
+            left.safe_s,
+            lambda place_m: self._needs_from_s(member, place_m, home_m),
+            self._live.spec.speed_of(member.spec),
+            self.current_mps,
+        )
 
     def allows(self, member: Member, target_m: FloatArray) -> bool:
         """Whether a vehicle's energy lasts for one more leg, to a target (2,), and for the way home from there."""

@@ -5,6 +5,9 @@ from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
+import numpy as np
+
+from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
@@ -134,6 +137,7 @@ class VehicleViews:
         if left is not None and needs_s is not None and math.isfinite(needs_s) and member.withdrawal is None:
             slack_s = (left.safe_s - with_reserve_s(needs_s)) / self._time_scale
             turn_back_at = (now() + timedelta(seconds=max(slack_s, 0.0))).replace(microsecond=0)
+        over = member.withdrawal is not None and member.withdrawal.over
         active = [FailsafeView(failsafe=a.failsafe, response=a.response, message=a.message) for a in member.failsafes]
         return {
             "withdrawn": "" if member.withdrawal is None else member.withdrawal.why,
@@ -142,8 +146,15 @@ class VehicleViews:
             "recovery_point": None if recovery is None else recovery.point,
             "return_needs_s": None if needs_s is None or not math.isfinite(needs_s) else round(needs_s),
             "turn_back_at": turn_back_at,
+            "turn_back_point": self._lon_lats(member.turn_back_m)[0] if member.turn_back_m is not None else None,
+            "way_home": [] if over or member.way_home_m is None else self._lon_lats(member.way_home_m),
             "failsafes": active,
         }
+
+    def _lon_lats(self, places_m: FloatArray) -> list[tuple[float, float]]:
+        """Return longitudes and latitudes of places, (n, 2) or (2,)."""
+        lats, lons = self._frame.to_geographic(*np.atleast_2d(places_m).T)
+        return [(round(float(lon), 7), round(float(lat), 7)) for lon, lat in zip(lons, lats, strict=True)]
 
     def _place(self, name: str, position: Position) -> tuple[float, float] | None:
         """Return where a vehicle is; it is shown far more often than it moves."""

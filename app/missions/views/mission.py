@@ -122,6 +122,15 @@ class VehicleView(View):
     turn_back_at: datetime | None = Field(
         default=None, description="When it has to turn back, if it goes no farther from home; null: not known"
     )
+    turn_back_point: tuple[Longitude, Latitude] | None = Field(
+        default=None,
+        description="Where on its planned legs it has to turn back at the latest, [longitude, latitude]; null: on none "
+        "of them, or not known",
+    )
+    way_home: list[tuple[Longitude, Latitude]] = Field(
+        default_factory=list,
+        description="Corners of its way home from about where it is, the last its recovery point; empty: none, or over",
+    )
     failsafes: list[FailsafeView] = Field(
         default_factory=list, description="What is wrong with it and what is done about that, the strongest first"
     )

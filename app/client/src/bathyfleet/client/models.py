@@ -2421,6 +2421,12 @@ class VehicleView(Model):
     """How long its way home takes from where it is, vehicle time; null: not known"""
     turn_back_at: datetime | None
     """When it has to turn back, if it goes no farther from home; null: not known"""
+    turn_back_point: tuple[float, float] | None
+    """Where on its planned legs it has to turn back at the latest, [longitude, latitude]; null: on none of them, or
+    not known
+    """
+    way_home: list[tuple[float, float]]
+    """Corners of its way home from about where it is, the last its recovery point; empty: none, or over"""
     failsafes: list[FailsafeView]
     """What is wrong with it and what is done about that, the strongest first"""
     battery: BatteryState | None

@@ -7141,6 +7141,22 @@ export interface components {
              */
             turn_back_at: string | null;
             /**
+             * Turn Back Point
+             * @description Where on its planned legs it has to turn back at the latest, [longitude, latitude]; null: on none of them, or not known
+             */
+            turn_back_point: [
+                number,
+                number
+            ] | null;
+            /**
+             * Way Home
+             * @description Corners of its way home from about where it is, the last its recovery point; empty: none, or over
+             */
+            way_home: [
+                number,
+                number
+            ][];
+            /**
              * Failsafes
              * @description What is wrong with it and what is done about that, the strongest first
              */

@@ -353,6 +353,10 @@ export class Chart {
     this.#show({ routes });
   }
 
+  setWaysHome(waysHome: readonly Track[]): void {
+    this.#show({ waysHome });
+  }
+
   /** How far each vehicle's messages reach. */
   setRanges(ranges: LivelyContent["ranges"]): void {
     this.#show({ ranges });

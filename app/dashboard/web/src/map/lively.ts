@@ -25,6 +25,7 @@ export interface LivelyContent {
   tails: readonly Track[];
   swaths: readonly SwathLine[];
   routes: readonly Route[];
+  waysHome: readonly Track[];
   targets: readonly TargetMark[];
   ships: readonly ShipMark[];
   /** What the pointer is at: of a ship there its words are shown. */
@@ -52,6 +53,7 @@ export const NOTHING: LivelyContent = {
   tails: [],
   swaths: [],
   routes: [],
+  waysHome: [],
   targets: [],
   ships: [],
   pointed: null,
@@ -70,8 +72,21 @@ export function paintLively(
   sides: Sides,
   paper: Paper,
 ): void {
-  const { draft, ranges, tails, swaths, routes, targets, ships, pointed, marks, spots, measure, sketch } =
-    content;
+  const {
+    draft,
+    ranges,
+    tails,
+    swaths,
+    routes,
+    waysHome,
+    targets,
+    ships,
+    pointed,
+    marks,
+    spots,
+    measure,
+    sketch,
+  } = content;
   context.lineJoin = context.lineCap = "round";
   for (const ring of draft.area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
@@ -92,6 +107,7 @@ export function paintLively(
     line(context, at, ends, { colour: paper.casing, width: 7, opacity: 0.65 * opacity });
     line(context, at, ends, { colour, width: 3.5, opacity });
   }
+  for (const { points, colour } of waysHome) line(context, at, points, { colour, width: 1.5, dash: [1, 5] });
   for (const { points, colour, acknowledged, arrivalRadius_m } of routes) {
     const to = points.at(-1);
     if (to) line(context, at, circle(to, arrivalRadius_m), { colour, width: 1.5, opacity: 0.8 });

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { recoveryMarks } from "./recovery";
+import { recoveryMarks, wayHome } from "./recovery";
 
 const point = [-8.7, 41.2] as const;
 const own = [-8.6, 41.1] as const;
@@ -11,4 +11,12 @@ it("the mission's recovery point and a vehicle's own are marked with their radiu
     { words: "Recovery of sim-2", sign: "home", at: own, radius_m: 40 },
   ]);
   expect(recoveryMarks({ recovery: null, vehicles }, 25).map(({ radius_m }) => radius_m)).toEqual([25]);
+});
+
+it("a way home begins where the vehicle is, and one that left, is there or was never heard has none", () => {
+  const out = { active: true, lon_deg: -8.65, lat_deg: 41.15, way_home: [own, point] };
+  expect(wayHome(out, "red")).toEqual([{ points: [[-8.65, 41.15], own, point], colour: "red" }]);
+  for (const change of [{ active: false }, { lon_deg: null }, { way_home: [] }]) {
+    expect(wayHome({ ...out, ...change }, "red")).toEqual([]);
+  }
 });

@@ -1,7 +1,7 @@
 /** Where vehicles come home to, as places on the map. Pure. */
 
 import { say } from "../words/say";
-import type { PlaceMark } from "./marks";
+import type { PlaceMark, Track } from "./marks";
 
 type At = readonly [number, number];
 
@@ -24,4 +24,17 @@ export function recoveryMarks({ recovery, vehicles }: Homes, usual_m: number): P
       own ? [mark(say("recovery.recoveryOf", { name }), own)] : [],
     ),
   ];
+}
+
+interface Homeward {
+  active: boolean;
+  lon_deg: number | null;
+  lat_deg: number | null;
+  way_home: readonly At[];
+}
+
+/** A vehicle's way home as a line from where it is; nothing where there is none, or it is there. */
+export function wayHome({ active, lon_deg, lat_deg, way_home }: Homeward, colour: string): Track[] {
+  if (!active || lon_deg === null || lat_deg === null || way_home.length === 0) return [];
+  return [{ points: [[lon_deg, lat_deg], ...way_home.map(([lng, lat]): At => [lng, lat])], colour }];
 }

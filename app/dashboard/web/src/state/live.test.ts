@@ -47,6 +47,8 @@ const vehicle = (
   recovery_point: null,
   return_needs_s: null,
   turn_back_at: null,
+  turn_back_point: null,
+  way_home: [],
   failsafes: [],
 });
 

@@ -13,7 +13,7 @@ import type { PlaceMark, Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
 import { lookupTable } from "../map/palette";
 import type { Look } from "../map/paper";
-import { recoveryMarks } from "../map/recovery";
+import { recoveryMarks, wayHome } from "../map/recovery";
 import { gridPlace, type SeaFloor } from "../map/seafloor";
 import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
@@ -68,7 +68,7 @@ import {
 } from "../state/store";
 import { tilesAddress } from "../state/tiles";
 import { say } from "../words/say";
-import { VehicleMark, WaypointMark } from "./marks";
+import { TurnBackMark, VehicleMark, WaypointMark } from "./marks";
 import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./room";
 
 /** For measurements: when something was shown for the first time. */
@@ -115,6 +115,9 @@ export function follow(chart: Chart): () => void {
     followTracks(chart),
     effect(() => {
       chart.setRoutes(replayStep.value === null ? routes() : []);
+      chart.setWaysHome(
+        replayStep.value === null ? vehicles.value.flatMap(({ view: v, colour }) => wayHome(v, colour)) : [],
+      );
       chart.setPins(replayStep.value === null ? pins() : pastPins());
     }),
     effect(() => {
@@ -395,10 +398,17 @@ function waypointPin(waypoint: WaypointView, colour: string): Pin {
   };
 }
 
+function turnBackPin({ view: { name, active, turn_back_point: at }, colour }: Vehicle): Pin[] {
+  if (!active || at === null) return [];
+  const draw = (element: HTMLElement) => render(<TurnBackMark name={name} colour={colour} />, element);
+  return [{ key: `turn-back ${name}`, at, layerIndex: 1, draw }];
+}
+
 function pins(): Pin[] {
   return vehicles.value.flatMap((vehicle) => {
     const { view: v, waypoint, colour } = vehicle;
     const made: Pin[] = waypoint && v.active ? [waypointPin(waypoint, colour)] : [];
+    made.push(...turnBackPin(vehicle));
     if (v.lon_deg !== null && v.lat_deg !== null) {
       made.push({
         key: `vehicle ${v.name}`,

@@ -160,6 +160,24 @@ function shape(status: WaypointStatus, colour: string) {
   }
 }
 
+/** Where a vehicle has to turn back at the latest. */
+export function TurnBackMark({ name, colour }: { name: string; colour: string }) {
+  const words = say("marks.turnBack", { name });
+  return (
+    <div
+      class="turn-back-mark"
+      data-testid={`turn-back-mark-${name}`}
+      role="img"
+      aria-label={words}
+      title={words}
+    >
+      <span aria-hidden="true" style={{ color: colour }}>
+        ↩
+      </span>
+    </div>
+  );
+}
+
 export function WaypointMark({ waypoint, colour }: { waypoint: WaypointView; colour: string }) {
   const words = say("marks.waypointOf", {
     step: waypoint.step,

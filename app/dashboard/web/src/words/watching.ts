@@ -302,4 +302,8 @@ export const WATCHING = {
     en: "{label} {last} now, {first} at first, between {least} and {most}",
     pt: "{label} {last} agora, {first} no início, entre {least} e {most}",
   },
+  "marks.turnBack": {
+    en: "{name} has to turn back here at the latest",
+    pt: "{name} tem de voltar para trás aqui, o mais tardar",
+  },
 } as const;
