@@ -96,6 +96,7 @@ const NO_WORDS = new Set([
   "ui/MapMenu.tsx: Escape",
   "ui/follow.tsx: waypoint",
   "ui/follow.tsx: vehicle",
+  "ui/follow.tsx: turn-back",
   "state/attention.ts: alarm",
   "state/attention.ts: mission",
   "state/attention.ts: vehicle",
