@@ -32,7 +32,7 @@ STEP_DEADLINE_S = 86_400.0
 WIDEST_BORDER = 0.25
 """Part of a small area's side that is left free at each border at most."""
 EVENT = "neptus"
-ENOUGH_RATIOS = 5
+ENOUGH_RATIOS, MOST_RATIOS = 5, 15
 """Steps whose samples are compared with the vehicle's own altitude."""
 FLYING = (MissionState.RUNNING, MissionState.PAUSED)
 
@@ -70,6 +70,8 @@ class NeptusSessions:
         self._users: dict[str, str] = {}
         self._warned: set[str] = set()
         self._ratios: dict[str, list[float]] = {}
+        self._slanted: set[str] = set()
+        """Whose samples were warned of."""
         self.link = NeptusFleetLink(settings, self)
 
     async def log_in(self, user: str, password: str, host: str, *, own_user: bool) -> str | None:
@@ -192,10 +194,11 @@ class NeptusSessions:
         for index, ratio in enumerate(data.altitude_ratios):
             name = vehicle_name(data.session, index)
             ratios = self._ratios.setdefault(name, [])
-            if ratio is None or len(ratios) >= ENOUGH_RATIOS:
+            if ratio is None or len(ratios) >= MOST_RATIOS or name in self._slanted:
                 continue
             ratios.append(ratio)
-            if len(ratios) == ENOUGH_RATIOS and looks_slanted(median(ratios)):
+            if len(ratios) >= ENOUGH_RATIOS and looks_slanted(median(ratios)):
+                self._slanted.add(name)
                 await self._log(
                     data.session,
                     Level.WARNING,

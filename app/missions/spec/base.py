@@ -2,9 +2,12 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, field_validator
 from shapely.geometry import Polygon
 from shapely.validation import explain_validity
+
+from app.arrays import FloatArray
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
 Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
@@ -27,6 +30,12 @@ def _is_no_longer_than_taken(ring: object) -> object:
 
 # Looked at before its positions are, and no further than to the first that is wrong.
 Ring = Annotated[list[tuple[Longitude, Latitude]], FailFast(), BeforeValidator(_is_no_longer_than_taken)]
+
+
+def cell_count(size_m: FloatArray, cell_m: float) -> float:
+    """Return how many cells cover a rectangle (east, north); infinite for cells that are too small to be counted."""
+    with np.errstate(over="ignore"):
+        return float(np.prod(np.ceil(size_m / cell_m)))
 
 
 class PolygonGeometry(Model):

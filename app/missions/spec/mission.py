@@ -20,7 +20,7 @@ from app.exploration.planner.options import PlannerOptions
 from app.mapping.georeference import LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
 from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
-from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry
+from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.recovery import Recovery
@@ -561,7 +561,7 @@ class MissionSpec(Model):
                     "in it"
                 )
         size = self.local_area().max(axis=0)
-        cells = float(np.prod(np.ceil(size / self.cell_m)))
+        cells = cell_count(size, self.cell_m)
         if cells > MAX_SEARCH_CELLS:
             raise ValueError(
                 f"the site has {cells:.0f} cells of {self.cell_m} m, at most {MAX_SEARCH_CELLS} are searched: make "
@@ -579,7 +579,7 @@ class MissionSpec(Model):
     def _area_is_of_a_sensible_size(self) -> Self:
         area = self.local_area()
         size = area.max(axis=0) - area.min(axis=0)
-        cells = float(np.prod(np.ceil(size / self.cell_m)))
+        cells = cell_count(size, self.cell_m)
         if min(size) < 2 * self.cell_m:
             raise ValueError(
                 f"the area is {size[0]:.1f} m x {size[1]:.1f} m, less than two cells of {self.cell_m} m: "

@@ -9,7 +9,7 @@ from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
-from app.missions.spec.base import Model, PolygonGeometry
+from app.missions.spec.base import Model, PolygonGeometry, cell_count
 
 MAX_SITE_CELLS = 4_000_000
 """Of a site's grid: several surveys are taken together in memory."""
@@ -41,7 +41,7 @@ class SiteSpec(Model):
     @model_validator(mode="after")
     def _area_is_of_a_sensible_size(self) -> "SiteSpec":
         size = self.local_area().max(axis=0)
-        cells = float(np.prod(np.ceil(size / self.cell_m)))
+        cells = cell_count(size, self.cell_m)
         if min(size) < 2 * self.cell_m:
             raise ValueError(
                 f"the area is {size[0]:.1f} m x {size[1]:.1f} m, less than two cells of {self.cell_m} m: "
