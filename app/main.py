@@ -51,6 +51,7 @@ from app.api.auth import console_log_in
 from app.api.bodies import BodyMiddleware
 from app.api.budget import Budget
 from app.api.connections import Sockets, is_shared_host, patient_http
+from app.api.direct import DirectRoutes
 from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
 from app.api.health import health_router
 from app.api.intake import Intakes
@@ -206,6 +207,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
 
 def _add_middleware(app: FastAPI, settings: Settings, limits: RequestLimits) -> None:
     """Add what requests pass through, from the inside out."""
+    app.add_middleware(DirectRoutes, routers=ROUTERS)
     app.add_middleware(ForwardingMiddleware)
     app.add_middleware(
         BodyMiddleware,

@@ -15,6 +15,7 @@ from starlette.types import Scope
 
 from app.api.auth import RoleCheck
 from app.api.problems import ProblemError
+from app.api.route_index import RouteIndex
 from app.api.state import EdgeState
 from app.api.tokens import Principal
 
@@ -81,23 +82,20 @@ class Intakes:
     """Finds the route of a request that may change something."""
 
     def __init__(self, routers: Iterable[APIRouter]) -> None:
-        self._by_method: dict[str, list[Intake]] = {}
-        for router in routers:
-            for route in router.routes:
-                if isinstance(route, APIRoute):
-                    intake = Intake(route, _role(route), _kind(route))
-                    for method in route.methods or ():
-                        self._by_method.setdefault(method, []).append(intake)
+        self._index = RouteIndex(
+            (route, Intake(route, _role(route), _kind(route)))
+            for router in routers
+            for route in router.routes
+            if isinstance(route, APIRoute)
+        )
 
     def find(self, scope: Scope) -> Intake | None:
         """Return a request's intake, and note its route and mission with the request; None: there is none."""
-        for intake in self._by_method.get(scope["method"], ()):
-            found = intake.route.path_regex.match(scope["path"])
-            if found:
-                scope["route"] = intake.route
-                scope["path_params"] = found.groupdict()
-                return intake
-        return None
+        found = self._index.find(scope["method"], scope["path"])
+        if found is None:
+            return None
+        scope["route"], scope["path_params"], intake = found
+        return intake
 
 
 def has_body(headers: Headers) -> bool:

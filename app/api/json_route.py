@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from json import JSONDecodeError
 from typing import Any
 
@@ -35,16 +36,16 @@ class JsonRoute(APIRoute):
     What a model's attribute ``json_bounds`` says counts for its bodies in place of the usual :class:`Bounds`.
     """
 
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return what answers a request."""
-        handle = super().get_route_handler()
+    @cached_property
+    def check(self) -> Callable[[bytes, Scope], Coroutine[Any, Any, tuple[Any, Problem | None]]] | None:
+        """What makes a body the endpoint's value, or says what is wrong with it; None: the route takes no body."""
         if self.body_field is None:
-            return handle
+            return None
         field = self.body_field
         model = field.field_info.annotation
         bounds: Bounds = getattr(model, "json_bounds", Bounds())
 
-        def check(body: bytes, scope: Scope) -> tuple[Any, Problem | None]:
+        def checked(body: bytes, scope: Scope) -> tuple[Any, Problem | None]:
             if excess := bounds.excess(body):
                 return None, _too_much(excess, scope)
             try:
@@ -58,21 +59,31 @@ class JsonRoute(APIRoute):
                     return None, invalid([_unstorable(path, text)], 1, scope)
             if parsed is None:
                 return None, None
-            checked, errors = field.validate(parsed, {}, loc=("body",))
-            return checked, validation_problem(errors, model, scope) if errors else None
+            value, errors = field.validate(parsed, {}, loc=("body",))
+            return value, validation_problem(errors, model, scope) if errors else None
+
+        async def check(body: bytes, scope: Scope) -> tuple[Any, Problem | None]:
+            if len(body) <= IN_THREAD_BYTES:
+                return checked(body, scope)
+            return await asyncio.get_running_loop().run_in_executor(_reader, checked, body, scope)
+
+        return check
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return what answers a request."""
+        handle = super().get_route_handler()
+        if self.check is None:
+            return handle
+        check = self.check
 
         async def read_first(request: Request) -> Response:
             body = await request.body()
             if not body:
                 return await handle(request)
-            if len(body) <= IN_THREAD_BYTES:
-                checked, problem = check(body, request.scope)
-            else:
-                loop = asyncio.get_running_loop()
-                checked, problem = await loop.run_in_executor(_reader, check, body, request.scope)
+            value, problem = await check(body, request.scope)
             if problem is not None:
                 return problem_response(problem)
-            return await handle(_Checked(request, checked))
+            return await handle(_Checked(request, value))
 
         return read_first
 

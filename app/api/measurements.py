@@ -114,6 +114,8 @@ async def get_waypoint(
     """Wait for the vehicle's next waypoint (long poll). Fetching a waypoint acknowledges it."""
     check_vehicle(vehicle, name)
     found: WaypointView | None = None
+    if timeout_s == 0.0 and not state.stopping.is_set():
+        return _answer(await waypoint(mission, name, after_step=after_step))
 
     async def fetch() -> None:
         nonlocal found
@@ -128,6 +130,10 @@ async def get_waypoint(
         raise ProblemError(
             "not-ready", "the service is shutting down", remedy="Ask again", headers={"Retry-After": "2"}
         )
+    return _answer(found)
+
+
+def _answer(found: WaypointView | None) -> Response:
     if found is None:
         return Response(status_code=204)
     return Response(found.model_dump_json(), media_type="application/json")

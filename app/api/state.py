@@ -2,10 +2,10 @@
 
 import asyncio
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
@@ -94,6 +94,9 @@ async def _state(connection: HTTPConnection) -> EdgeState:
 async def _service(connection: HTTPConnection) -> MissionService:
     return edge_state(connection).service
 
+
+AT_HAND: dict[Callable[..., Any], Callable[[EdgeState], Any]] = {_state: lambda edge: edge, _service: lambda edge: edge.service}
+"""What the dependencies return, for whoever has the state already."""
 
 State = Annotated[EdgeState, Depends(_state)]
 Service = Annotated[MissionService, Depends(_service)]
