@@ -18,7 +18,7 @@ from fastapi.routing import APIRoute
 from pydantic import TypeAdapter
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.auth import RoleCheck
 from app.api.bodies import replayed
@@ -190,10 +190,10 @@ class DirectRoutes:
         found = None
         if scope["type"] == "http" and not scope.get("root_path"):
             found = self._index.find(scope["method"], scope["path"])
-        if found is None or found[2] is None or scope["app"].dependency_overrides:
+        route, parameters, plan = found or (None, {}, None)
+        if route is None or plan is None or scope["app"].dependency_overrides:
             await self.app(scope, receive, send)
             return
-        route, parameters, plan = found
         body = None
         request = Request(scope, receive, send)
         scope.update(route=route, endpoint=route.endpoint, path_params=parameters)
@@ -213,7 +213,24 @@ class DirectRoutes:
             return
         except Exception as error:
             response = _explained(error, request)
-        await response(scope, receive, send)
+        await _send(response, request, receive, send)
+
+
+async def _send(response: Response, request: Request, receive: Receive, send: Send) -> None:
+    """Answer; what a response finds wrong before its first byte is an answer of its own."""
+    began = False
+
+    async def send_on(message: Message) -> None:
+        nonlocal began
+        began = True
+        await send(message)
+
+    try:
+        await response(request.scope, receive, send_on)
+    except Exception as error:
+        if began:
+            raise
+        await _explained(error, request)(request.scope, receive, send)
 
 
 def plan_of(route: APIRoute) -> _Plan | None:

@@ -176,6 +176,8 @@ def compare(options: argparse.Namespace) -> dict[str, Any]:
     settings = {"log_level": options.log, "time_scale": "1", "max_requests_per_s": "0"}
     with running_service(before=other, **settings) as before, running_service(**settings) as present:
         asked = {name: (service, begun(service, options)) for name, service in (("before", before), ("now", present))}
+        for service, requests in asked.values():
+            measure(service, requests, options, options.rate)  # what a first start compiles counts for neither
         for _ in range(options.rounds):
             for name, (service, requests) in asked.items():
                 found[name].append(measure(service, requests, options, options.rate))
