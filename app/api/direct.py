@@ -5,6 +5,7 @@ two stacks for what may have to be closed: several times the work of most answer
 Only what is in order is answered here. Whatever cannot be read goes the framework's way, which says what is wrong.
 """
 
+import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -15,10 +16,9 @@ from fastapi.dependencies.models import Dependant
 from fastapi.dependencies.utils import request_params_to_args
 from fastapi.routing import APIRoute
 from pydantic import TypeAdapter
-from starlette._utils import is_async_callable
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.auth import RoleCheck
 from app.api.bodies import replayed
@@ -59,7 +59,7 @@ class _Plan:
             raise ValueError("the route has ways of its own")
         if not isinstance(route.response_class, DefaultPlaceholder) and route.response_model is not None:
             raise ValueError("the route makes answers of a class of its own")
-        if route.is_json_stream or route.is_sse_stream or route.max_body_size is not None or _picks_fields(route):
+        if any(getattr(route, name, None) for name in _WAYS_OF_ITS_OWN) or not route.response_model_by_alias:
             raise ValueError("the route's answers are made in a way of its own")
         self.steps: list[_Step] = []
         self._numbers: dict[Any, int] = {}
@@ -75,7 +75,7 @@ class _Plan:
         call = dependant.call
         if call in self._numbers:
             return self._numbers[call]
-        if call is None or not is_async_callable(call):
+        if call is None or not _is_coroutine(call):
             raise ValueError("it is called in a way of its own")
         if dependant.cookie_params or dependant.background_tasks_param_name or dependant.security_scopes_param_name:
             raise ValueError("it takes what is not read here")
@@ -144,15 +144,15 @@ class _Plan:
 _JSON = "application/json"
 
 
-def _picks_fields(route: APIRoute) -> bool:
-    return bool(
-        route.response_model_include
-        or route.response_model_exclude
-        or route.response_model_exclude_unset
-        or route.response_model_exclude_defaults
-        or route.response_model_exclude_none
-        or not route.response_model_by_alias
-    )
+_WAYS_OF_ITS_OWN = (
+    *("is_json_stream", "is_sse_stream", "max_body_size", "response_model_include", "response_model_exclude"),
+    *("response_model_exclude_unset", "response_model_exclude_defaults", "response_model_exclude_none"),
+)
+"""What a route may ask of the framework that is not done here; older frameworks do not know all of it."""
+
+
+def _is_coroutine(call: Callable[..., Any]) -> bool:
+    return inspect.iscoroutinefunction(call) or inspect.iscoroutinefunction(getattr(call, "__call__", None))  # noqa: B004
 
 
 def _empty() -> Response:
@@ -182,7 +182,7 @@ class DirectRoutes:
     def __init__(self, app: ASGIApp, routers: Iterable[APIRouter]) -> None:
         self.app = app
         self._index = RouteIndex(
-            (route, _plan(route)) for router in routers for route in router.routes if isinstance(route, APIRoute)
+            (route, plan_of(route)) for router in routers for route in router.routes if isinstance(route, APIRoute)
         )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -190,13 +190,13 @@ class DirectRoutes:
         found = None
         if scope["type"] == "http" and not scope.get("root_path"):
             found = self._index.find(scope["method"], scope["path"])
-        if found is None or found[2] is None or scope["app"].dependency_overrides:
+        route, parameters, plan = found or (None, {}, None)
+        if route is None or plan is None or scope["app"].dependency_overrides:
             await self.app(scope, receive, send)
             return
-        route, parameters, plan = found
         body = None
         request = Request(scope, receive, send)
-        request.scope |= {"route": route, "endpoint": route.endpoint, "path_params": parameters}
+        scope.update(route=route, endpoint=route.endpoint, path_params=parameters)
         try:
             content = None
             if plan.check is not None:
@@ -206,17 +206,35 @@ class DirectRoutes:
                     await problem_response(problem)(scope, receive, send)
                     return
                 if content is None:
-                    raise _NotInOrderError  # noqa: TRY301 - as when anything else cannot be read
+                    raise _NotInOrderError
             response = await plan.answer(request, content)
         except _NotInOrderError:
             await self.app(scope, receive if body is None else replayed(body, receive), send)
             return
         except Exception as error:
             response = _explained(error, request)
-        await response(scope, receive, send)
+        await _send(response, request, receive, send)
 
 
-def _plan(route: APIRoute) -> _Plan | None:
+async def _send(response: Response, request: Request, receive: Receive, send: Send) -> None:
+    """Answer; what a response finds wrong before its first byte is an answer of its own."""
+    began = False
+
+    async def send_on(message: Message) -> None:
+        nonlocal began
+        began = True
+        await send(message)
+
+    try:
+        await response(request.scope, receive, send_on)
+    except Exception as error:
+        if began:
+            raise
+        await _explained(error, request)(request.scope, receive, send)
+
+
+def plan_of(route: APIRoute) -> _Plan | None:
+    """Return how a route is answered; None: in the framework's way."""
     try:
         return _Plan(route)
     except ValueError:

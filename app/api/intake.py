@@ -89,6 +89,10 @@ class Intakes:
             if isinstance(route, APIRoute)
         )
 
+    def of(self, method: str) -> list[Intake]:
+        """Return the intakes of a method's routes."""
+        return self._index.of(method)
+
     def find(self, scope: Scope) -> Intake | None:
         """Return a request's intake, and note its route and mission with the request; None: there is none."""
         found = self._index.find(scope["method"], scope["path"])

@@ -40,6 +40,10 @@ class RouteIndex(Generic[T]):
         of_length = self._shapes.setdefault((method, len(parts)), {})
         of_length.setdefault(fixed, {}).setdefault(words, []).append(number)
 
+    def of(self, method: str) -> list[T]:
+        """Return what belongs to the routes of a method, in their order."""
+        return [belonging for route, belonging in self._entries if method in (route.methods or ())]
+
     def find(self, method: str, path: str) -> tuple[APIRoute, dict[str, str], T] | None:
         """Return the route that answers, its parameters as texts, and what belongs to it; None: there is none."""
         parts = path.split("/")

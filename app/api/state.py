@@ -95,7 +95,10 @@ async def _service(connection: HTTPConnection) -> MissionService:
     return edge_state(connection).service
 
 
-AT_HAND: dict[Callable[..., Any], Callable[[EdgeState], Any]] = {_state: lambda edge: edge, _service: lambda edge: edge.service}
+AT_HAND: dict[Callable[..., Any], Callable[[EdgeState], Any]] = {
+    _state: lambda edge: edge,
+    _service: lambda edge: edge.service,
+}
 """What the dependencies return, for whoever has the state already."""
 
 State = Annotated[EdgeState, Depends(_state)]

@@ -3,7 +3,8 @@
 The real service runs in a process of its own on a new SQLite file, ten vehicles that speak REST in a running mission.
 One lean client (raw sockets, requests made ahead, answers looked at for status and length only) sends a mix over kept
 connections at times that do not depend on the answers: a request that had to wait for a free connection is counted from
-when it was due. ``--rate 0`` asks for as much as the service can do. Printed is one JSON object.
+when it was due. ``--rate 0`` asks for as much as the service can do. ``--before TREE`` compares with
+the program of another work tree, each measured in turn in one run. Printed is one JSON object.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import sys
 import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import psutil
@@ -167,6 +169,40 @@ def measure(service: Service, requests: Requests, options: argparse.Namespace, r
     )
 
 
+def compare(options: argparse.Namespace) -> dict[str, Any]:
+    """Measure another tree's service and this one's in turn, several times: what else runs here changes meanwhile."""
+    found: dict[str, list[dict[str, Any]]] = {"before": [], "now": []}
+    other = f"import sys; sys.path.insert(0, {str(options.before.resolve())!r})"
+    settings = {"log_level": options.log, "time_scale": "1", "max_requests_per_s": "0"}
+    with running_service(before=other, **settings) as before, running_service(**settings) as present:
+        asked = {name: (service, begun(service, options)) for name, service in (("before", before), ("now", present))}
+        for service, requests in asked.values():
+            measure(service, requests, options, options.rate)  # what a first start compiles counts for neither
+        for _ in range(options.rounds):
+            for name, (service, requests) in asked.items():
+                found[name].append(measure(service, requests, options, options.rate))
+    shown: dict[str, Any] = {
+        name: {
+            "requests_per_core_second": [one["requests_per_core_second"] for one in rounds],
+            "requests_per_s": [one["requests_per_s"] for one in rounds],
+            "p50_ms": [one["p50_ms"] for one in rounds],
+            "errors": sum(one["errors"] for one in rounds),
+        }
+        for name, rounds in found.items()
+    }
+    medians = {name: statistics.median(shown[name]["requests_per_core_second"]) for name in shown}
+    errors = sum(shown[name]["errors"] for name in found)
+    return shown | {"times_as_many": round(medians["now"] / medians["before"], 2), "errors": errors}
+
+
+def begun(service: Service, options: argparse.Namespace) -> Requests:
+    """Begin a mission of vehicles that speak REST."""
+    mission = create_mission(service, VEHICLES, cell_m=2.0)
+    begin(service, mission, VEHICLES)
+    token = "" if options.open else service.make_token("benchmark", "operator")
+    return Requests(service, mission, token)
+
+
 def main() -> None:
     """Run and print."""
     parser = make_parser(__doc__, LOAD)
@@ -175,12 +211,16 @@ def main() -> None:
     parser.add_argument("--connections", type=int, default=16)
     parser.add_argument("--open", action="store_true", help="without access tokens")
     parser.add_argument("--log", default="info", help="the service's log level")
+    parser.add_argument("--before", type=Path, metavar="TREE", help="compare with the program in another work tree")
+    parser.add_argument("--rounds", type=int, default=3, help="of a comparison")
     options = parser.parse_args()
-    with running_service(log_level=options.log, time_scale="1") as service:
-        mission = create_mission(service, VEHICLES, cell_m=2.0)
-        begin(service, mission, VEHICLES)
-        token = "" if options.open else service.make_token("benchmark", "operator")
-        result = measure(service, Requests(service, mission, token), options, options.rate)
+    if options.before:
+        result = compare(options)
+        print(json.dumps(result))
+        write_section(options.write, LOAD, "REST requests, before and now", result, hidden={options.before: "BEFORE"})
+        sys.exit(1 if result["errors"] else 0)
+    with running_service(log_level=options.log, time_scale="1", max_requests_per_s="0") as service:
+        result = measure(service, begun(service, options), options, options.rate)
     print(json.dumps(result))
     asked = f"{options.rate:g} REST requests/s" if options.rate else "As many REST requests as are answered"
     write_section(options.write, LOAD, f"{asked}, mixed", result)

@@ -130,7 +130,7 @@ def test_every_route_that_may_change_something_says_who_may_and_what_it_takes() 
     middleware = next(m for m in app.user_middleware if m.cls is bodies.BodyMiddleware)
     intakes = middleware.kwargs["intakes"]
     assert isinstance(intakes, Intakes)
-    found = [one for method in ("POST", "PUT", "PATCH", "DELETE") for one in intakes._by_method.get(method, ())]
+    found = [one for method in ("POST", "PUT", "PATCH", "DELETE") for one in intakes.of(method)]
     assert len(found) >= 20
     for one in found:
         assert one.role is not None, one.route.path
