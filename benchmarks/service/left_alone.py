@@ -18,7 +18,8 @@ from typing import Any
 
 from benchmarks.common.report import make_parser, write_section
 from benchmarks.service.faults import PAGE
-from tests.support.faults.left_alone import NAMES, left_alone
+from tests.support.faults.left_alone import left_alone
+from tests.support.faults.sea import NAMES
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
