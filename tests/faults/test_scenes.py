@@ -9,6 +9,7 @@ import pytest
 from tests.support.faults.cut import can_be_made
 from tests.support.faults.disks import Disk, Ration, small_disk
 from tests.support.faults.imc_scenes import bad_radio, cut_in_two, lied_to_over_imc, two_services, vanished
+from tests.support.faults.left_alone import left_alone
 from tests.support.faults.scenes import aborted_without_a_disk, clock_jumps, disk_full, lied_to, locked
 
 pytestmark = pytest.mark.skipif("BATHYFLEET_FAULTS" not in os.environ, reason="set BATHYFLEET_FAULTS to play them all")
@@ -60,6 +61,12 @@ async def test_what_a_lying_vehicle_says_moves_nobody_out_of_the_area(tmp_path: 
 
 async def test_neither_of_two_services_takes_the_others_vehicle(tmp_path: Path) -> None:
     await two_services(tmp_path, steps=4, speed=SPEED)
+
+
+async def test_vehicles_that_are_left_alone_come_home(tmp_path: Path) -> None:
+    found = await left_alone(tmp_path, seed=1, speed=SPEED, timeout_s=60.0)
+    assert found["home"] == 2, found
+    assert (found["zones_entered"], found["collided"]) == (0, 0), found
 
 
 @pytest.mark.skipif(not can_be_made(), reason="network namespaces need root and the program ip")

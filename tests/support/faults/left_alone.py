@@ -1,0 +1,145 @@
+"""The service is killed while DUNE vehicles survey and nobody starts it again: they have to come home by themselves."""
+
+import asyncio
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely.geometry import LineString, Polygon, box
+
+from simulator import seafloors
+from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.dune.node import FakeDune
+from tests.support.faults.missions import FRAME, mission_of, started, steps_more
+from tests.support.faults.sea import IDS, LIMITS, NAMES, OURS, imc_vehicles
+from tests.support.faults.service import Service, service_in
+from tests.support.ports import free_ports
+from tests.support.waiting import until
+
+FLOOR_M = 300.0
+AREA = box(40.0, 80.0, 240.0, 260.0)
+ZONE = box(110.0, 140.0, 170.0, 200.0)
+HOME_M = (150.0, 30.0)
+"""The recovery point, outside the area."""
+NEAR_M = 25.0
+TOUCH_M = 2.5
+"""Vehicles of which the centres are closer than one is long touch each other."""
+AFLOAT_M = 0.3
+"""At most this deep a vehicle is at the surface."""
+START_M = ((100.0, 90.0, 0.0), (180.0, 90.0, 0.0))
+PATIENCE_S = 3600.0
+"""Whoever is not home this long after the kill does not come, seconds of the vehicles' time."""
+
+
+async def left_alone(
+    folder: Path, *, seed: int, speed: float, timeout_s: float, current_mps: float = 0.0
+) -> dict[str, Any]:
+    """Kill the service at a moment drawn by ``seed``; what became of both vehicles, watched where they truly are.
+
+    Parameters
+    ----------
+    speed
+        Vehicle seconds per second of the wall clock.
+    timeout_s
+        After so long without a console ``LostComms`` starts the plan, vehicle seconds.
+    current_mps
+        Speed of the current; where it sets to is drawn.
+    """
+    rng = np.random.default_rng(seed)
+    steps, further_s, towards = int(rng.integers(3, 16)), float(rng.uniform(0, 30)), float(rng.uniform(0, 2 * math.pi))
+    *announce_ports, port, base = free_ports(24)[:7]
+    floor = seafloors.generate(
+        "harbour", seed, width_m=FLOOR_M, height_m=FLOOR_M, origin=(FRAME.origin_lat_deg, FRAME.origin_lon_deg)
+    )
+    specs = default_specs(len(NAMES), floor, names=NAMES, ids=IDS, starts=START_M, base_port=base)
+    options = DuneOptions(announce_ports=tuple(announce_ports), lost_comms_s=timeout_s)
+    current = (current_mps * math.sin(towards), current_mps * math.cos(towards))
+    settings = {
+        "IMC__ENABLED": "true",
+        "IMC__LOOPBACK_ONLY": "true",
+        "IMC__ANNOUNCE_PORTS": json.dumps(announce_ports),
+        "IMC__PORT": str(port),
+        "IMC__ID": str(OURS),
+        "TIME_SCALE": f"{speed:g}",
+    }
+    async with (
+        DuneFleet(floor, specs, speed=speed, current=current, options=options, seed=seed) as fleet,
+        service_in(folder, settings=settings) as (service, api),
+    ):
+
+        async def ready() -> bool:
+            vehicles = (await api.get("/vehicles")).json()
+            return {v["name"] for v in vehicles if v["link"] == "ready"} >= set(NAMES)
+
+        await until(ready, "both are ready")
+        mission_id = await started(api, _mission())
+        await steps_more(service, mission_id, steps)
+        await asyncio.sleep(further_s / speed)
+        return {"seed": seed, "steps": steps} | await _killed(service, fleet)
+
+
+async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
+    """Kill the service, and watch until all are home or patience ends."""
+    kept = sum("lostcomms" in node.database.plans for node in fleet.nodes)
+    await service.kill()
+    begun_s, far = fleet.clock.now(), [round(_from_home_m(node), 1) for node in fleet.nodes]
+    tracks: list[list[tuple[float, float]]] = [[] for _ in fleet.nodes]
+    closest_m, arrived_s = math.inf, [math.nan] * len(fleet.nodes)
+    while fleet.clock.now() - begun_s < PATIENCE_S and any(map(math.isnan, arrived_s)):
+        places = [node.vehicle.true_position for node in fleet.nodes]
+        first, second = places
+        apart_m = math.hypot(first.horizontal_distance_m(second.east_m, second.north_m), first.depth_m - second.depth_m)
+        closest_m = min(closest_m, apart_m)
+        for number, (node, place) in enumerate(zip(fleet.nodes, places, strict=True)):
+            tracks[number].append((place.east_m, place.north_m))
+            if math.isnan(arrived_s[number]) and _home(node):
+                arrived_s[number] = fleet.clock.now() - begun_s
+        await asyncio.sleep(0.02)
+    levels = [node.vehicle.battery.level_pct for node in fleet.nodes if node.vehicle.battery is not None]
+    return {
+        "kept_on_board": kept,
+        "from_home_when_killed_m": far,
+        "home": sum(map(math.isfinite, arrived_s)),
+        "from_point_m": [round(_from_home_m(node), 1) for node in fleet.nodes],
+        "home_after_s": [round(s) if math.isfinite(s) else None for s in arrived_s],
+        "least_energy_pct": round(min(levels), 1) if levels else None,
+        "zones_entered": sum(LineString(track).intersects(ZONE) for track in tracks if len(track) > 1),
+        "closest_m": round(closest_m, 1),
+        "collided": int(closest_m < TOUCH_M),
+    }
+
+
+def _from_home_m(node: FakeDune) -> float:
+    return node.vehicle.true_position.horizontal_distance_m(*HOME_M)
+
+
+def _home(node: FakeDune) -> bool:
+    """Whether it came by its plan, is near its point, and at the surface."""
+    plan = node.plan.plan_control_state()
+    at_the_end = plan.plan_id == "lostcomms" and str(plan.man_id).endswith(" end")
+    return at_the_end and _from_home_m(node) <= NEAR_M and node.vehicle.true_position.depth_m < AFLOAT_M
+
+
+def _mission() -> dict[str, Any]:
+    return mission_of(
+        imc_vehicles(*NAMES),
+        area=_geojson(AREA),
+        keep_out=[_geojson(ZONE)],
+        recovery={"point": _lon_lat(*HOME_M), "radius_m": NEAR_M},
+        steps=500,
+        limits=LIMITS | {"max_step_m": 20.0},
+        step_deadline_s=120.0,
+        planner={"name": "lawnmower"},
+        cell_m=4.0,
+    )
+
+
+def _geojson(polygon: Polygon) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [[_lon_lat(*corner) for corner in polygon.exterior.coords]]}
+
+
+def _lon_lat(east_m: float, north_m: float) -> list[float]:
+    lat, lon = FRAME.to_geographic(east_m, north_m)
+    return [float(lon), float(lat)]
