@@ -46,6 +46,7 @@ BEYOND_THE_SCHEMA = {
     "getMap",
     "getMapOverlay",
     "getMapFile",
+    "getProfile",
     "getSoundingsFile",
     "getTracksFile",
     "getTile",

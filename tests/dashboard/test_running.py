@@ -48,7 +48,9 @@ def test_a_mission_from_the_form_to_its_abort(watched: Watched, service: Service
     expect(by_id(page, "range-low")).to_be_visible()
     expect(by_id(page, "step")).not_to_have_text("0")
     page.mouse.move(620, 430)
-    expect(by_id(page, "readout")).to_contain_text(re.compile(r"\d+\.\d\d m ± \d+\.\d\d m"))
+    # Vehicles that go anywhere come there at some time.
+    known = re.compile(r"\d+\.\d\d m ± \d+\.\d\d m")
+    expect(by_id(page, "readout")).to_contain_text(known, timeout=200_000)
     expect_colours(page)
 
     by_id(page, "pause").click()
