@@ -78,15 +78,29 @@ class FlownLine:
     begun: bool = False
 
 
+@dataclass(frozen=True)
+class Piece:
+    """A piece of a line that a vehicle was sent along.
+
+    Attributes
+    ----------
+    path : (k, 2)
+        East and north.
+    open_m : (n, 2)
+        Places across its end that nobody had seen when it was sent.
+    """
+
+    path: FloatArray
+    open_m: FloatArray
+
+
 @dataclass
 class Assignment:
     """What one vehicle is at, and the pieces of lines that it was sent along and may not have flown yet."""
 
     share: Strip | None = None
     course: FlownLine | None = None
-    expected: list[FloatArray] = field(default_factory=list)
-    ends: list[FloatArray] = field(default_factory=list)
-    """Of each piece the places (n, 2) beside its end that were open when it was sent."""
+    expected: list[Piece] = field(default_factory=list)
     refused: int = 0
     """How often in a row it was not sent where it was to go."""
     laid_on: Coverage | None = None
@@ -183,9 +197,9 @@ class SwathSurvey:
         if sweep is None:
             return
         for end in ends_m[::-1]:
-            if not sweep.expected or np.hypot(*(sweep.expected[-1][-1] - end)) > NEAR_M:
+            if not sweep.expected or np.hypot(*(sweep.expected[-1].path[-1] - end)) > NEAR_M:
                 continue
-            piece = sweep.expected.pop()
+            piece = sweep.expected.pop().path
             if sweep.course is not None and sweep.course.begun:
                 sweep.course.path = np.vstack([piece, sweep.course.path[1:]])
         sweep.refused = 0
@@ -216,11 +230,11 @@ class SwathSurvey:
         """Put a piece of a line back that a vehicle was not sent along: it does not go on from its end."""
         if not sweep.expected:
             return
-        piece = sweep.expected[-1]
+        piece = sweep.expected[-1].path
         if np.hypot(*(pose[:2] - piece[-1])) <= max(NEAR_M, float(np.hypot(*(pose[:2] - piece[0])))):
             sweep.refused = 0
             return
-        del sweep.expected[-1], sweep.ends[-1]
+        del sweep.expected[-1]
         course = sweep.course
         sweep.refused += 1
         if course is None or not course.begun:
@@ -264,8 +278,8 @@ class SwathSurvey:
             goes_m = float(ahead_m[-1]) if ahead_m[-1] <= leg_m else 0.5 * float(ahead_m[-1])
         end = np.array([np.interp(goes_m, ahead_m, vertices[:, k]) for k in (0, 1)])
         inner = (ahead_m > 0.0) & (ahead_m < goes_m - 1e-6)
-        sweep.expected.append(np.vstack([pose[:2], vertices[inner], end]))
-        sweep.ends.append(_open_beside_end(sweep.expected[-1], flying, coverage))
+        piece = np.vstack([pose[:2], vertices[inner], end])
+        sweep.expected.append(Piece(piece, _open_beside_end(piece, flying, coverage)))
         rest = vertices[ahead_m > goes_m + 1e-6]
         course.path = np.vstack([end, rest]) if len(rest) else np.zeros((0, 2))
         return end
@@ -492,7 +506,7 @@ class SwathSurvey:
         """Return what will be seen on what everybody was sent along, and on what the others' lines have left."""
         seen = np.zeros_like(raster.open)
         for name, sweep in self._sweeps.items():
-            paths = list(sweep.expected)
+            paths = [piece.path for piece in sweep.expected]
             if name != vehicle and sweep.course is not None and len(sweep.course.path) > 1:
                 paths.append(sweep.course.path)
             for path in paths:
@@ -503,14 +517,14 @@ class SwathSurvey:
         """Expect nothing any more of pieces that were flown; those before them were flown, too."""
         for sweep in self._sweeps.values():
             for k in range(len(sweep.expected) - 1, -1, -1):
-                rows, cols = _under(sweep.expected[k], coverage)
+                rows, cols = _under(sweep.expected[k].path, coverage)
                 last = int((1.0 - LAST_PART) * len(rows))
                 rows, cols = rows[last:], cols[last:]
                 inside = coverage.wanted[rows, cols]
                 if not inside.any() or (
-                    coverage.done[rows, cols][inside].mean() >= FLOWN and _end_seen(sweep.ends[k], coverage)
+                    coverage.done[rows, cols][inside].mean() >= FLOWN and _end_seen(sweep.expected[k].open_m, coverage)
                 ):
-                    del sweep.expected[: k + 1], sweep.ends[: k + 1]
+                    del sweep.expected[: k + 1]
                     break
 
     def _count(self, path: FloatArray, flying: Flying, coverage: Coverage, tries: int = 1) -> None:
@@ -548,8 +562,8 @@ class SwathSurvey:
                         "overlap": s.course.overlap,
                         "begun": s.course.begun,
                     },
-                    "expected": [path.tolist() for path in s.expected],
-                    "ends": [places.tolist() for places in s.ends],
+                    "expected": [piece.path.tolist() for piece in s.expected],
+                    "ends": [piece.open_m.tolist() for piece in s.expected],
                     "refused": s.refused,
                     "skipped": None if s.skipped is None else s.skipped.tolist(),
                 }
@@ -578,13 +592,21 @@ class SwathSurvey:
                     float(course["overlap"]),
                     bool(course["begun"]),
                 ),
-                [np.array(path, dtype=np.float64).reshape(-1, 2) for path in kept["expected"]],
-                [np.array(places, dtype=np.float64).reshape(-1, 2) for places in kept["ends"]],
+                _pieces(kept["expected"], kept.get("ends", [])),
                 int(kept.get("refused", 0)),
                 skipped=None
                 if kept.get("skipped") is None
                 else np.array(kept["skipped"], dtype=np.float64).reshape(-1, 2),
             )
+
+
+def _pieces(paths: list[Any], ends: list[Any]) -> list[Piece]:
+    """Return pieces as they were remembered; earlier versions noted nothing of their ends."""
+    places = [*ends, *([[]] * (len(paths) - len(ends)))]
+    return [
+        Piece(*(np.array(one, dtype=np.float64).reshape(-1, 2) for one in both))
+        for both in zip(paths, places, strict=True)
+    ]
 
 
 def _packed(tried: IntArray) -> str:
