@@ -79,6 +79,25 @@ def sweep(
     raise AssertionError("it does not end")
 
 
+def test_a_site_of_one_swath_is_left_to_one_vehicle() -> None:
+    alone, _ = sweep(Sea(np.full((40, 60), 30.0)), 1)
+    team, _ = sweep(Sea(np.full((40, 60), 30.0)), 3)
+    assert team < alone + 10.0
+
+
+def test_memory_of_earlier_versions_is_read() -> None:
+    sea = Sea(np.full((60, 80), 8.0))
+    survey, pose = SwathSurvey(0.0, 1.0, 8.0), np.array([2.0, 2.0, np.nan])
+    for _ in range(2):
+        survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+    kept = json.loads(json.dumps(survey.remember()))
+    for sweep_of in kept["sweeps"].values():
+        del sweep_of["ends"]
+    again = SwathSurvey(0.0, 1.0, 8.0)
+    again.recall(kept)
+    assert again.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0) is not None
+
+
 @settings(max_examples=4, deadline=None)
 @given(st.integers(60, 110), st.integers(60, 110), st.integers(1, 4), st.floats(6.0, 30.0), st.floats(-0.1, 0.1))
 def test_everything_is_seen(rows: int, cols: int, vehicles: int, depth_m: float, rise: float) -> None:
