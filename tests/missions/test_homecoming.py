@@ -7,11 +7,13 @@ from typing import Any
 import pytest
 
 from app.missions.errors import ConflictError
+from app.missions.fleet.interface import FaultKind
+from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flown import Phase
 from app.missions.operations.history import events_after
 from app.missions.running.homecoming import call_home, hold
 from app.missions.service import MissionService
-from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mission import MissionSpec, VehicleKind
 from app.missions.states import Action, MissionState
 from app.missions.team import Withdrawal
 from app.missions.views.mission import MissionView, VehicleView
@@ -235,6 +237,26 @@ async def test_vehicles_turn_back_in_time(harbour_closed: Harbour) -> None:
     assert ended.progress.step < 1000
     assert vehicle.energy_left_pct is not None
     assert 0.0 < vehicle.energy_left_pct < 70.0
+
+
+async def test_vehicles_are_called_home_though_no_line_can_be_written(service: MissionService) -> None:
+    mission = await service.create(recovered("a", "b", steps=1000, failsafes={"vehicle_error": "return"}))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    link = service.hub._links[VehicleKind.SIM]
+    assert isinstance(link, SimFleetLink)
+    async with live.journal._logging:
+        for name in ("a", "b"):
+            link.fail(name, FaultKind.ERROR, "a fin is stuck")
+        await until(lambda: all(member.withdrawal is not None for member in live.team), "both are called home")
+        assert not await words_of(service, mission, "failsafe")
+
+    async def told() -> bool:
+        return sum("a fin is stuck" in line for line in await words_of(service, mission, "failsafe")) == 2
+
+    await until(told, "it is told why")
+    await act(service, mission.id, "abort")
 
 
 async def test_the_way_home_keeps_clear_of_zones(service: MissionService) -> None:

@@ -75,6 +75,7 @@ class FailsafeWatch:
         now_s = asyncio.get_running_loop().time() * self._time_scale
         too_close = self._too_close()
         self._range.take_currents()
+        news: list[tuple[str, list[Active]]] = []
         for member in self._live.team:
             member.way_home_m = self._range.way(member)
             member.return_needs_s = self._range.needs_s(member)
@@ -85,10 +86,13 @@ class FailsafeWatch:
             detected |= await self._ships_of(member)
             found = await self._waiting_below(member, now_s, self._judge(member, now_s, detected))
             member.failsafes = found
-            await self._tell(member.name, found)
             self._act(member, found)
+            news.append((member.name, found))
         lost = self._all_lost()
-        await self._tell(TEAM, self._judges.setdefault(TEAM, FailsafeJudge()).judge(lost, now_s))
+        news.append((TEAM, self._judges.setdefault(TEAM, FailsafeJudge()).judge(lost, now_s)))
+        # What is done waits for no line of the log: the database may be slow, or full.
+        for name, found in news:
+            await self._tell(name, found)
 
     def _judge(self, member: Member, now_s: float, detected: dict[Failsafe, str]) -> list[Active]:
         judge = self._judges.get(member.name)

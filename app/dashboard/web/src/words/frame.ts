@@ -344,7 +344,7 @@ export const FRAME = {
   "keys.abortAll": { en: "Ask whether to abort all", pt: "Perguntar se aborta tudo" },
   "keys.start": { en: "Checklist before the start", pt: "Verificação antes do início" },
   "keys.pauseOrResume": { en: "Pause or resume", pt: "Pausa ou retomar" },
-  "keys.takeAlarms": { en: "Take the alarms", pt: "Tomar nota dos alarmes" },
+  "keys.takeAlarms": { en: "Take the alarms", pt: "Assumir os alarmes" },
   "keys.log": { en: "Log", pt: "Registo" },
   "keys.rejectedSoundings": { en: "Rejected soundings", pt: "Sondas rejeitadas" },
   "keys.nextColours": { en: "Next colours, among them night", pt: "Cores seguintes, entre elas a noite" },

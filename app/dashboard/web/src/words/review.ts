@@ -262,6 +262,6 @@ export const REVIEW = {
   "terms.left_m": { en: "metres of lines left", pt: "metros de linhas por fazer" },
   "terms.left_pct": { en: "% left to see", pt: "% por ver" },
   "terms.waypoints": { en: "waypoints planned", pt: "pontos de passagem planeados" },
-  "terms.errands": { en: "vehicles on errands", pt: "veículos em recados" },
+  "terms.errands": { en: "vehicles on errands", pt: "veículos em tarefas à parte" },
   "terms.trustInPrediction": { en: "trust in prediction {number}", pt: "confiança na previsão {number}" },
 } as const;
