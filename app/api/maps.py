@@ -329,7 +329,9 @@ async def get_crossovers_file(
 ) -> Response:
     """Return where lines cross as a file, all crossings."""
     options = ProductOptions(order)
-    return file_answer(await export(mission, service.maps, service.settings.provider, "crossovers.csv", options))
+    return file_answer(
+        await export(mission, service.maps, service.settings.provider, service.workshop, "crossovers.csv", options)
+    )
 
 
 def _add_report(kind: ReportKind) -> None:
@@ -413,7 +415,9 @@ def file_answer(product: Product) -> Response:
 )
 async def get_holidays_file(service: Service, reader: Reader, mission: Mission) -> Response:
     """Return what swath sonars missed as a file."""
-    return file_answer(await export(mission, service.maps, service.settings.provider, "holidays.geojson"))
+    return file_answer(
+        await export(mission, service.maps, service.settings.provider, service.workshop, "holidays.geojson")
+    )
 
 
 _FileOptions = Annotated[ProductOptions, Depends(_file_options)]
@@ -436,7 +440,9 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
                 f"the {resource} {'is' if resource == MAP else 'are'} not made as .{format[:20]}",
                 remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
             )
-        product = await export(mission, service.maps, service.settings.provider, kinds[format], options)
+        product = await export(
+            mission, service.maps, service.settings.provider, service.workshop, kinds[format], options
+        )
         return file_answer(product)
 
     get_file.__doc__ = description
