@@ -3,8 +3,8 @@
 A square that a swath sonar swept in lines from south to north, with a crossline and gaps: its pings are taken in as
 from a link, the map is made, then the report as PDF and as a web page in each language. Told are the seconds of each,
 where the first one finds crossings too, its size, the seconds for what REST answers and for checksums of files again
-(``answers_s``), and the longest time between a look at the event loop and the next. ``--keep FOLDER`` leaves the
-reports there.
+(``answers_s``) and for ``map.tif``, the processor's time, also of other processes, and the longest time between a look
+at the event loop and the next. ``--keep FOLDER`` leaves the reports there.
 """
 
 import argparse

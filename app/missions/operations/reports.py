@@ -103,22 +103,26 @@ class Reports:
 
     async def answers(self, live: LiveMission, order: Order = Order.ORDER_1A) -> Answers:
         """Return what a mission's report is made of. Raises what :meth:`report` does."""
-        return await self._apart(_answers, await self._gathered(live, order), order)
+        return await self._apart(live, order, _answers, order)
 
     async def _made(self, live: LiveMission, options: ReportOptions) -> Product:
         kind = options.kind
         async with self._turn:
-            content = await self._apart(_report, await self._gathered(live, options.order), options)
+            content = await self._apart(live, options.order, _report, options)
         return Product(product_name(live.facts, "report", kind.extension), kind.media_type, content)
 
-    async def _apart(self, work: "Callable[[_Gathered, Asked], Made]", gathered: "_Gathered", asked: Asked) -> Made:
-        if gathered.material.snapshot.large:
-            return await self._workshop.make(work, gathered, asked)
-        # Not with the planning threads: vehicles may wait for a decision.
-        return await asyncio.to_thread(work, gathered, asked)
-
-    async def _gathered(self, live: LiveMission, order: Order) -> "_Gathered":
+    async def _apart(
+        self, live: LiveMission, order: Order, work: "Callable[[_Gathered, Asked], Made]", asked: Asked
+    ) -> Made:
+        """Return what is made of all that is known of a mission."""
         snapshot = await newest_map(live, self._maps)
+        if snapshot.large:
+            async with self._workshop.process(__name__, "matplotlib.figure") as process:
+                return await process.make(work, await self._gathered(live, order, snapshot), asked)
+        # Not with the planning threads: vehicles may wait for a decision.
+        return await asyncio.to_thread(work, await self._gathered(live, order, snapshot), asked)
+
+    async def _gathered(self, live: LiveMission, order: Order, snapshot: MapSnapshot) -> "_Gathered":
         found = await check_of(live, snapshot)
         period, pings, tracks = await surveyed(live), await pings_of(live), await track_lines(live)
         counts = {

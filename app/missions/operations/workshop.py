@@ -2,8 +2,9 @@
 
 Libraries in C, and loops of numpy, keep the interpreter's lock for as long as they take.
 
-As a program: what is to be done is on standard input, pickled; the argument is the number of the open file for what
-came of it. Both files are this service's own, and have no name.
+As a program: the first two arguments are the numbers of open files, which are this service's own and have no name.
+What is to be done is in the first, pickled, as soon as there is something on standard input; what came of it goes to
+the second. Further arguments are modules to be loaded meanwhile.
 """
 
 import asyncio
@@ -12,8 +13,9 @@ import pickle
 import signal
 import sys
 from asyncio.subprocess import Process
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any, ParamSpec, TypeVar
 
@@ -59,16 +61,32 @@ class Workshop:
         Exception
             What the function raises.
         """
+        async with self.process(work.__module__) as process:
+            return await process.make(work, *arguments, **named)
+
+    @asynccontextmanager
+    async def process(self, *modules: str) -> AsyncIterator["MakingProcess"]:
+        """Have a process, for one thing, that loads modules while what it will be given is gathered.
+
+        Raises
+        ------
+        ProductUnavailableError
+            When the service ends.
+        """
         async with self._turn:
+            if self._closed:
+                raise _ending()
             with await asyncio.to_thread(unnamed_file) as task, await asyncio.to_thread(unnamed_file) as result:
-                await to_the_end(asyncio.to_thread(_write, task, (work, arguments, named)))
-                code = await self._run(task, result)
-                if code:
-                    raise self._broken_off(code)
-                made, error = await to_the_end(asyncio.to_thread(_read, result))
-        if error is not None:
-            raise _raised(*error)
-        return made  # type: ignore[no-any-return]
+                process = await _start(task, result, modules)
+                self._processes.add(process)
+                try:
+                    if self._closed:
+                        _kill(process)
+                    yield MakingProcess(process, task, result, lambda: self._closed)
+                finally:
+                    _kill(process)
+                    await process.wait()
+                    self._processes.discard(process)
 
     async def close(self) -> None:
         """End what is being made; nothing more is made."""
@@ -78,48 +96,71 @@ class Workshop:
             _kill(process)
         await asyncio.gather(*(process.wait() for process in processes))
 
-    async def _run(self, task: IO[bytes], result: IO[bytes]) -> int:
-        """Return the exit code of the process, negative where a signal ended it."""
-        if self._closed:
-            return -signal.SIGKILL
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-P",
-            "-m",
-            __name__,
-            str(result.fileno()),
-            stdin=task,
-            stdout=asyncio.subprocess.DEVNULL,
-            pass_fds=(result.fileno(),),
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))},
-            # Its own session: a signal from a terminal is not for it, and what it starts ends with it.
-            start_new_session=True,
-        )
-        self._processes.add(process)
+
+class MakingProcess:
+    """A process that makes one thing."""
+
+    def __init__(self, process: Process, task: IO[bytes], result: IO[bytes], closed: Callable[[], bool]) -> None:
+        self._process = process
+        self._task, self._result = task, result
+        self._closed = closed
+
+    async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
+        """Return what a function returns; see :meth:`Workshop.make`."""
+        await to_the_end(asyncio.to_thread(_write, self._task, (work, arguments, named)))
+        code = await self._ended()
+        if code:
+            raise _ending() if self._closed() else _broken_off(code)
+        made, error = await to_the_end(asyncio.to_thread(_read, self._result))
+        if error is not None:
+            raise _raised(*error)
+        return made  # type: ignore[no-any-return]
+
+    async def _ended(self) -> int:
+        """Say that the task is written; return the exit code of the process, negative where a signal ended it."""
+        assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         try:
-            if self._closed:
-                _kill(process)
             async with asyncio.timeout(MAKING_TIMEOUT_S):
-                return await process.wait()
+                with suppress(ConnectionError):  # it has ended before
+                    self._process.stdin.write(b"\n")
+                    await self._process.stdin.drain()
+                return await self._process.wait()
         except TimeoutError:
             return -signal.SIGXCPU
-        finally:
-            _kill(process)
-            await process.wait()
-            self._processes.discard(process)
 
-    def _broken_off(self, code: int) -> ProductUnavailableError:
-        if self._closed:
-            return ProductUnavailableError("the service is ending", "ask again when it has started")
-        if code == -signal.SIGXCPU:
-            return ProductUnavailableError(
-                f"it takes more than {MAKING_TIMEOUT_S:g} s", "choose larger cells or a smaller area"
-            )
-        how = f"signal {-code}" if code < 0 else f"exit code {code}"
+
+async def _start(task: IO[bytes], result: IO[bytes], modules: Sequence[str]) -> Process:
+    files = task.fileno(), result.fileno()
+    return await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-P",
+        "-m",
+        __name__,
+        *map(str, files),
+        *modules,
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.DEVNULL,
+        pass_fds=files,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))},
+        # Its own session: a signal from a terminal is not for it, and what it starts ends with it.
+        start_new_session=True,
+    )
+
+
+def _ending() -> ProductUnavailableError:
+    return ProductUnavailableError("the service is ending", "ask again when it has started")
+
+
+def _broken_off(code: int) -> ProductUnavailableError:
+    if code == -signal.SIGXCPU:
         return ProductUnavailableError(
-            f"the process that makes the file was ended before it was done ({how}): memory may be short",
-            "ask again; where that does not help give the service more memory, or choose larger cells",
+            f"it takes more than {MAKING_TIMEOUT_S:g} s", "choose larger cells or a smaller area"
         )
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    return ProductUnavailableError(
+        f"the process that makes the file was ended before it was done ({how}): memory may be short",
+        "ask again; where that does not help give the service more memory, or choose larger cells",
+    )
 
 
 def _kill(process: Process) -> None:
@@ -152,12 +193,18 @@ def main() -> None:
     """Do what standard input asks, and write down what came of it."""
     limit(LIMITS)
     made, told = None, None
-    work, arguments, named = pickle.load(sys.stdin.buffer)  # noqa: S301 - this program wrote it
+    task, result = (int(number) for number in sys.argv[1:3])
+    for module in sys.argv[3:]:
+        import_module(module)
+    if not sys.stdin.buffer.read(1):
+        return  # it is not needed after all
+    with open(task, "rb", closefd=False) as file:
+        work, arguments, named = _read(file)
     try:
         made = work(*arguments, **named)
     except Exception as error:
         told = type(error), error.args, error.__dict__
-    with open(int(sys.argv[1]), "wb", closefd=False) as out:
+    with open(result, "wb", closefd=False) as out:
         _write(out, (made, told))
 
 

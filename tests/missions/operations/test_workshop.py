@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from app.missions.errors import InvalidRequestError, ProductUnavailableError
+from app.missions.errors import InvalidRequestError, MapNotReadyError, ProductUnavailableError
 from app.missions.operations.workshop import Workshop
 from tests.support.waiting import until
 
@@ -97,6 +97,17 @@ async def test_a_process_that_is_killed_is_told_and_the_next_one_works(workshop:
         await workshop.make(end_itself)
     assert "ask again" in told.value.remedy
     assert await workshop.make(divide, 6.0, 2.0) == 3.0
+
+
+async def test_a_process_that_is_not_needed_after_all_leaves_room(workshop: Workshop) -> None:
+    with pytest.raises(MapNotReadyError):
+        async with workshop.process("json"):
+            raise MapNotReadyError("there is nothing yet")
+    async with workshop.process("json") as process:
+        psutil.Process().children()[0].kill()
+        with pytest.raises(ProductUnavailableError, match="signal 9"):
+            await process.make(divide, 1.0, 2.0)
+    assert await workshop.make(divide, 1.0, 2.0) == 0.5
 
 
 async def test_it_ends_with_the_service(tmp_path: Path) -> None:
