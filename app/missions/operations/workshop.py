@@ -44,7 +44,7 @@ class Workshop:
     def __init__(self) -> None:
         self._turn = asyncio.Semaphore(AT_ONCE)
         self._processes: set[Process] = set()
-        self._closed = False
+        self._closing = asyncio.Event()
 
     async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
         """Return what a function of a module returns; the process ends with whoever waits for it.
@@ -74,15 +74,15 @@ class Workshop:
             When the service ends.
         """
         async with self._turn:
-            if self._closed:
+            if self._closing.is_set():
                 raise _ending()
             with await asyncio.to_thread(unnamed_file) as task, await asyncio.to_thread(unnamed_file) as result:
                 process = await _start(task, result, modules)
                 self._processes.add(process)
                 try:
-                    if self._closed:
+                    if self._closing.is_set():
                         _kill(process)
-                    yield MakingProcess(process, task, result, lambda: self._closed)
+                    yield MakingProcess(process, task, result, self._closing.is_set)
                 finally:
                     _kill(process)
                     await process.wait()
@@ -90,7 +90,7 @@ class Workshop:
 
     async def close(self) -> None:
         """End what is being made; nothing more is made."""
-        self._closed = True
+        self._closing.set()
         processes = list(self._processes)
         for process in processes:
             _kill(process)
