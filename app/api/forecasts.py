@@ -1,10 +1,8 @@
 """What is to be expected of a mission before it is started."""
 
-import asyncio
-from collections.abc import Coroutine
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi import APIRouter, Body, Query, Request
 
 from app.api.auth import Operator
 from app.api.json_route import JsonRoute
@@ -13,18 +11,13 @@ from app.api.missions import EXAMPLE_SPEC
 from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service
+from app.api.while_connected import while_connected
 from app.missions.forecast.request import ForecastView
 from app.missions.spec.mission import MissionSpec
 
 router = APIRouter(
     route_class=JsonRoute, prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden")
 )
-
-LOOK_S = 0.2
-"""How often it is looked whether a client still waits."""
-
-CLIENT_LEFT = 499
-"""Only the log sees it."""
 
 _FloorDepth = Annotated[
     float | None,
@@ -45,7 +38,7 @@ async def forecast_mission(
     service: Service, operator: Operator, mission: Mission, request: Request, floor_depth_m: _FloorDepth = None
 ) -> Any:
     """Simulate what is left of a mission, over what was imported of the sea floor and a guess for the rest."""
-    return await _while_connected(request, service.forecaster.of_mission(mission, floor_depth_m))
+    return await while_connected(request, service.forecaster.of_mission(mission, floor_depth_m))
 
 
 @router.post(
@@ -68,17 +61,4 @@ async def forecast_description(
 
     Takes half a minute or so, on a busy machine a minute or two; a client that does not wait any more ends it.
     """
-    return await _while_connected(request, service.forecaster.of_description(spec, floor_depth_m))
-
-
-async def _while_connected(request: Request, work: Coroutine[Any, Any, ForecastView]) -> ForecastView | Response:
-    """Return what ``work`` does, and end it when the client leaves: nobody would read the answer."""
-    task = asyncio.ensure_future(work)
-    try:
-        while not task.done():
-            if await request.is_disconnected():
-                return Response(status_code=CLIENT_LEFT)
-            await asyncio.wait([task], timeout=LOOK_S)
-        return task.result()
-    finally:
-        task.cancel()
+    return await while_connected(request, service.forecaster.of_description(spec, floor_depth_m))

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Annotated, Any, cast
 
 import numpy as np
-from fastapi import APIRouter, Depends, Header, Path, Query, Response
+from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema
 
@@ -17,6 +17,7 @@ from app.api.mission import Mission
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API
 from app.api.state import EdgeState, Service, State
+from app.api.while_connected import while_connected
 from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.overlay import overlay_png
 from app.mapping.s44 import Order
@@ -329,7 +330,9 @@ async def get_crossovers_file(
 ) -> Response:
     """Return where lines cross as a file, all crossings."""
     options = ProductOptions(order)
-    return file_answer(await export(mission, service.maps, service.settings.provider, "crossovers.csv", options))
+    return file_answer(
+        await export(mission, service.maps, service.settings.provider, service.workshop, "crossovers.csv", options)
+    )
 
 
 def _add_report(kind: ReportKind) -> None:
@@ -337,10 +340,12 @@ def _add_report(kind: ReportKind) -> None:
         service: Service,
         reader: Reader,
         mission: Mission,
+        request: Request,
         lang: Annotated[Language, Query(description="Language that it is written in")] = Language.EN,
         order: S44Order = Order.ORDER_1A,
     ) -> Response:
-        return file_answer(await service.reports.report(mission, ReportOptions(kind, lang, order)))
+        making = service.reports.report(mission, ReportOptions(kind, lang, order))
+        return file_answer(await while_connected(request, making))
 
     name = kind.extension
     router.add_api_route(
@@ -392,8 +397,10 @@ async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
     ]
 
 
-def file_answer(product: Product) -> Response:
-    """Return what lets a client save a file under its name."""
+def file_answer(product: Product | Response) -> Response:
+    """Return what lets a client save a file under its name; an answer stays as it is."""
+    if isinstance(product, Response):
+        return product
     return Response(
         product.content,
         media_type=product.media_type,
@@ -413,7 +420,9 @@ def file_answer(product: Product) -> Response:
 )
 async def get_holidays_file(service: Service, reader: Reader, mission: Mission) -> Response:
     """Return what swath sonars missed as a file."""
-    return file_answer(await export(mission, service.maps, service.settings.provider, "holidays.geojson"))
+    return file_answer(
+        await export(mission, service.maps, service.settings.provider, service.workshop, "holidays.geojson")
+    )
 
 
 _FileOptions = Annotated[ProductOptions, Depends(_file_options)]
@@ -429,6 +438,7 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
         reader: Reader,
         mission: Mission,
         options: _FileOptions,
+        request: Request,
     ) -> Response:
         if format not in kinds:
             raise ProblemError(
@@ -436,8 +446,8 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
                 f"the {resource} {'is' if resource == MAP else 'are'} not made as .{format[:20]}",
                 remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
             )
-        product = await export(mission, service.maps, service.settings.provider, kinds[format], options)
-        return file_answer(product)
+        making = export(mission, service.maps, service.settings.provider, service.workshop, kinds[format], options)
+        return file_answer(await while_connected(request, making))
 
     get_file.__doc__ = description
     media = {PRODUCTS[name].media_type.partition(";")[0] for name in kinds.values()}

@@ -30,6 +30,7 @@ from app.missions.errors import (
     MissionNotFoundError,
     PingsNotFoundError,
     PingsUnreadableError,
+    ProductUnavailableError,
     SiteNotFoundError,
     SoundingNotFoundError,
     TargetNotFoundError,
@@ -111,6 +112,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "too-many-connections": (503, "Too many requests at the same time"),
     "mission-elsewhere": (503, "Another process has the mission"),
     "import-unavailable": (503, "No file can be read now"),
+    "product-unavailable": (503, "The file cannot be made now"),
     "overloaded": (503, "Too much is under way"),
     "not-ready": (503, "The service is not ready"),
     "database-unavailable": (503, "The database cannot be used now"),
@@ -407,6 +409,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
         (AlarmNotFoundError, "alarm-not-found"),
         (SiteNotFoundError, "site-not-found"),
         (ImportUnavailableError, "import-unavailable"),
+        (ProductUnavailableError, "product-unavailable"),
         (FileTooLargeError, "body-too-large"),
         (MapNotReadyError, "map-not-ready"),
         (MissionElsewhereError, "mission-elsewhere"),
@@ -433,7 +436,7 @@ def _mission_problem(request: Request, error: Exception) -> Response:
             )
         )
     problem = make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
-    later = isinstance(error, ImportUnavailableError)
+    later = isinstance(error, ImportUnavailableError | ProductUnavailableError)
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
 
 
@@ -475,6 +478,7 @@ def install(app: FastAPI) -> None:
         VehicleNotFoundError,
         PingsNotFoundError,
         PingsUnreadableError,
+        ProductUnavailableError,
         SoundingNotFoundError,
         TargetNotFoundError,
         ImportNotFoundError,

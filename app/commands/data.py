@@ -69,7 +69,9 @@ def export(
 
     async def run(service: MissionService) -> Product:
         live = await meant_mission(service, mission)
-        return await mission_maps.export(live, service.maps, service.settings.provider, format, options)
+        return await mission_maps.export(
+            live, service.maps, service.settings.provider, service.workshop, format, options
+        )
 
     product = with_missions(settings, run)
     if out == Path("-"):

@@ -55,6 +55,10 @@ class ImportUnavailableError(MissionError):
     """No file can be taken in or read now."""
 
 
+class ProductUnavailableError(MissionError):
+    """A file could not be made to its end now."""
+
+
 class SoundingNotFoundError(MissionError):
     """There is no such sounding in the mission."""
 

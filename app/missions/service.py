@@ -32,6 +32,7 @@ from app.missions.operations.sites import Sites
 from app.missions.operations.traffic import places_of, traffic_view
 from app.missions.operations.uploads import Uploads
 from app.missions.operations.web_tiles import WebTiles
+from app.missions.operations.workshop import Workshop
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.descriptions import describe_anew
@@ -138,7 +139,9 @@ class MissionService:
         """Files on their way in."""
         self.imports = Imports(Reader(unconfined=settings.unconfined_imports), self.maps)
         """Files that missions begin with or are compared with."""
-        self.reports = Reports(self.maps, settings.provider)
+        self.workshop = Workshop()
+        """Makes what computes long."""
+        self.reports = Reports(self.maps, settings.provider, self.workshop)
         """Reports of surveys."""
         self.sites = Sites(database, self.get, self.maps, self.imports, lambda: self._started)
         """Places that are surveyed again and again."""
@@ -165,6 +168,7 @@ class MissionService:
         Running missions stay running: another process takes them up, or this one at its next start.
         """
         self._started = False
+        await self.workshop.close()
         await self._failover.end()
         await self.alarms.close()
         await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))

@@ -3,8 +3,8 @@
 A square that a swath sonar swept in lines from south to north, with a crossline and gaps: its pings are taken in as
 from a link, the map is made, then the report as PDF and as a web page in each language. Told are the seconds of each,
 where the first one finds crossings too, its size, the seconds for what REST answers and for checksums of files again
-(``answers_s``), and the longest time between a look at the event loop and the next. ``--keep FOLDER`` leaves the
-reports there.
+(``answers_s``) and for ``map.tif``, the processor's time, also of other processes, and the longest time between a look
+at the event loop and the next. ``--keep FOLDER`` leaves the reports there.
 """
 
 import argparse
@@ -19,6 +19,7 @@ import numpy as np
 
 from app.mapping.georeference import LocalFrame
 from app.missions.fleet.interface import PingReport, Position
+from app.missions.operations.mission_maps import export
 from app.missions.operations.reports import ReportOptions
 from app.missions.report.kinds import REPORTS
 from app.missions.report.texts import Language
@@ -110,6 +111,8 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         await live.journal.flush()
         await live.build_map()
         progress = live.progress()
+        used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+        processor_s = sum(one.ru_utime + one.ru_stime for one in used)
         watch = LoopWatch()
         found: dict[str, Any] = {
             "pings": progress.pings,
@@ -126,10 +129,16 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 if options.keep is not None:
                     (options.keep / f"report-{language}.{name}").write_bytes(product.content)
         begun = time.perf_counter()
+        product = await export(live, service.maps, service.settings.provider, service.workshop, "tif")
+        found["map_tif_s"] = round(time.perf_counter() - begun, 2)
+        found["map_tif_bytes"] = len(product.content)
+        begun = time.perf_counter()
         await service.reports.answers(live)
         found["answers_s"] = round(time.perf_counter() - begun, 2)
         watch.stop()
         found["loop_held_ms"] = round(1000 * watch.longest_s, 1)
+        used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+        found["processor_s"] = round(sum(one.ru_utime + one.ru_stime for one in used) - processor_s, 1)
         found["memory_mib"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
         return found
     finally:

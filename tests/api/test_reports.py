@@ -1,5 +1,6 @@
 """Reports of surveys over REST: every number is that of the other answers, and names are shown as they are."""
 
+import asyncio
 import hashlib
 import html.parser
 import json
@@ -10,16 +11,19 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import psutil
 import pypdfium2
 import pytest
 
 from app.main import Server
 from app.mapping.quality.crossovers import warm_up
+from app.missions.maps import snapshot
 from app.missions.report.texts import DECIMAL_POINTS, Language
 from app.settings import Settings
 from tests.support.missions.specs import rectangle
 from tests.support.rest import mission_spec, running, soundings
 from tests.support.tracks import flown, lawnmower, pinged
+from tests.support.waiting import until
 
 START_S = 1_795_225_140.0
 HOSTILE = '</title><script>alert(1)</script>{{7*7}} #eval("1") $x$ @a *b* \\ Ωж ' + "W" * 40
@@ -276,3 +280,25 @@ async def test_reports_are_among_the_files(client: httpx.AsyncClient) -> None:
         wrong = await client.get(f"{path}/{name}", params={"lang": "xx"})
         assert wrong.status_code == 422
         assert wrong.json()["errors"][0]["field"] == "lang"
+
+
+async def test_reports_of_large_maps_end_with_their_client_and_tell_when_they_are_broken_off(
+    server: Server, client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(snapshot, "LARGE_CELLS", 1)
+    path, here = await swath_survey(client), psutil.Process()
+    leaving = asyncio.create_task(client.get(f"{path}/report.html"))
+    await until(here.children, "a process makes the report")
+    (process,) = here.children()
+    leaving.cancel()
+    await until(lambda: not process.is_running() or process.status() == psutil.STATUS_ZOMBIE, "it has ended")
+    await until(lambda: not here.children(), "nothing is left of it")
+    staying = asyncio.create_task(client.get(f"{path}/map.tif"))
+    await until(here.children, "a process makes the map")
+    here.children()[0].kill()
+    answer = await staying
+    assert answer.status_code == 503
+    assert answer.headers["retry-after"]
+    assert answer.json()["type"].endswith("product-unavailable")
+    assert "memory may be short" in answer.json()["detail"]
+    assert (await client.get(f"{path}/map.tif")).status_code == 200

@@ -135,9 +135,13 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
             continue
         if extension in REFUSED:
             with pytest.raises(ConflictError, match=REFUSED[extension]):
-                await export(await service.get(created.id), service.maps, service.settings.provider, extension)
+                await export(
+                    await service.get(created.id), service.maps, service.settings.provider, service.workshop, extension
+                )
             continue
-        product = await export(await service.get(created.id), service.maps, service.settings.provider, extension)
+        product = await export(
+            await service.get(created.id), service.maps, service.settings.provider, service.workshop, extension
+        )
         assert (product.filename, product.media_type) == (f"quay.{extension}", kind.media_type)
         if extension == "tif":
             with rasterio.open(io.BytesIO(product.content)) as image:
@@ -156,7 +160,7 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
             cells = [row for row in product.content.decode().splitlines() if row and not row.startswith("#")]
             assert len(cells) >= 225
     with pytest.raises(InvalidRequestError, match="there is no format 'doc'") as caught:
-        await export(await service.get(created.id), service.maps, service.settings.provider, "doc")
+        await export(await service.get(created.id), service.maps, service.settings.provider, service.workshop, "doc")
     assert "tif" in caught.value.remedy
 
 

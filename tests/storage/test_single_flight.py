@@ -50,3 +50,30 @@ async def test_one_who_leaves_or_a_failure_is_nothing_to_the_others() -> None:
         await staying
     fail = False
     assert await shared() == "here"
+
+
+async def test_work_that_everybody_left_ends_where_it_is_to() -> None:
+    begun, ended = asyncio.Event(), asyncio.Event()
+    gate = asyncio.Event()
+
+    async def work() -> str:
+        begun.set()
+        try:
+            await gate.wait()
+        finally:
+            ended.set()
+        return "here"
+
+    shared = Shared(work, ends_unwanted=True)
+    callers = [asyncio.create_task(shared()) for _ in range(2)]
+    await begun.wait()
+    callers[0].cancel()
+    await asyncio.wait([callers[0]])
+    assert not ended.is_set(), "one waits yet"
+    waiting = asyncio.create_task(shared())  # for what is begun after this
+    await asyncio.sleep(0)
+    waiting.cancel()
+    callers[1].cancel()
+    await ended.wait()
+    gate.set()
+    assert await shared() == "here"

@@ -1,7 +1,7 @@
 """A mission's map as it leaves the service: where it lies, what its depths mean, how good it is, and its JSON."""
 
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,9 @@ from imc_bridge.printable import printable
 
 NOT_MADE = 0
 """Version of a map that holds nothing but live cells: the first considered map is still being made."""
+
+LARGE_CELLS = 50_000
+"""Libraries hold the interpreter's lock for a tenth of a second and longer to write files of larger maps."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,15 @@ class MapSnapshot:
     def tag(self) -> str:
         """Changes with everything that the map shows."""
         return f"{self.version}.{self.revision}" + ("" if self.live is None else f"@{self.live.version}")
+
+    @property
+    def large(self) -> bool:
+        """Whether a process of its own makes files of the map."""
+        return self.built.map.depth_m.size >= LARGE_CELLS
+
+    def without_live(self) -> "MapSnapshot":
+        """Return the map without what changes while soundings come."""
+        return replace(self, live=None, interpolation=None)
 
     def source(self, order: Order = Order.ORDER_1A) -> LayerSource:
         """Return what the map's layers are computed from."""

@@ -27,6 +27,7 @@ from app.missions.maps.snapshot import MapSnapshot
 from app.missions.operations.crossovers import check_of
 from app.missions.operations.history import soundings_of
 from app.missions.operations.scans import search_of
+from app.missions.operations.workshop import Workshop
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
 from app.missions.views.soundings import Verdict
@@ -93,7 +94,12 @@ async def map_tiles(
 
 
 async def export(
-    live: LiveMission, maps: FinalMaps, provider: ProviderSettings, name: str, options: ProductOptions | None = None
+    live: LiveMission,
+    maps: FinalMaps,
+    provider: ProviderSettings,
+    workshop: Workshop,
+    name: str,
+    options: ProductOptions | None = None,
 ) -> Product:
     """Return a product file of the mission, a key of ``PRODUCTS``.
 
@@ -102,6 +108,8 @@ async def export(
     InvalidRequestError, MapNotReadyError, ConflictError
         For an unknown kind or options that cannot be; where the map is needed and there is none yet; where the
         mission would have to be a search.
+    ProductUnavailableError
+        When the process that makes files of large maps was ended.
     """
     needs = product_kind(name).needs
     snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
@@ -109,14 +117,17 @@ async def export(
         facts=live.facts,
         created=now(),
         provider=provider.named(),
-        map=snapshot,
+        map=None if snapshot is None else snapshot.without_live(),
         soundings=await soundings_of(live) if SOUNDINGS in needs else (),
         tracks=await track_lines(live) if TRACKS in needs else (),
         search=search_of(live) if SEARCH in needs else None,
         surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
         crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
     )
-    return await live.in_thread(make_product, name, material, options or ProductOptions())
+    chosen = options or ProductOptions()
+    if snapshot is not None and snapshot.large:
+        return await workshop.make(make_product, name, material, chosen)
+    return await live.in_thread(make_product, name, material, chosen)
 
 
 async def surveyed(live: LiveMission) -> Surveyed:

@@ -1,15 +1,15 @@
-"""Reports of surveys: the answers of REST are gathered, and made into a document by a thread."""
+"""Reports of surveys: the answers of REST are gathered, and made into a document by a process of its own."""
 
 import asyncio
 import hashlib
 import platform
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import orjson
@@ -39,7 +39,8 @@ from app.missions.operations.mission_maps import newest_map, surveyed, track_lin
 from app.missions.operations.pings import pings_of
 from app.missions.operations.recorrection import corrections_view
 from app.missions.operations.review import soundings_page
-from app.missions.operations.uncertainty_budget import uncertainty_budget
+from app.missions.operations.uncertainty_budget import budget_from, travel_depth_m
+from app.missions.operations.workshop import Workshop
 from app.missions.report.answers import Answers, Incident
 from app.missions.report.kinds import ReportKind
 from app.missions.report.sections import document_of
@@ -61,6 +62,9 @@ SUMMED = ("tif", "soundings.csv", "tracks.geojson", "crossovers.csv", "holidays.
 MOST_SOUNDINGS = 50_000
 """Files of more soundings are left out of that."""
 
+Asked = TypeVar("Asked")
+Made = TypeVar("Made")
+
 NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][+-]?\d+)?")
 
 
@@ -76,8 +80,9 @@ class ReportOptions:
 class Reports:
     """Makes reports, one at a time, beside everything else."""
 
-    def __init__(self, maps: FinalMaps, provider: ProviderSettings) -> None:
+    def __init__(self, maps: FinalMaps, provider: ProviderSettings, workshop: Workshop) -> None:
         self._maps = maps
+        self._workshop = workshop
         self._authority = provider.organization
         self._turn = asyncio.Lock()
 
@@ -88,27 +93,36 @@ class Reports:
         ------
         MapNotReadyError, PingsUnreadableError
             Before anything was sounded; where a file of pings is missing.
+        ProductUnavailableError
+            When the process that makes reports of large maps was ended.
         """
         shared = live.part(_Asked).by_options
         if options not in shared:
-            shared[options] = Shared(partial(self._made, live, options))
+            shared[options] = Shared(partial(self._made, live, options), ends_unwanted=True)
         return await shared[options]()
 
     async def answers(self, live: LiveMission, order: Order = Order.ORDER_1A) -> Answers:
-        """Return what a mission's report is made of. Raises MapNotReadyError, PingsUnreadableError."""
-        gathered = await self._gathered(live, order)
-        # Not with the planning threads: vehicles may wait for a decision.
-        return await asyncio.to_thread(_answers, gathered, order)
+        """Return what a mission's report is made of. Raises what :meth:`report` does."""
+        return await self._apart(live, order, _answers, order)
 
     async def _made(self, live: LiveMission, options: ReportOptions) -> Product:
         kind = options.kind
         async with self._turn:
-            answers = await self.answers(live, options.order)
-            content = await asyncio.to_thread(lambda: kind.make(document_of(answers, Texts(options.language))))
+            content = await self._apart(live, options.order, _report, options)
         return Product(product_name(live.facts, "report", kind.extension), kind.media_type, content)
 
-    async def _gathered(self, live: LiveMission, order: Order) -> "_Gathered":
+    async def _apart(
+        self, live: LiveMission, order: Order, work: "Callable[[_Gathered, Asked], Made]", asked: Asked
+    ) -> Made:
+        """Return what is made of all that is known of a mission."""
         snapshot = await newest_map(live, self._maps)
+        if snapshot.large:
+            async with self._workshop.process(__name__, "matplotlib.figure") as process:
+                return await process.make(work, await self._gathered(live, order, snapshot), asked)
+        # Not with the planning threads: vehicles may wait for a decision.
+        return await asyncio.to_thread(work, await self._gathered(live, order, snapshot), asked)
+
+    async def _gathered(self, live: LiveMission, order: Order, snapshot: MapSnapshot) -> "_Gathered":
         found = await check_of(live, snapshot)
         period, pings, tracks = await surveyed(live), await pings_of(live), await track_lines(live)
         counts = {
@@ -127,7 +141,7 @@ class Reports:
         material = Material(
             facts=live.facts,
             created=now(),
-            map=snapshot,
+            map=snapshot.without_live(),
             soundings=() if many else await soundings_of(live),
             tracks=tracks,
             crossovers=found.check,
@@ -160,7 +174,17 @@ class Reports:
             for row in events
         ]
         left_off = {"soundings.csv"} if many else set()
-        return _Gathered(live, views, rest, found, material, incidents, left_off, self._authority)
+        return _Gathered(
+            at_sea=live.header.state in AT_SEA,
+            travel_m=travel_depth_m(live),
+            views=views,
+            rest=rest,
+            found=found,
+            material=material,
+            incidents=incidents,
+            left_off=left_off,
+            authority=self._authority,
+        )
 
 
 class _Asked:
@@ -174,7 +198,8 @@ class _Asked:
 class _Gathered:
     """All that a report is computed from."""
 
-    live: LiveMission
+    at_sea: bool
+    travel_m: float
     views: Mapping[str, View | Sequence[View] | None]
     rest: Mapping[str, Any]
     found: FoundCheck
@@ -184,14 +209,18 @@ class _Gathered:
     authority: str
 
 
+def _report(gathered: _Gathered, options: ReportOptions) -> bytes:
+    return options.kind.make(document_of(_answers(gathered, options.order), Texts(options.language)))
+
+
 def _answers(gathered: _Gathered, order: Order) -> Answers:
     material = gathered.material
-    snapshot, live = material.snapshot, gathered.live
+    snapshot = material.snapshot
     views: dict[str, Any] = dict(gathered.views)
     views |= {"quality": quality_of(snapshot), "crosslines": crossovers_view(gathered.found, snapshot, order)}
     is_swath = snapshot.ensonified() is not None
     if is_swath:
-        views["uncertainty_budget"] = uncertainty_budget(live, snapshot)
+        views["uncertainty_budget"] = budget_from(snapshot, gathered.travel_m)
     rest = {name: _plain(view) for name, view in views.items()} | dict(gathered.rest)
     rest |= {"map": snapshot.header() | {"corners": [list(corner) for corner in snapshot.header()["corners"]]}}
     if is_swath:
@@ -199,7 +228,7 @@ def _answers(gathered: _Gathered, order: Order) -> Answers:
     summed = [
         name for name in SUMMED if name not in gathered.left_off and (is_swath or SWATHS not in PRODUCTS[name].needs)
     ]
-    if live.header.state in AT_SEA:
+    if gathered.at_sea:
         summed = []  # they are others as soon as a vehicle has measured again
     rest["files"] = [_summed(make_product(name, material, ProductOptions(order)), name) for name in summed]
     return Answers(

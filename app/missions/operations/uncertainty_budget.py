@@ -17,10 +17,19 @@ LEAST_BELOW_M = 0.5
 
 def uncertainty_budget(live: LiveMission, snapshot: MapSnapshot) -> UncertaintyBudgetView:
     """Return what each source of error adds straight down and to the sides, at the map's mean depth."""
-    spec = live.spec
+    return budget_from(snapshot, travel_depth_m(live))
+
+
+def travel_depth_m(live: LiveMission) -> float:
+    """Return how deep the highest vehicle of a mission travels."""
+    limits = live.spec.limits
+    return min((member.cruise_depth_m(limits) for member in live.team), default=limits.min_depth_m)
+
+
+def budget_from(snapshot: MapSnapshot, travel_m: float) -> UncertaintyBudgetView:
+    """Return the budget of soundings that are made from a depth."""
+    spec = snapshot.facts.spec
     depth_m = float(np.nanmean(snapshot.built.map.depth_m))
-    limits = spec.limits
-    travel_m = min((member.cruise_depth_m(limits) for member in live.team), default=limits.min_depth_m)
     below_m = max(depth_m - travel_m, LEAST_BELOW_M)
     count = len(ANGLES_DEG)
     beams = BeamGeometry(np.radians(ANGLES_DEG), np.full(count, below_m), np.zeros(count))
