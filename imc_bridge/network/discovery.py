@@ -24,7 +24,6 @@ MAX_NAME = 64
 _VERSION_SERVICE = re.compile(r"imc\+info://[^/]*/version/([^/;]+)")
 _UID_SERVICE = re.compile(r"dune://[^/]*/uid/(\d+)")
 
-SYSTEM_CCU = 0
 VEHICLE_TYPES = frozenset({2, 3})
 """UUV and USV."""
 

@@ -1,7 +1,6 @@
 """How knowledge comes together in a run: everything at once, or in messages of limited capacity (AURO15 sec. 3.4)."""
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -16,32 +15,6 @@ APART = 0.02
 
 SILENT_AFTER = 5
 """Steps without a report after which the planner no longer counts on a vehicle."""
-
-
-class TeamModel(Protocol):
-    """The vehicles of a :class:`World` with their knowledge and the planner's."""
-
-    @property
-    def landmarks(self) -> Landmarks:
-        """What is known of the landmarks to anyone."""
-        ...
-
-    def sense(self, rng: np.random.Generator) -> None:
-        """Let every vehicle measure from where it is."""
-        ...
-
-    def report(self, step: int) -> tuple[IntArray, FloatArray, Belief]:
-        """Return what the planner gets to know: vehicles (k,) by number, their positions (k, 3), the landmarks."""
-        ...
-
-    @property
-    def sent_bytes(self) -> int:
-        """Bytes of all messages so far."""
-        ...
-
-    def order(self, vehicles: IntArray, waypoints: FloatArray) -> FloatArray:
-        """Hand the planner's waypoints (k, 3) to the vehicles; return where those that are there go, (n, 3)."""
-        ...
 
 
 class UnlimitedTeam:
