@@ -20,7 +20,7 @@ from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_l
 from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve, warm_up
 from app.exploration.survey.value import SurveyObjective, lower_to_route, lower_to_segment, make_nodes, plan_value
 from simulator.seafloors import generate
-from tests.support.situations import make_situation
+from tests.support.situations import make_belief, make_situation
 
 NO_TURNS = Turns(0.0, 0.0)
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
@@ -257,3 +257,36 @@ def test_the_backbone_is_as_long_as_each_vehicle_can_fly(left: tuple[float, floa
     )
     value = plan_value(far, nodes, objective, vehicles, vias, counts)
     assert value < plan_value(far, nodes, objective, vehicles, *packed([share.stops for share in other]))
+
+
+def most_across_m(left_m: float, legs: int) -> float:
+    """Survey a floor that is rough in one corner; return how far the leg goes to the side that does so most."""
+    situation = make_situation(belief=make_belief(cell=5.0))
+    rough = (situation.belief.xy_m > 50.0).all(axis=1)
+    planner, rng = create_planner("cao", PlannerOptions(search=1000), SingleBeam(0.01)), np.random.default_rng(0)
+    positions, most = situation.positions, 0.0
+    sounded, left = positions[:, :2], np.full(len(positions), left_m)
+    for step in range(1, legs + 1):
+        away = np.asarray(cKDTree(sounded).query(situation.belief.xy_m)[0])
+        belief = replace(
+            situation.belief,
+            depth_m=np.full(len(rough), 12.0),
+            sd_m=np.where(rough, 0.1 * away, 0.001 * away),
+            weight=np.where(rough, 9.0, 0.01),
+        )
+        now = replace(
+            situation, step=step, positions=positions, belief=belief, soundings_en_m=sounded, left_m=left.copy()
+        )
+        after = planner.propose(now, rng).positions
+        ways = after - positions
+        if step > 3:  # the first legs go to where the lines begin
+            most = max(most, float(np.abs(ways[:, :2]).min(axis=1).max()))
+        left -= np.linalg.norm(ways, axis=1)
+        sounded = np.vstack([sounded, *np.linspace(positions[:, :2], after[:, :2], 9)])
+        positions = after
+    return most
+
+
+def test_lines_that_lie_closer_than_the_places_that_plans_are_judged_at_stay_even() -> None:
+    assert most_across_m(left_m=1500.0, legs=90) < 0.5  # corners are cut
+    assert most_across_m(left_m=300.0, legs=30) > 1.0

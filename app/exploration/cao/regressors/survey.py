@@ -52,6 +52,9 @@ KNOWN = 0.5
 LEAVE_PLAN = 0.02
 """A leg off the plan must promise a squared error smaller by this part: predictions are noisy, and a choice among many
 takes the luckiest."""
+COARSE = 0.75
+"""Nodes farther apart than this part of the spacing of lines no longer tell lattices from freer plans: a search would
+bend lines to pass over nodes."""
 SILENT_WITHIN, SILENT = 0.5, 0.05
 """Within so many spacings of a place that gave no echo ground counts only this part: there is nothing to be heard."""
 JITTER = 0.7
@@ -366,7 +369,8 @@ class SurveyRegressors:
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
         knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
         leave = 1.0 if self._free else LEAVE_BACKBONE if self._adapts else LEAVE_LINES
-        self._free = knows and value + self._noise < leave * (values[1] + self._noise)
+        fine = _cell(self._nodes.en_m) <= COARSE * self._spacing
+        self._free = knows and fine and value + self._noise < leave * (values[1] + self._noise)
         self._planned_m = self._flown_m
         return (vias, counts), (value, values[1])
 
