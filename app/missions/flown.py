@@ -48,7 +48,8 @@ class Flown:
     def remember(self) -> dict[str, float]:
         """Return what is stored, so that a restart goes on counting."""
         kept = asdict(self)
-        return {name: round(kept[name], 2) for name in ("flown_m", "on_plan_m", "idle_s", "used_s")}
+        names = ("flown_m", "on_plan_m", "idle_s", "used_s", "left_m")
+        return {name: round(kept[name], 2) for name in names if kept[name] is not None}
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Flown":

@@ -36,8 +36,8 @@ def test_way_counts_as_planned_along_the_leg(
 
 def test_what_is_stored_is_counted_on() -> None:
     flown = Flown(flown_m=60.0, on_plan_m=50.0, idle_s=5.5, left_m=40.0, phase=Phase.SURVEY)
-    assert Flown.recall(flown.remember()) == Flown(flown_m=60.0, on_plan_m=50.0, idle_s=5.5)
-    assert Flown.recall(None) == Flown()
+    assert Flown.recall(flown.remember()) == Flown(flown_m=60.0, on_plan_m=50.0, idle_s=5.5, left_m=40.0)
+    assert Flown.recall(Flown().remember()) == Flown.recall(None) == Flown()
 
 
 def test_efficiency_is_the_teams_and_unknown_before_anything_was_flown() -> None:

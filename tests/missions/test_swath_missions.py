@@ -92,7 +92,7 @@ async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Har
     assert (live.progress().ensonified_pct or 0.0) > 99.0
 
 
-async def test_cells_by_depth_leave_the_same_after_the_service_started_again(harbour: Harbour) -> None:
+async def test_cells_and_what_was_left_are_the_same_after_the_service_started_again(harbour: Harbour) -> None:
     live = await started(harbour, cell_m=0.5, coverage={"cell_of_depth": 0.1})
     await until_state(harbour.service, live.id, MissionState.FINISHED)
 
@@ -118,6 +118,10 @@ async def test_cells_by_depth_leave_the_same_after_the_service_started_again(har
     await harbour.reopen()
     for before, after in zip((places, nodes, samples), await refined(), strict=True):
         np.testing.assert_array_equal(before, after)
+    again = (await harbour.service.get(live.id)).progress()
+    assert progress.minutes_left is not None
+    assert again.minutes_left == pytest.approx(progress.minutes_left, abs=0.02)
+    assert again.minutes_left < 60.0
 
 
 async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour) -> None:
