@@ -1,0 +1,178 @@
+"""The one door for heavy work: a cluster does it where there is one, else a thread or a process of this machine."""
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
+
+import structlog
+
+from app.compute.cluster import Cluster, NotDoneError, WorkersDiedError
+from app.compute.metrics import REPEATED, WORK
+from app.compute.packing import Packed, Raised, pack, unpack
+from app.compute.settings import ComputeSettings
+
+AT_ONCE_HERE = 1
+"""So many pieces of work that the cluster did not do are repeated by threads at the same time: each takes cores that
+vehicles' decisions need."""
+
+WAITING = 32
+"""Threads that wait for the cluster: maps of so many missions at the same time."""
+
+P = ParamSpec("P")
+Made = TypeVar("Made")
+
+log = structlog.get_logger(__name__)
+
+
+class Process(Protocol):
+    """Does one thing, beside this process."""
+
+    async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
+        """Return what a function of a module returns."""
+        ...
+
+
+class Processes(Process, Protocol):
+    """Has things done by processes of this machine."""
+
+    def process(self, *modules: str) -> AbstractAsyncContextManager[Process]:
+        """Have a process, for one thing, that loads modules meanwhile."""
+        ...
+
+
+class Compute:
+    """Has functions of modules computed with inputs that can be pickled.
+
+    What is given to a cluster and not done there, for whatever reason, is done once more on this machine: inputs are
+    never lost, and functions have no effect but what they return.
+
+    Parameters
+    ----------
+    processes
+        How this machine has things done by processes of its own.
+    """
+
+    def __init__(self, settings: ComputeSettings, processes: Processes) -> None:
+        self._cluster = Cluster(settings) if settings.scheduler else None
+        self._processes = processes
+        self._turn = threading.BoundedSemaphore(AT_ONCE_HERE)
+        self._waiting = ThreadPoolExecutor(WAITING, thread_name_prefix="compute") if settings.scheduler else None
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def start(self) -> None:
+        """Look for the cluster, if one is named. Does not wait."""
+        self._loop = asyncio.get_running_loop()
+        if self._cluster is not None:
+            self._cluster.start()
+
+    async def close(self) -> None:
+        """Give nothing to the cluster any more; what it has is given up."""
+        if self._cluster is not None:
+            await asyncio.to_thread(self._cluster.close)
+        if self._waiting is not None:
+            await asyncio.to_thread(self._waiting.shutdown, wait=True, cancel_futures=True)
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether a cluster does heavy work now."""
+        return self._cluster is not None and not self._cluster.trouble
+
+    @property
+    def waiting(self) -> Executor | None:
+        """Threads in which may be waited for the cluster; None where there is none."""
+        return self._waiting if self.elsewhere else None
+
+    @property
+    def state(self) -> str | None:
+        """How the cluster is: ``ok``, or why this machine does everything; None where no cluster is named."""
+        if self._cluster is None:
+            return None
+        return f"this machine does everything: {self._cluster.trouble}" if self._cluster.trouble else "ok"
+
+    async def run(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
+        """Return what a function of a module returns: by the cluster, else by a thread."""
+        try:
+            return await self._there(work, arguments, named)
+        except WorkersDiedError:
+            return await self._processes.make(work, *arguments, **named)
+        except NotDoneError:
+            return await asyncio.to_thread(self._here, work, arguments, named)
+
+    async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
+        """Return what a function of a module returns: by the cluster, else by a process of its own.
+
+        For libraries in C and loops of numpy, which would hold the interpreter's lock.
+        """
+        try:
+            return await self._there(work, arguments, named)
+        except NotDoneError:
+            WORK.labels("process").inc()
+            return await self._processes.make(work, *arguments, **named)
+
+    @asynccontextmanager
+    async def process(self, *modules: str) -> AsyncIterator[Process]:
+        """Have something to make one thing with, which loads modules while its input is gathered."""
+        if self.elsewhere:
+            yield self
+            return
+        async with self._processes.process(*modules) as process:
+            WORK.labels("process").inc()
+            yield process
+
+    def in_thread(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
+        """Return what :meth:`run` does; for threads, which wait."""
+        if not self.elsewhere:
+            return self._here(work, arguments, named)
+        try:
+            assert self._cluster is not None  # noqa: S101 - it is elsewhere
+            return cast("Made", self._made(self._cluster.submit(_name(work), pack((work, arguments, named))).result()))
+        except WorkersDiedError as error:
+            _repeat(work, error, "process")
+            assert self._loop is not None  # noqa: S101 - it was started
+            making = self._processes.make(work, *arguments, **named)
+            return asyncio.run_coroutine_threadsafe(_coroutine(making), self._loop).result()
+        except NotDoneError as error:
+            _repeat(work, error, "thread")
+            return self._here(work, arguments, named)
+
+    async def _there(self, work: Callable[..., Made], arguments: tuple[Any, ...], named: dict[str, Any]) -> Made:
+        """Return what the cluster makes. Raises NotDoneError, and whatever the work raises."""
+        if self._cluster is None or self._cluster.trouble:
+            raise NotDoneError("absent", "no cluster")
+        packed = await asyncio.to_thread(pack, (work, arguments, named))
+        try:
+            made = await asyncio.wrap_future(self._cluster.submit(_name(work), packed))
+        except NotDoneError as error:
+            _repeat(work, error, "process" if isinstance(error, WorkersDiedError) else "thread")
+            raise
+        return cast("Made", await asyncio.to_thread(self._made, made))
+
+    def _made(self, packed: Packed) -> Any:
+        made, raised = unpack(packed)
+        WORK.labels("cluster").inc()
+        if isinstance(raised, Raised):
+            raise raised.error()
+        return made
+
+    def _here(self, work: Callable[..., Made], arguments: tuple[Any, ...], named: dict[str, Any]) -> Made:
+        WORK.labels("thread").inc()
+        if self._cluster is None:
+            return work(*arguments, **named)
+        with self._turn:
+            return work(*arguments, **named)
+
+
+def _name(work: Callable[..., Any]) -> str:
+    return getattr(work, "__name__", type(work).__name__)
+
+
+def _repeat(work: Callable[..., Any], error: NotDoneError, where: str) -> None:
+    REPEATED.labels(error.kind).inc()
+    log.warning("done once more on this machine", work=_name(work), where=where, reason=str(error))
+
+
+async def _coroutine(making: Awaitable[Made]) -> Made:
+    return await making
