@@ -331,7 +331,7 @@ async def get_crossovers_file(
     """Return where lines cross as a file, all crossings."""
     options = ProductOptions(order)
     return file_answer(
-        await export(mission, service.maps, service.settings.provider, service.workshop, "crossovers.csv", options)
+        await export(mission, service.maps, service.settings.provider, service.compute, "crossovers.csv", options)
     )
 
 
@@ -421,7 +421,7 @@ def file_answer(product: Product | Response) -> Response:
 async def get_holidays_file(service: Service, reader: Reader, mission: Mission) -> Response:
     """Return what swath sonars missed as a file."""
     return file_answer(
-        await export(mission, service.maps, service.settings.provider, service.workshop, "holidays.geojson")
+        await export(mission, service.maps, service.settings.provider, service.compute, "holidays.geojson")
     )
 
 
@@ -446,7 +446,7 @@ def _add_files(resource: str, operation_id: str, summary: str, description: str)
                 f"the {resource} {'is' if resource == MAP else 'are'} not made as .{format[:20]}",
                 remedy="Use one of " + ", ".join(f".{name}" for name in kinds),
             )
-        making = export(mission, service.maps, service.settings.provider, service.workshop, kinds[format], options)
+        making = export(mission, service.maps, service.settings.provider, service.compute, kinds[format], options)
         return file_answer(await while_connected(request, making))
 
     get_file.__doc__ = description

@@ -79,5 +79,5 @@ async def get_search(
 async def get_search_obstacles(service: Service, reader: Reader, mission: Mission) -> Response:
     """Return the outlines of all cells that obstacles fill: known beforehand, and found."""
     return file_answer(
-        await export(mission, service.maps, service.settings.provider, service.workshop, "obstacles.geojson")
+        await export(mission, service.maps, service.settings.provider, service.compute, "obstacles.geojson")
     )

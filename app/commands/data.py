@@ -70,7 +70,7 @@ def export(
     async def run(service: MissionService) -> Product:
         live = await meant_mission(service, mission)
         return await mission_maps.export(
-            live, service.maps, service.settings.provider, service.workshop, format, options
+            live, service.maps, service.settings.provider, service.compute, format, options
         )
 
     product = with_missions(settings, run)

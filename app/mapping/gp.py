@@ -1,5 +1,6 @@
 """The default map: a nonstationary Gaussian process, kriged locally."""
 
+import copy
 import math
 from dataclasses import replace
 from typing import Literal, Self
@@ -67,6 +68,22 @@ TILE_RANGE = (4, 16)
 
 REFINEMENT_GAIN = 5.0  # of log likelihood, to consider the nonstationary process
 FULL_TRUST_GAIN = 0.04  # by which part it must predict better to be trusted alone
+
+OF_SOUNDINGS = (
+    "soundings_",
+    "outliers_",
+    "trend_",
+    "_levels",
+    "_plain",
+    "_refined",
+    "_rough",
+    "_support",
+    "_log_ratio",
+    "_scale_fields",
+    "_calibration",
+    "_reach",
+)
+"""What every fit makes anew, however large."""
 
 
 class GaussianProcessMap:
@@ -229,6 +246,13 @@ class GaussianProcessMap:
         )
         self.trend_ = best.trend
         return self
+
+    def learned(self) -> Self:
+        """Return what was learned, without the soundings: fit it with ``learn=False`` for the same predictions."""
+        bare = copy.copy(self)
+        for name in OF_SOUNDINGS:
+            bare.__dict__.pop(name, None)
+        return bare
 
     def _rough_process(self, subset: IntArray, *, learn: bool) -> Conditioned | None:
         """What is believed where soundings do not surround a place; None where the kernel is not smoother than that."""

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import structlog
 
+from app.compute.door import Compute
 from app.exploration.planners import INSTALLED
 from app.missions import states
 from app.missions.alarms.desk import AlarmDesk
@@ -108,6 +109,9 @@ class MissionService:
             links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody, is_own_user).link)
         self.hub = FleetHub(links)
         """All links."""
+        self._workshop = Workshop()
+        self.compute = Compute(settings.compute, self._workshop)
+        """Does what computes long."""
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._claims = Claims(self.hub)
         self.maps = FinalMaps()
@@ -116,7 +120,7 @@ class MissionService:
         """Tiles of maps for web maps and GIS."""
         self._compiling = ThreadPoolExecutor(WORKERS, thread_name_prefix="compiling")
         self._compilation = Compilation(self._compiling)
-        self.forecaster = Forecaster(self.hub, self._compilation)
+        self.forecaster = Forecaster(self.hub, self._compilation, self.compute)
         """Flies missions ahead."""
         self._supervisor = MissionSupervisor(
             self.hub, self._claims, self._executor, self.maps, self._compilation, settings.time_scale
@@ -128,7 +132,14 @@ class MissionService:
         self.traffic = Traffic(settings.ais, lambda: places_of(self._registry))
         """Ships about."""
         self._registry = MissionRegistry(
-            database, self.hub, self._executor, self.maps, self._ping_files, settings.time_scale, self.traffic
+            database,
+            self.hub,
+            self._executor,
+            self.maps,
+            self._ping_files,
+            settings.time_scale,
+            self.traffic,
+            self.compute,
         )
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
@@ -139,9 +150,7 @@ class MissionService:
         """Files on their way in."""
         self.imports = Imports(Reader(unconfined=settings.unconfined_imports), self.maps)
         """Files that missions begin with or are compared with."""
-        self.workshop = Workshop()
-        """Makes what computes long."""
-        self.reports = Reports(self.maps, settings.provider, self.workshop)
+        self.reports = Reports(self.maps, settings.provider, self.compute)
         """Reports of surveys."""
         self.sites = Sites(database, self.get, self.maps, self.imports, lambda: self._started)
         """Places that are surveyed again and again."""
@@ -154,6 +163,7 @@ class MissionService:
         for planner in INSTALLED.broken.values():
             log.warning("planner cannot be used", planner=planner.name, package=planner.package, reason=planner.reason)
         self._compilation.begin()
+        self.compute.start()
         await finish_removing(self._database, self._ping_files)
         await self.hub.start()
         await self.traffic.start()
@@ -168,7 +178,8 @@ class MissionService:
         Running missions stay running: another process takes them up, or this one at its next start.
         """
         self._started = False
-        await self.workshop.close()
+        await self._workshop.close()
+        await self.compute.close()
         await self._failover.end()
         await self.alarms.close()
         await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))
@@ -204,7 +215,11 @@ class MissionService:
             components["database"] = self._database.trouble or "ok"
         except Exception as error:
             components["database"] = f"cannot be reached: {error}"
-        return all(state == "ok" for state in components.values()), components
+        well = all(state == "ok" for state in components.values())
+        if self.compute.state is not None:
+            # Without the cluster everything is done all the same, later.
+            components["compute"] = self.compute.state
+        return well, components
 
     # Missions
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from app.compute.settings import ComputeSettings
 from app.missions.alarm_settings import AlarmSettings
 from imc_bridge.settings import ConsoleSettings
 
@@ -218,6 +219,7 @@ class ServiceSettings(Section):
     simulation: SimulationSettings = Field(
         default=SimulationSettings(), description="The world of vehicles of kind sim"
     )
+    compute: ComputeSettings = Field(default=ComputeSettings(), description="Where heavy work is done")
     provider: ProviderSettings = Field(
         default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
     )

@@ -129,7 +129,7 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 if options.keep is not None:
                     (options.keep / f"report-{language}.{name}").write_bytes(product.content)
         begun = time.perf_counter()
-        product = await export(live, service.maps, service.settings.provider, service.workshop, "tif")
+        product = await export(live, service.maps, service.settings.provider, service.compute, "tif")
         found["map_tif_s"] = round(time.perf_counter() - begun, 2)
         found["map_tif_bytes"] = len(product.content)
         begun = time.perf_counter()

@@ -11,10 +11,11 @@ from pydantic import Field
 from shapely.geometry import Point, Polygon
 
 from app.arrays import FloatArray
+from app.compute.door import Compute
 from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
-from app.missions.forecast.simulate import Forecast, forecast
+from app.missions.forecast.simulate import Forecast, floors_under, fly_over, forecast
 from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_spec
 from app.missions.running.team_changes import refuse_ended
@@ -76,11 +77,12 @@ class ForecastView(View):
 
 
 class Forecaster:
-    """Makes forecasts beside the planning of running missions."""
+    """Makes forecasts beside the planning of running missions: on a cluster over all floors at the same time."""
 
-    def __init__(self, hub: FleetHub, compilation: Compilation) -> None:
+    def __init__(self, hub: FleetHub, compilation: Compilation, compute: Compute) -> None:
         self._hub = hub
         self._compilation = compilation
+        self._compute = compute
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="forecast")
         self._one = asyncio.Lock()
         self._closing = threading.Event()
@@ -140,17 +142,39 @@ class Forecaster:
         ours = members or [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
         if not ours:
             raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+        known = np.zeros((0, 4)) if prior is None else prior
+        starts, where = await asyncio.to_thread(starts_of, spec, ours)
+        if self._compute.elsewhere:
+            floors = await asyncio.to_thread(lambda: list(floors_under(spec, ours, known, floor_depth_m)))
+            flights = await asyncio.gather(
+                *(
+                    self._compute.run(fly_over, floor, spec, ours, starts, known, first_step, BUDGET_S)
+                    for floor in floors
+                )
+            )
+            found = Forecast(list(flights), floors)
+        else:
+            found = await self._here(spec, ours, starts, known, floor_depth_m, first_step)
+        return _view(spec, found, where, spec.steps - first_step + 1)
+
+    async def _here(
+        self,
+        spec: MissionSpec,
+        members: list[Member],
+        starts_m: FloatArray,
+        prior: FloatArray,
+        floor_depth_m: float | None,
+        first_step: int,
+    ) -> Forecast:
         # The time that a forecast may take is for steps, not for compiling.
         await self._compilation.search()
         gone = threading.Event()
-        known = np.zeros((0, 4)) if prior is None else prior
-        starts, where = await asyncio.to_thread(starts_of, spec, ours)
         work = partial(
             forecast,
             spec,
-            ours,
-            starts,
-            known,
+            members,
+            starts_m,
+            prior,
             floor_depth_m=floor_depth_m,
             first_step=first_step,
             budget_s=BUDGET_S,
@@ -159,10 +183,9 @@ class Forecaster:
         )
         try:
             async with self._one:
-                found = await asyncio.get_running_loop().run_in_executor(self._executor, work)
+                return await asyncio.get_running_loop().run_in_executor(self._executor, work)
         finally:
             gone.set()
-        return _view(spec, found, where, spec.steps - first_step + 1)
 
 
 def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str]:

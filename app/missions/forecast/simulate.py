@@ -104,18 +104,24 @@ def forecast(
         Asked at every step whether anyone still wants to know.
     """
     begun = time.monotonic()
-    cruise = max(member.cruise_depth_m(spec.limits) for member in members)
     flights: list[Flown] = []
     floors: list[Floor] = []
-    for floor in floors_of(spec, prior, cruise, floor_depth_m):
+    for floor in floors_under(spec, members, prior, floor_depth_m):
         if flights and (stop() or time.monotonic() - begun > patience_s):
             break
         floors.append(floor)
-        flights.append(_fly_over(floor, spec, members, starts_m, prior, first_step, budget_s, stop))
+        flights.append(fly_over(floor, spec, members, starts_m, prior, first_step, budget_s, stop))
     return Forecast(flights, floors)
 
 
-def _fly_over(
+def floors_under(
+    spec: MissionSpec, members: list[Member], prior: FloatArray, floor_depth_m: float | None = None
+) -> Iterator[Floor]:
+    """Return the floors that a mission is flown ahead over, one after the other; see :func:`forecast`."""
+    return floors_of(spec, prior, max(member.cruise_depth_m(spec.limits) for member in members), floor_depth_m)
+
+
+def fly_over(
     floor: Floor,
     spec: MissionSpec,
     members: list[Member],
@@ -123,8 +129,9 @@ def _fly_over(
     prior: FloatArray,
     first_step: int,
     budget_s: float,
-    stop: Callable[[], bool],
+    stop: Callable[[], bool] = lambda: False,
 ) -> Flown:
+    """Fly a mission ahead over one floor; see :func:`forecast`."""
     until = time.thread_time() + budget_s
     builder = MapBuilder(
         spec.local_area(), forecast_cell_m(spec), spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth

@@ -14,6 +14,7 @@ import structlog
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
+from app.compute.door import Compute
 from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
@@ -47,7 +48,7 @@ from app.missions.live.swath_intake import SwathIntake
 from app.missions.live.trails import Trails
 from app.missions.live.vehicles import VehicleViews, local_place
 from app.missions.live.waypoints import WaypointViews
-from app.missions.maps.builder import BuiltMap, MapBuilder
+from app.missions.maps.builder import HEAVY, BuiltMap, MapBuilder
 from app.missions.maps.live_grid import map_of
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
 from app.missions.maps.tiles import TileCache
@@ -176,6 +177,8 @@ class LiveMission:
         self.team = Team(hub.capabilities, self._energy_of)
         self.broadcaster = Broadcaster()
         self.builder = builder
+        self.compute: Compute | None = None
+        """Who does heavy work; None: this process alone."""
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
         corrections = Corrections.of(spec, self.frame, stored.tide_table, stored.adjustment)
@@ -496,7 +499,7 @@ class LiveMission:
         await self.whole.complete()
         await self.swath.complete()
         before = self.builder.newest
-        built = await self.in_thread(partial(self.builder.build, thorough=True))
+        built = await self.mapped(partial(self.builder.build, thorough=True))
         if built is not None and built is not before:
             self.publish_map(built)
             self.publish_summary()
@@ -513,6 +516,17 @@ class LiveMission:
         if self.map_is_missing:
             await self.build_map()
             await self.whole.keep(self.header.step, ended=self.header.state in ENDED)
+
+    def compute_by(self, compute: Compute) -> None:
+        """Have heavy work done by a cluster, where there is one."""
+        self.compute = compute
+        self.builder.elsewhere = compute.in_thread
+
+    async def mapped(self, work: Callable[..., Made], *arguments: Any) -> Made:
+        """Have the builder make a map in a worker thread; planning threads do not wait for a cluster."""
+        many = self.compute is not None and self.journal.counts.accepted >= HEAVY
+        waiting = self.compute.waiting if self.compute is not None and many else None
+        return await asyncio.get_running_loop().run_in_executor(waiting or self._executor, work, *arguments)
 
     async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
         """Compute something in a worker thread."""

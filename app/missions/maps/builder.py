@@ -1,10 +1,11 @@
 """From accepted soundings to the mission's map and to the belief a planner works on."""
 
-import copy
 import hashlib
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import shapely
@@ -16,7 +17,7 @@ from app.exploration.core.coverage import Coverage
 from app.exploration.core.problem import Belief
 from app.mapping.fusion import fuse, prior_map
 from app.mapping.gp import GaussianProcessMap
-from app.mapping.outliers import flag_outliers
+from app.mapping.surveys import judged, mapped
 from app.mapping.swath.ensonified import Ensonified, ensonified
 from app.mapping.swath.gridded import is_of_swaths, without_guesses
 from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
@@ -35,6 +36,9 @@ the second is added times its share of the area."""
 
 Doubted = list[tuple[FloatArray, str]]
 """Soundings, rows of shape (4,), that a map leaves out, each with the reason."""
+
+HEAVY = 20_000
+"""Of so many soundings on maps are made elsewhere, where that is possible: of fewer it would hardly be quicker."""
 
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
@@ -131,6 +135,9 @@ class MapBuilder:
         self._nodes &= self.mask
         if not self._nodes.any():
             self._nodes = self.mask.copy()
+        self.elsewhere: Callable[..., Any] = _here
+        """Computes a function of a module with its arguments, in place of the thread that asks."""
+        self._away = False
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
         self.arrivals = MapQueue()
         self.live = LiveGrid(self.grid, self.mask) if live else None
@@ -204,9 +211,11 @@ class MapBuilder:
         """Make a map of everything added so far; None without soundings.
 
         Gross outliers are judged by ``learn``; a sounding that came since is trusted until then. A thorough map judges
-        every sounding and learns the model first, as a product should. While the soundings are not in memory the newest
-        map stays as it is.
+        every sounding and learns the model first, as a product should. While the soundings are not in memory, or a
+        thorough map is made elsewhere, the newest map stays as it is: no decision waits for a cluster.
         """
+        if self._away and not thorough and self._newest is not None:
+            return self._newest
         with self._building:
             came = self.arrivals.take()
             if came is None:
@@ -220,7 +229,7 @@ class MapBuilder:
                 self._newest = None
                 return None
             if thorough:
-                self.learn(always=True)
+                self._learn(self._compute(thorough=True), always=True)
             if came[0] or beams != self._beams_mapped or (self._newest is not None and thorough):
                 self._newest = self._build(thorough=thorough)
                 self._beams_mapped = beams
@@ -252,7 +261,7 @@ class MapBuilder:
         bathymetry = self._prior
         measured = self.swath.map(self._soundings) if self.swath.beams else None
         if measured is None and len(self._soundings):
-            measured = self._measured()
+            measured = self._measured(self._compute(thorough=thorough))
         if measured is not None:
             bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
         if bathymetry is None:
@@ -280,7 +289,7 @@ class MapBuilder:
             if self.swath.beams:
                 measured = self.swath.map(self._soundings)
                 return None if measured is None else without_guesses(measured)
-            return self._measured() if len(self._soundings) else None
+            return self._measured(self._compute(thorough=True)) if len(self._soundings) else None
 
     def _with_margin(self, bathymetry: BathymetricMap) -> BathymetricMap:
         """Ask more of cells that were not known in the newest map."""
@@ -289,23 +298,36 @@ class MapBuilder:
         before = np.zeros_like(self.mask) if self._newest is None else self._newest.map.known(self._accuracy_m)
         return replace(bathymetry, bound_sd_m=bound * np.where(before, 1.0, asked))
 
-    def _measured(self) -> BathymetricMap:
+    def _compute(self, *, thorough: bool) -> Callable[..., Any]:
+        """Return who computes: maps that vehicles are led by are always made here."""
+        return self._elsewhere if thorough and len(self._soundings) >= HEAVY else _here
+
+    def _elsewhere(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        self._away = True
+        try:
+            return self.elsewhere(work, *arguments)
+        finally:
+            self._away = False
+
+    def _measured(self, compute: Callable[..., Any]) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
         learned = self._learned
         used = np.ones(len(self._soundings), dtype=bool)
         used[: len(learned.reasons)] = ~learned.rejected
-        model = copy.copy(learned.model)
-        bathymetry = model.fit(Soundings.of_rows(self._soundings[used]), learn=False).predict(self.grid, self.mask)
+        bathymetry, model = compute(mapped, self._soundings[used], learned.model, self.grid, self.mask)
         if not learned.reasons:
             # The first fit had to learn; keep what it found.
             self._learned = _Learned(model)
-        return bathymetry
+        return bathymetry  # type: ignore[no-any-return]
 
     def learn(self, *, always: bool = False) -> None:
         """Judge outliers and learn the model's hyperparameters anew when there are enough more soundings.
 
         Slower than a build, so it is done while the vehicles travel. The next ``build`` uses what was found.
         """
+        self._learn(_here, always=always)
+
+    def _learn(self, compute: Callable[..., Any], *, always: bool) -> None:
         if not self._learning.acquire(blocking=always):
             return  # somebody is at it
         try:
@@ -314,17 +336,12 @@ class MapBuilder:
             known, trusted = self._soundings, self._trusted
             if not len(known) or (len(known) < RELEARN_GROWTH * len(before) and not always):
                 return
-            soundings = Soundings.of_rows(known)
-            verdict = flag_outliers(soundings, hyperparameters=getattr(model, "stationary_hyperparameters_", None))
             # Both were taken while soundings may have been added: the shorter one says for how many.
-            restored = np.flatnonzero(trusted[: len(known)])
-            reasons = list(verdict.reasons)
-            for i in restored:
-                reasons[i] = ""
-            used = np.array([not reason for reason in reasons])
-            fitted = copy.copy(model).fit(soundings.take(used), learn=True)
+            restored = np.zeros(len(known), dtype=bool)
+            restored[: len(trusted)] = trusted[: len(known)]
+            fitted, reasons = compute(judged, known, restored, model)
             if generation == self._generation:
-                self._learned = _Learned(fitted, known, tuple(reasons))
+                self._learned = _Learned(fitted, known, tuple(reasons.get(i, "") for i in range(len(known))))
         finally:
             self._learning.release()
 
@@ -350,8 +367,8 @@ class MapBuilder:
             if prior is None:
                 raise ValueError("there is no sounding to make a map of")
             return prior
-        model = copy.copy(learned.model)
-        measured = model.fit(Soundings.of_rows(soundings[used]), learn=False).predict(self.grid, self.mask)
+        compute = self.elsewhere if len(soundings) >= HEAVY else _here
+        measured: BathymetricMap = compute(mapped, soundings[used], learned.model, self.grid, self.mask)[0]
         return measured if prior is None else fuse(measured, prior)
 
     def coverage_pct(self) -> float:
@@ -424,6 +441,10 @@ class MapBuilder:
         doubtful = np.zeros(len(places), dtype=bool)
         doubtful[: len(rejected)] = rejected
         return places[~doubtful], places[doubtful]
+
+
+def _here(work: Callable[..., Any], *arguments: Any) -> Any:
+    return work(*arguments)
 
 
 def _new_model() -> GaussianProcessMap:

@@ -98,7 +98,7 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
         tracks = await _positions(live, places)
         fixes = await asyncio.to_thread(_fixes, request.fixes, tracks, names, live.frame)
         model = DriftModel(walk_m=request.walk_m, rate_mph=request.rate_mph)
-        found = await asyncio.to_thread(
+        found = await (asyncio.to_thread if live.compute is None else live.compute.run)(
             adjusted, soundings, fixes, model, cell_m=max(FINEST_M, live.spec.cell_m), reach_m=REACH_M
         )
         view = await asyncio.to_thread(_view, found, names, len(fixes), live.frame, actor)

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 
+from app.compute.door import Compute
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions.clock import now
 from app.missions.errors import MapNotReadyError
@@ -27,7 +28,6 @@ from app.missions.maps.snapshot import MapSnapshot
 from app.missions.operations.crossovers import check_of
 from app.missions.operations.history import soundings_of
 from app.missions.operations.scans import search_of
-from app.missions.operations.workshop import Workshop
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
 from app.missions.views.soundings import Verdict
@@ -65,7 +65,7 @@ async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
     if newest is None:
         raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
     try:
-        bathymetry = await live.in_thread(live.builder.as_of, found.table)
+        bathymetry = await live.mapped(live.builder.as_of, found.table)
     except ValueError:
         raise MapNotReadyError(
             f"no sounding was accepted until the end of step {step}", "choose a later step"
@@ -97,7 +97,7 @@ async def export(
     live: LiveMission,
     maps: FinalMaps,
     provider: ProviderSettings,
-    workshop: Workshop,
+    compute: Compute,
     name: str,
     options: ProductOptions | None = None,
 ) -> Product:
@@ -126,7 +126,7 @@ async def export(
     )
     chosen = options or ProductOptions()
     if snapshot is not None and snapshot.large:
-        return await workshop.make(make_product, name, material, chosen)
+        return await compute.make(make_product, name, material, chosen)
     return await live.in_thread(make_product, name, material, chosen)
 
 

@@ -16,6 +16,7 @@ import orjson
 
 from app import __version__
 from app.arrays import FloatArray
+from app.compute.door import Compute
 from app.mapping.products.tracks import Track
 from app.mapping.s44 import Order
 from app.missions.clock import now
@@ -40,7 +41,6 @@ from app.missions.operations.pings import pings_of
 from app.missions.operations.recorrection import corrections_view
 from app.missions.operations.review import soundings_page
 from app.missions.operations.uncertainty_budget import budget_from, travel_depth_m
-from app.missions.operations.workshop import Workshop
 from app.missions.report.answers import Answers, Incident
 from app.missions.report.kinds import ReportKind
 from app.missions.report.sections import document_of
@@ -80,9 +80,9 @@ class ReportOptions:
 class Reports:
     """Makes reports, one at a time, beside everything else."""
 
-    def __init__(self, maps: FinalMaps, provider: ProviderSettings, workshop: Workshop) -> None:
+    def __init__(self, maps: FinalMaps, provider: ProviderSettings, compute: Compute) -> None:
         self._maps = maps
-        self._workshop = workshop
+        self._compute = compute
         self._authority = provider.organization
         self._turn = asyncio.Lock()
 
@@ -117,7 +117,7 @@ class Reports:
         """Return what is made of all that is known of a mission."""
         snapshot = await newest_map(live, self._maps)
         if snapshot.large:
-            async with self._workshop.process(__name__, "matplotlib.figure") as process:
+            async with self._compute.process(__name__, "matplotlib.figure") as process:
                 return await process.make(work, await self._gathered(live, order, snapshot), asked)
         # Not with the planning threads: vehicles may wait for a decision.
         return await asyncio.to_thread(work, await self._gathered(live, order, snapshot), asked)

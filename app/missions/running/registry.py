@@ -8,6 +8,7 @@ from functools import partial
 import structlog
 from sqlalchemy import delete, select
 
+from app.compute.door import Compute
 from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import take_up
@@ -43,6 +44,7 @@ class MissionRegistry:
         ping_files: PingFiles,
         time_scale: float,
         traffic: Traffic | None = None,
+        compute: Compute | None = None,
     ) -> None:
         self._database = database
         self._hub = hub
@@ -51,6 +53,7 @@ class MissionRegistry:
         self._ping_files = ping_files
         self._time_scale = time_scale
         self._traffic = traffic
+        self._compute = compute
         self._ownership: Ownership | None = None
         self._may_take_up: Callable[[MissionRow], Awaitable[bool]] = _always
         self._taken_up: Callable[[LiveMission], Awaitable[None]] = _nothing
@@ -123,6 +126,8 @@ class MissionRegistry:
                     row = await session.get_one(MissionRow, mission_id)
             live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
             live.ships.traffic = self._traffic
+            if self._compute is not None:
+                live.compute_by(self._compute)
             if self._ownership is not None:
                 await live.pings.tidy()
             await self._make_room()

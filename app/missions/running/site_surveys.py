@@ -34,7 +34,7 @@ async def keep_survey(live: LiveMission) -> None:
     if not _is_mapped(live):
         await live.build_map()
     made_of = _made_of(live)
-    own = await live.in_thread(live.builder.own_map)
+    own = await live.mapped(live.builder.own_map)
     period = await _period(live)
     if own is None or period is None:
         survey, content = None, b""
