@@ -73,7 +73,7 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert before.version >= found.version
     figures = (await view_of(service, mission.id)).progress.search
     product = await export(
-        await service.get(mission.id), service.maps, service.settings.provider, service.workshop, "obstacles.geojson"
+        await service.get(mission.id), service.maps, service.settings.provider, service.compute, "obstacles.geojson"
     )
     geo = json.loads(product.content)
     seen = [f for f in geo["features"] if f["properties"]["found"]]

@@ -136,11 +136,11 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
         if extension in REFUSED:
             with pytest.raises(ConflictError, match=REFUSED[extension]):
                 await export(
-                    await service.get(created.id), service.maps, service.settings.provider, service.workshop, extension
+                    await service.get(created.id), service.maps, service.settings.provider, service.compute, extension
                 )
             continue
         product = await export(
-            await service.get(created.id), service.maps, service.settings.provider, service.workshop, extension
+            await service.get(created.id), service.maps, service.settings.provider, service.compute, extension
         )
         assert (product.filename, product.media_type) == (f"quay.{extension}", kind.media_type)
         if extension == "tif":
@@ -160,7 +160,7 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
             cells = [row for row in product.content.decode().splitlines() if row and not row.startswith("#")]
             assert len(cells) >= 225
     with pytest.raises(InvalidRequestError, match="there is no format 'doc'") as caught:
-        await export(await service.get(created.id), service.maps, service.settings.provider, service.workshop, "doc")
+        await export(await service.get(created.id), service.maps, service.settings.provider, service.compute, "doc")
     assert "tif" in caught.value.remedy
 
 

@@ -99,7 +99,7 @@ async def test_cells_and_what_was_left_are_the_same_after_the_service_started_ag
     async def refined() -> Any:
         mission = await harbour.service.get(live.id)
         settings = harbour.service.settings
-        product = await export(mission, harbour.service.maps, settings.provider, harbour.service.workshop, "vr.bag")
+        product = await export(mission, harbour.service.maps, settings.provider, harbour.service.compute, "vr.bag")
         with h5py.File(io.BytesIO(product.content)) as file:
             return [file[f"BAG_root/varres_{name}"][:] for name in ("metadata", "refinements", "nodes")]
 

@@ -56,7 +56,7 @@ def reported(harbour: Harbour, live: LiveMission, kind: str = "html") -> Any:
 
 def exported(harbour: Harbour, live: LiveMission, name: str) -> Any:
     service = harbour.service
-    return export(live, service.maps, service.settings.provider, service.workshop, name, ProductOptions())
+    return export(live, service.maps, service.settings.provider, service.compute, name, ProductOptions())
 
 
 async def test_they_are_what_they_would_be_here(
