@@ -1,6 +1,7 @@
 """The one door for heavy work: a cluster does it where there is one, else a thread or a process of this machine."""
 
 import asyncio
+import pickle
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -81,6 +82,11 @@ class Compute:
         return self._cluster is not None and not self._cluster.trouble
 
     @property
+    def workers(self) -> int:
+        """How many workers do heavy work now."""
+        return self._cluster.workers if self._cluster is not None and self.elsewhere else 0
+
+    @property
     def waiting(self) -> Executor | None:
         """Threads in which may be waited for the cluster; None where there is none."""
         return self._waiting if self.elsewhere else None
@@ -128,7 +134,7 @@ class Compute:
             return self._here(work, arguments, named)
         try:
             assert self._cluster is not None  # noqa: S101 - it is elsewhere
-            return cast("Made", self._made(self._cluster.submit(_name(work), pack((work, arguments, named))).result()))
+            return cast("Made", self._made(self._cluster.submit(_name(work), _packed(work, arguments, named)).result()))
         except WorkersDiedError as error:
             _repeat(work, error, "process")
             assert self._loop is not None  # noqa: S101 - it was started
@@ -142,8 +148,8 @@ class Compute:
         """Return what the cluster makes. Raises NotDoneError, and whatever the work raises."""
         if self._cluster is None or self._cluster.trouble:
             raise NotDoneError("absent", "no cluster")
-        packed = await asyncio.to_thread(pack, (work, arguments, named))
         try:
+            packed = await asyncio.to_thread(_packed, work, arguments, named)
             made = await asyncio.wrap_future(self._cluster.submit(_name(work), packed))
         except NotDoneError as error:
             _repeat(work, error, "process" if isinstance(error, WorkersDiedError) else "thread")
@@ -167,6 +173,13 @@ class Compute:
 
 def _name(work: Callable[..., Any]) -> str:
     return getattr(work, "__name__", type(work).__name__)
+
+
+def _packed(work: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Packed:
+    try:
+        return pack((work, arguments, named))
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        raise NotDoneError("failed", f"its input cannot be sent ({error})") from None
 
 
 def _repeat(work: Callable[..., Any], error: NotDoneError, where: str) -> None:

@@ -144,6 +144,12 @@ async def test_who_no_longer_waits_does_not_keep_others_waiting(compute: Compute
     assert os.getpid() not in made
 
 
+async def test_what_cannot_be_sent_is_done_here(compute: Compute) -> None:
+    number = 7
+    assert await compute.run(lambda: (number, os.getpid())) == (7, os.getpid())
+    assert compute.state == "ok"
+
+
 async def test_a_worker_with_other_versions_is_told_and_nothing_is_given_to_it(
     compute: Compute, dask: DaskCluster, tmp_path: Path
 ) -> None:

@@ -8,17 +8,19 @@ from prometheus_client import REGISTRY
 
 from app.compute import cluster as cluster_module
 from app.compute.settings import ComputeSettings
+from app.missions.clock import now
 from app.missions.forecast import floor, request
 from app.missions.live import mission as live_mission
 from app.missions.live.mission import LiveMission
 from app.missions.maps import builder, snapshot
 from app.missions.operations import mission_maps
-from app.missions.operations.adjustment import AdjustmentRequest, adjust
+from app.missions.operations.adjustment import adjust
 from app.missions.operations.measurements import measure
 from app.missions.operations.mission_maps import export, newest_map
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
+from app.missions.views.adjustment import AdjustmentRequest
 from tests.support.cluster import DaskCluster, dask_cluster
 from tests.support.missions.harbour import Harbour, sim_spec
 from tests.support.missions.specs import make_spec
@@ -74,7 +76,7 @@ def by_the_cluster() -> float:
 async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
     service: MissionService, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    moment = mission_maps.now()
+    moment = now()
     monkeypatch.setattr(mission_maps, "now", lambda: moment)
     monkeypatch.setattr(floor, "KINDS", floor.KINDS[:2])
     spec = sim_spec(steps=3, planner={"name": "lawnmower"})
@@ -94,7 +96,9 @@ async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
     file = await product()
     ties = await adjusted(other)
     foretold = await service.forecaster.of_description(spec)
-    assert by_the_cluster() >= begun + 4 + foretold.floors
+    assert by_the_cluster() == begun + 4 + foretold.floors
+    assert (await service.forecaster.of_mission(live)).floors == 2
+    assert by_the_cluster() == begun + 4 + 2 * foretold.floors
     assert (await service.ready())[1]["compute"] == "ok"
 
     dask.kill_workers()

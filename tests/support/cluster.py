@@ -38,11 +38,10 @@ class DaskCluster:
         """Start it; who asks before it listens is refused."""
         self.scheduler = self._start("scheduler", f"--host={self.address}", "--no-dashboard", "--no-show")
 
-    def start_worker(self, **environment: str) -> subprocess.Popen[bytes]:
+    def start_worker(self, *options: str, **environment: str) -> subprocess.Popen[bytes]:
         """Start one with one thread; it looks for the scheduler until that is there."""
-        worker = self._start(
-            "worker", self.address, "--nthreads=1", "--no-nanny", "--no-dashboard", "--death-timeout=240", **environment
-        )
+        usual = "--nthreads=1", "--no-nanny", "--no-dashboard", "--death-timeout=240"
+        worker = self._start("worker", self.address, *usual, *options, **environment)
         self.workers.append(worker)
         return worker
 
