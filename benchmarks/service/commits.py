@@ -1,9 +1,9 @@
 """How many writes missions get from one database: ``python -m benchmarks.service.commits [--missions 8 --seconds 10]``.
 
 Missions of five vehicles each, which tell five soundings a second, write as they do at sea: what came in 0.1 s is
-judged, then committed in one transaction. Here no time is waited in between: told is how many transactions
-and soundings a second all missions of one process get, and what each costs that process's processor, with SQLite in a file and with a
-PostgreSQL server on the same machine, where one is installed.
+judged, then committed in one transaction. Here no time is waited in between: told is how many transactions and
+soundings a second all missions of one process get, and what each costs that process's processor, with SQLite in a file
+and with a PostgreSQL server on the same machine, where one is installed.
 """
 
 import argparse
