@@ -36,7 +36,10 @@ NO_WORKER_S = 20.0
 AHEAD = 2
 """So many pieces more than workers can do are with the cluster; the next ones wait here."""
 
+LEAVE_S = 2.0
+
 CONNECTING = "not connected yet"
+ENDING = "the service is ending"
 
 log = structlog.get_logger(__name__)
 
@@ -71,7 +74,8 @@ class Cluster:
         self._loop = asyncio.new_event_loop()
         self._thread: threading.Thread | None = None
         self._client: Client | None = None
-        self._ending = asyncio.Event()
+        self._staying: asyncio.Task[None] | None = None
+        self._ended = False
         self._lost = asyncio.Event()
         self._room = asyncio.Condition()
         self._threads = self._under_way = 0
@@ -90,13 +94,22 @@ class Cluster:
             self._thread = threading.Thread(target=self._live, name="cluster", daemon=True)
             self._thread.start()
 
-    def close(self) -> None:
-        """Leave it; it goes on. Blocks until that is done, a second or so."""
+    def end(self) -> None:
+        """Give up what is under way, and leave; the cluster goes on. Does not wait."""
+        if self._ended:
+            return
+        self._ended = True
+        self.trouble = ENDING
         if self._thread is None:
             self._loop.close()
-            return
-        self._loop.call_soon_threadsafe(self._ending.set)
-        self._thread.join()
+        elif self._thread.is_alive():
+            with suppress(RuntimeError):  # it has just ended by itself
+                self._loop.call_soon_threadsafe(self._cancel)
+
+    def join(self) -> None:
+        """Wait until it was left: seconds at most."""
+        if self._thread is not None:
+            self._thread.join()
 
     def submit(self, name: str, work: Packed) -> "ThreadFuture[Packed]":
         """Have a piece of work done, from any thread; what came of it is packed.
@@ -112,27 +125,38 @@ class Cluster:
     # In the thread
 
     def _live(self) -> None:
-        with suppress(Exception), asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+        with suppress(asyncio.CancelledError), asyncio.Runner(loop_factory=lambda: self._loop) as runner:
             runner.run(self._stay())
+
+    def _cancel(self) -> None:
+        if self._staying is not None:
+            self._staying.cancel()
 
     async def _stay(self) -> None:
         """Connect, and again whenever it was gone, until the end."""
-        ending = asyncio.ensure_future(self._ending.wait())
-        while not ending.done():
-            try:
-                await self._connect()
-                while not ending.done():
-                    await self._check()
-                    await asyncio.wait([ending], timeout=CHECK_S)
-            except NotDoneError as error:
-                self._tell(str(error))
-            except Exception as error:
-                log.error("the cluster cannot be used", scheduler=self.address, exc_info=error)
-                self._tell(f"{type(error).__name__}: {error}")
+        self._staying = asyncio.current_task()
+        try:
+            while not self._ended:
+                await self._use()
+                await asyncio.sleep(CHECK_S)
+        finally:
+            self.trouble = ENDING
+            CLUSTER_WORKERS.set(0)
+
+    async def _use(self) -> None:
+        """Be connected for as long as it is there."""
+        try:
+            await self._connect()
+            while True:
+                await self._check()
+                await asyncio.sleep(CHECK_S)
+        except NotDoneError as error:
+            self._tell(str(error))
+        except Exception as error:
+            log.error("the cluster cannot be used", scheduler=self.address, exc_info=error)
+            self._tell(f"{type(error).__name__}: {error}")
+        finally:
             await self._leave()
-            await asyncio.wait([ending], timeout=CHECK_S)
-        self.trouble = "the service is ending"
-        CLUSTER_WORKERS.set(0)
 
     async def _connect(self) -> None:
         # The only place that loads it: half a second, which those without a cluster need not spend.
@@ -202,7 +226,7 @@ class Cluster:
     def _tell(self, trouble: str) -> None:
         """Note whether it can be used; say so where that has changed, and give up what is under way where it cannot."""
         CLUSTER_WORKERS.set(0 if trouble else self.workers)
-        if trouble == self.trouble:
+        if trouble == self.trouble or self._ended:
             return
         before, self.trouble = self.trouble, trouble
         if trouble:
@@ -219,7 +243,7 @@ class Cluster:
         self._lost = asyncio.Event()
         if client is not None:
             with suppress(Exception):
-                async with asyncio.timeout(CONNECT_S):
+                async with asyncio.timeout(LEAVE_S):
                     await client._close(fast=True)
 
     # Pieces of work

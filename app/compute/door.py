@@ -62,6 +62,7 @@ class Compute:
         self._turn = threading.BoundedSemaphore(AT_ONCE_HERE)
         self._waiting = ThreadPoolExecutor(WAITING, thread_name_prefix="compute") if settings.scheduler else None
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._ending = False
 
     def start(self) -> None:
         """Look for the cluster, if one is named. Does not wait."""
@@ -69,10 +70,17 @@ class Compute:
         if self._cluster is not None:
             self._cluster.start()
 
-    async def close(self) -> None:
-        """Give nothing to the cluster any more; what it has is given up."""
+    def end(self) -> None:
+        """Give nothing to the cluster any more; what it has is given up and not done here. Does not wait."""
+        self._ending = True
         if self._cluster is not None:
-            await asyncio.to_thread(self._cluster.close)
+            self._cluster.end()
+
+    async def close(self) -> None:
+        """End, and wait for what is being done."""
+        self.end()
+        if self._cluster is not None:
+            await asyncio.to_thread(self._cluster.join)
         if self._waiting is not None:
             await asyncio.to_thread(self._waiting.shutdown, wait=True, cancel_futures=True)
 
@@ -102,9 +110,9 @@ class Compute:
         """Return what a function of a module returns: by the cluster, else by a thread."""
         try:
             return await self._there(work, arguments, named)
-        except WorkersDiedError:
-            return await self._processes.make(work, *arguments, **named)
-        except NotDoneError:
+        except NotDoneError as error:
+            if self._apart(error):
+                return await self._processes.make(work, *arguments, **named)
             return await asyncio.to_thread(self._here, work, arguments, named)
 
     async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
@@ -135,14 +143,13 @@ class Compute:
         try:
             assert self._cluster is not None  # noqa: S101 - it is elsewhere
             return cast("Made", self._made(self._cluster.submit(_name(work), _packed(work, arguments, named)).result()))
-        except WorkersDiedError as error:
-            _repeat(work, error, "process")
+        except NotDoneError as error:
+            _repeat(work, error)
+            if not self._apart(error):
+                return self._here(work, arguments, named)
             assert self._loop is not None  # noqa: S101 - it was started
             making = self._processes.make(work, *arguments, **named)
             return asyncio.run_coroutine_threadsafe(_coroutine(making), self._loop).result()
-        except NotDoneError as error:
-            _repeat(work, error, "thread")
-            return self._here(work, arguments, named)
 
     async def _there(self, work: Callable[..., Made], arguments: tuple[Any, ...], named: dict[str, Any]) -> Made:
         """Return what the cluster makes. Raises NotDoneError, and whatever the work raises."""
@@ -152,9 +159,13 @@ class Compute:
             packed = await asyncio.to_thread(_packed, work, arguments, named)
             made = await asyncio.wrap_future(self._cluster.submit(_name(work), packed))
         except NotDoneError as error:
-            _repeat(work, error, "process" if isinstance(error, WorkersDiedError) else "thread")
+            _repeat(work, error)
             raise
         return cast("Made", await asyncio.to_thread(self._made, made))
+
+    def _apart(self, error: NotDoneError) -> bool:
+        """Whether what was not done must not be done by this process: a process refuses it where the service ends."""
+        return isinstance(error, WorkersDiedError) or (self._cluster is not None and self._ending)
 
     def _made(self, packed: Packed) -> Any:
         made, raised = unpack(packed)
@@ -182,9 +193,9 @@ def _packed(work: Callable[..., Any], arguments: tuple[Any, ...], named: dict[st
         raise NotDoneError("failed", f"its input cannot be sent ({error})") from None
 
 
-def _repeat(work: Callable[..., Any], error: NotDoneError, where: str) -> None:
+def _repeat(work: Callable[..., Any], error: NotDoneError) -> None:
     REPEATED.labels(error.kind).inc()
-    log.warning("done once more on this machine", work=_name(work), where=where, reason=str(error))
+    log.warning("done once more on this machine", work=_name(work), reason=str(error))
 
 
 async def _coroutine(making: Awaitable[Made]) -> Made:

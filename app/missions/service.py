@@ -179,7 +179,7 @@ class MissionService:
         """
         self._started = False
         await self._workshop.close()
-        await self.compute.close()
+        self.compute.end()
         await self._failover.end()
         await self.alarms.close()
         await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))
@@ -192,6 +192,7 @@ class MissionService:
         self._compilation.end()
         self._compiling.shutdown(wait=True, cancel_futures=True)
         self._executor.shutdown(wait=True, cancel_futures=True)
+        await self.compute.close()
         self.forecaster.close()
         self.web_tiles.close()
         self._at_once.close()

@@ -1,4 +1,4 @@
-"""What a Dask cluster of two workers carries: ``python -m benchmarks.service.cluster [--maps 6 --soundings 200000]``.
+"""What a Dask cluster of two workers carries: ``python -m benchmarks.service.cluster [--maps 4 --soundings 200000]``.
 
 The same heavy work twice: thorough maps of many soundings, and forecasts over five floors each, as the service gives
 them away. First this process does it, on one core; then two workers, each on one core of its own, behind a scheduler.
@@ -177,11 +177,11 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     parser = make_parser(__doc__, LOAD)
-    parser.add_argument("--maps", type=int, default=6, help="how many")
+    parser.add_argument("--maps", type=int, default=4, help="how many")
     parser.add_argument("--soundings", type=int, default=200_000, help="of each map")
     parser.add_argument("--side", type=float, default=1000.0, help="of each map's area, metres")
     parser.add_argument("--forecasts", type=int, default=2, help="how many, over five floors each")
-    parser.add_argument("--steps", type=int, default=60, help="of each mission that is forecast")
+    parser.add_argument("--steps", type=int, default=40, help="of each mission that is forecast")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         figures = asyncio.run(measure(options, Path(name)))

@@ -1,6 +1,7 @@
 """Heavy work on a real cluster: the same as here, whatever ends in the middle."""
 
 import asyncio
+import contextlib
 import os
 import shutil
 import signal
@@ -16,7 +17,7 @@ from app.compute import cluster as cluster_module
 from app.compute.door import Compute
 from app.compute.settings import ComputeSettings
 from app.compute.worker import facts
-from app.missions.errors import InvalidRequestError
+from app.missions.errors import InvalidRequestError, ProductUnavailableError
 from app.missions.operations.workshop import Workshop
 from tests.support import heavy_work
 from tests.support.cluster import DaskCluster, dask_cluster
@@ -133,6 +134,26 @@ async def test_what_is_late_is_done_here_and_the_cluster_may_leave_it(
     for process in begun_by(tmp_path):
         os.kill(process, signal.SIGKILL)
         await until(lambda: any(worker.poll() is not None for worker in dask.workers), "it has ended")
+    forget_dead(dask)
+
+
+async def test_what_is_under_way_when_the_service_ends_is_not_begun_here(dask: DaskCluster, tmp_path: Path) -> None:
+    workshop = Workshop()
+    compute = Compute(ComputeSettings(scheduler=dask.address), workshop)
+    compute.start()
+    await until(lambda: compute.elsewhere, "the cluster is there")
+    work = asyncio.create_task(compute.run(heavy_work.begin_and_hang_first, tmp_path))
+    waiting = asyncio.create_task(asyncio.to_thread(compute.in_thread, heavy_work.begin_and_hang_first, tmp_path))
+    worker = await begun(tmp_path, work)
+    await workshop.close()
+    compute.end()
+    with pytest.raises(ProductUnavailableError, match="the service is ending"):
+        await work
+    with contextlib.suppress(ProductUnavailableError):  # the other worker may have done it
+        assert await waiting != os.getpid()
+    await compute.close()
+    os.kill(worker, signal.SIGKILL)
+    await until(lambda: any(one.poll() is not None for one in dask.workers), "it has ended")
     forget_dead(dask)
 
 

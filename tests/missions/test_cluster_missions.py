@@ -1,12 +1,15 @@
 """A service with a cluster makes what one without makes, and goes on without it."""
 
 from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from prometheus_client import REGISTRY
 
 from app.compute import cluster as cluster_module
+from app.compute import door, packing
+from app.compute.packing import Packed
 from app.compute.settings import ComputeSettings
 from app.missions.clock import now
 from app.missions.forecast import floor, request
@@ -58,6 +61,20 @@ async def service(dask: DaskCluster, make_settings: Callable[..., ServiceSetting
     await harbour.close()
 
 
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """All that is given to the cluster."""
+    found: list[bytes] = []
+
+    def recorded(content: Any) -> Packed:
+        packed = packing.pack(content)
+        found.append(packed.head + b"".join(buffer.tobytes() for buffer in packed.buffers))
+        return packed
+
+    monkeypatch.setattr(door, "pack", recorded)
+    return found
+
+
 async def surveyed(service: MissionService) -> LiveMission:
     """A mission with crossing lines of soundings over a flat floor, one of which is wrong."""
     created = await service.create(make_spec(vehicles=[{"name": "a", "kind": "rest"}]))
@@ -74,7 +91,7 @@ def by_the_cluster() -> float:
 
 
 async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
-    service: MissionService, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
+    service: MissionService, dask: DaskCluster, sent: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moment = now()
     monkeypatch.setattr(mission_maps, "now", lambda: moment)
@@ -100,6 +117,10 @@ async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
     assert (await service.forecaster.of_mission(live)).floors == 2
     assert by_the_cluster() == begun + 4 + 2 * foretold.floors
     assert (await service.ready())[1]["compute"] == "ok"
+
+    assert len(sent) == by_the_cluster() - begun
+    database = Path(service.settings.database_url.rpartition("/")[2]).name.encode()
+    assert not any(database in one for one in sent), "nobody elsewhere learns where the database is"
 
     dask.kill_workers()
     dask.kill_scheduler()
