@@ -168,6 +168,9 @@ class Cluster:
             ) from None
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would tell is told here, once
         settings = self._settings
+        for file in (settings.tls_ca_file, settings.tls_certificate, settings.tls_key):
+            if file is not None and not file.is_file():
+                raise NotDoneError("lost", f"{file} is no file that can be read")
         try:
             security = None
             if settings.encrypted:
@@ -177,7 +180,8 @@ class Cluster:
                     tls_client_key=str(settings.tls_key),
                     require_encryption=True,
                 )
-            self._client = await Client(
+            # Before it is connected: one that never was has to be closed, too.
+            self._client = Client(
                 self.address,
                 security=security,
                 timeout=CONNECT_S,
@@ -185,6 +189,7 @@ class Cluster:
                 set_as_default=False,
                 name="bathyfleet",
             )
+            await self._client
         except (OSError, TimeoutError, ValueError, ImportError, RuntimeError) as error:
             raise NotDoneError("lost", f"no Dask scheduler answers at {self.address} ({_words(error)})") from None
 
@@ -245,6 +250,7 @@ class Cluster:
             with suppress(Exception):
                 async with asyncio.timeout(LEAVE_S):
                     await client._close(fast=True)
+            client.status = "closed"  # whatever failed: nothing is done with it any more
 
     # Pieces of work
 
