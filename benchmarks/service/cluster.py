@@ -5,8 +5,8 @@ them away. First this process does it, on one core; then two workers, each on on
 Results have to be the same. Told are seconds by the clock, and seconds of the processor of each process: on a machine
 where other programs run, and where scheduler, service and workers share two cores, the clock says little. A worker
 takes ``idle_share`` of a core for being there, for as long as it lasts by the clock; the time that it would need on a
-core of its own is what it spent without that, made longer by that share. ``ratio`` is this process's processor time over
-the busiest worker's such time. ``ratio_as_spent`` leaves the idle seconds in, ``ratio_by_the_clock`` is what came of it
+core of its own is what it spent without that, made longer by that share. ``ratio`` is this process's time over the
+busiest worker's. ``ratio_as_spent`` leaves the idle seconds in, ``ratio_by_the_clock`` is what came of it
 here. Beside that stands what giving it away costs the service and the scheduler.
 """
 
