@@ -7,6 +7,7 @@ holds that loop and not the service's, and the package is loaded there: a start 
 import asyncio
 import logging
 import threading
+import time
 import uuid
 from concurrent.futures import CancelledError
 from concurrent.futures import Future as ThreadFuture
@@ -71,7 +72,7 @@ class Cluster:
         self._settings = settings
         self.trouble = CONNECTING
         self.workers = 0
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
         self._client: Client | None = None
         self._staying: asyncio.Task[None] | None = None
@@ -91,7 +92,8 @@ class Cluster:
     def start(self) -> None:
         """Look for it from now on. Does not wait."""
         if self._thread is None:
-            self._thread = threading.Thread(target=self._live, name="cluster", daemon=True)
+            self._loop = asyncio.new_event_loop()
+            self._thread = threading.Thread(target=self._live, args=[self._loop], name="cluster", daemon=True)
             self._thread.start()
 
     def end(self) -> None:
@@ -100,10 +102,8 @@ class Cluster:
             return
         self._ended = True
         self.trouble = ENDING
-        if self._thread is None:
-            self._loop.close()
-        elif self._thread.is_alive():
-            with suppress(RuntimeError):  # it has just ended by itself
+        if self._loop is not None:
+            with suppress(RuntimeError):  # it has ended by itself
                 self._loop.call_soon_threadsafe(self._cancel)
 
     def join(self) -> None:
@@ -116,7 +116,7 @@ class Cluster:
 
         The future ends with NotDoneError where the cluster did not do it. ``name`` is shown on its pages.
         """
-        if self.trouble:
+        if self.trouble or self._loop is None:
             given_up: ThreadFuture[Packed] = ThreadFuture()
             given_up.set_exception(NotDoneError("lost", self.trouble))
             return given_up
@@ -124,8 +124,8 @@ class Cluster:
 
     # In the thread
 
-    def _live(self) -> None:
-        with suppress(asyncio.CancelledError), asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+    def _live(self, loop: asyncio.AbstractEventLoop) -> None:
+        with suppress(asyncio.CancelledError), asyncio.Runner(loop_factory=lambda: loop) as runner:
             runner.run(self._stay())
 
     def _cancel(self) -> None:
@@ -214,7 +214,7 @@ class Cluster:
     async def _trouble(self, client: "Client", threads: dict[str, int]) -> str:
         """Return in words why these workers cannot be used; empty where they can."""
         if not threads:
-            now_s = self._loop.time()
+            now_s = time.monotonic()
             self._empty_s = now_s if self._empty_s is None else self._empty_s
             if self.trouble or now_s - self._empty_s > NO_WORKER_S:
                 return f"the scheduler at {self.address} has no worker"
