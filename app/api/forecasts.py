@@ -13,8 +13,10 @@ from app.api.missions import EXAMPLE_SPEC
 from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service
+from app.missions.forecast.preview import PlanView
 from app.missions.forecast.request import ForecastView
 from app.missions.spec.mission import MissionSpec
+from app.missions.views.base import View
 
 router = APIRouter(
     route_class=JsonRoute, prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden")
@@ -71,7 +73,30 @@ async def forecast_description(
     return await _while_connected(request, service.forecaster.of_description(spec, floor_depth_m))
 
 
-async def _while_connected(request: Request, work: Coroutine[Any, Any, ForecastView]) -> ForecastView | Response:
+@router.post(
+    "/plan",
+    operation_id="previewPlan",
+    summary="Plan a mission that is being described",
+    response_model=PlanView,
+    responses=problems("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request"),
+)
+async def preview_plan(
+    spec: Annotated[
+        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
+    ],
+    service: Service,
+    operator: Operator,
+    request: Request,
+    floor_depth_m: _FloorDepth = None,
+) -> Any:
+    """Return the lines that a mission would begin with, before anyone creates it. Nothing is stored, nothing moves.
+
+    Takes parts of a second, so it can be asked for while an area is dragged; a client that leaves ends it.
+    """
+    return await _while_connected(request, service.previews.of(spec, floor_depth_m))
+
+
+async def _while_connected(request: Request, work: Coroutine[Any, Any, View]) -> View | Response:
     """Return what ``work`` does, and end it when the client leaves: nobody would read the answer."""
     task = asyncio.ensure_future(work)
     try:

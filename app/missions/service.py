@@ -22,6 +22,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
 from app.missions.live.mission import Ending, LiveMission
 from app.missions.operations.imports import Imports
@@ -117,6 +118,8 @@ class MissionService:
         self._compilation = Compilation(self._compiling)
         self.forecaster = Forecaster(self.hub, self._compilation)
         """Flies missions ahead."""
+        self.previews = PlanPreviews(self.hub, self._compilation)
+        """Plans of missions that are being described."""
         self._supervisor = MissionSupervisor(
             self.hub, self._claims, self._executor, self.maps, self._compilation, settings.time_scale
         )
@@ -178,6 +181,7 @@ class MissionService:
         self._compiling.shutdown(wait=True, cancel_futures=True)
         self._executor.shutdown(wait=True, cancel_futures=True)
         self.forecaster.close()
+        self.previews.close()
         self.web_tiles.close()
         self._at_once.close()
 

@@ -8,6 +8,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/preflight": "checkMission",
     "POST /missions/{mission_id}/forecast": "forecastMission",
     "POST /forecast": "forecastDescription",
+    "POST /plan": "previewPlan",
     "GET /missions/{mission_id}/steps": "listSteps",
     "GET /missions/{mission_id}/telemetry": "getTelemetry",
     "POST /missions/{mission_id}/notes": "writeNote",

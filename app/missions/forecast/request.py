@@ -136,10 +136,7 @@ class Forecaster:
         InvalidRequestError
             When the mission has no vehicle.
         """
-        team = Team(self._hub.capabilities)
-        ours = members or [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
-        if not ours:
-            raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+        ours = members or described_team(self._hub, spec)
         # The time that a forecast may take is for steps, not for compiling.
         await self._compilation.search()
         gone = threading.Event()
@@ -163,6 +160,15 @@ class Forecaster:
         finally:
             gone.set()
         return _view(spec, found, where, spec.steps - first_step + 1)
+
+
+def described_team(hub: FleetHub, spec: MissionSpec) -> list[Member]:
+    """Return the vehicles of a description, none of them in the water yet. Raises InvalidRequestError without any."""
+    team = Team(hub.capabilities)
+    members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+    if not members:
+        raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+    return members
 
 
 def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str]:

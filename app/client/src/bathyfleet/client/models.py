@@ -1150,6 +1150,51 @@ class PingsView(Model):
     parts: list[PingPartView]
 
 
+class PlanView(Model):
+    """The lines that a mission would begin with, and what they take: a plan, not a promise."""
+
+    vehicles: list[PlannedVehicleView]
+    distance_m: float
+    """Of all vehicles together"""
+    duration_s: float
+    """Until the last vehicle is at the end of its way, by the vehicles' time"""
+    duration_s_range: ForecastRange
+    energy_suffices: bool | None
+    """Whether every vehicle's energy lasts; null: of one or more it is not known, the others' does"""
+    whole: bool
+    """Whether this is all; else the ways end where the time for planning was up"""
+    assumptions: list[str]
+    """What was taken to be so, in words"""
+
+
+class PlannedVehicleView(Model):
+    """What one vehicle would do."""
+
+    vehicle: str
+    way: list[tuple[float, float]]
+    """From where it begins, [longitude, latitude]"""
+    way_home: list[tuple[float, float]] | None
+    """From the end of that; null: it has no recovery point, or no way leads there"""
+    distance_m: float
+    """Length of `way`"""
+    distance_home_m: float | None
+    """Length of `way_home`"""
+    duration_s: float
+    """Seconds of its time for `way`, turns and fixes by the clock included"""
+    duration_s_range: ForecastRange
+    """Without turns and fixes, and with every turn flown as a whole circle"""
+    home_s: float | None
+    """Seconds for `way_home`"""
+    energy_needs_s: float
+    """How long its energy has to last: for its way, the way home, and a reserve"""
+    energy_left_s: float | None
+    """How long it lasts for sure; null: not known"""
+    turn_back: tuple[float, float] | None
+    """Where on its way it has to turn back for want of energy; null: nowhere, or not known"""
+    turn_back_m: float | None
+    """How far along its way that is"""
+
+
 class PlannerOptions(Model):
     """Settings of the planners. Every planner reads those that concern it."""
 

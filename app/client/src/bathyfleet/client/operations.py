@@ -312,6 +312,21 @@ class Operations(ABC):
             query={"floor_depth_m": floor_depth_m},
         ))
 
+    def preview_plan(
+        self,
+        body: models.MissionSpec | Mapping[str, Any],
+        *,
+        floor_depth_m: float | None = None,
+    ) -> models.PlanView:
+        """Plan a mission that is being described: ``POST /plan``."""
+        return self._call(Call[models.PlanView](
+            "POST",
+            "/plan",
+            models.PlanView,
+            body=body,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
     def post_measurements(
         self,
         mission_id: str,
@@ -1308,6 +1323,21 @@ class AsyncOperations(ABC):
             "POST",
             "/forecast",
             models.ForecastView,
+            body=body,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
+    async def preview_plan(
+        self,
+        body: models.MissionSpec | Mapping[str, Any],
+        *,
+        floor_depth_m: float | None = None,
+    ) -> models.PlanView:
+        """Plan a mission that is being described: ``POST /plan``."""
+        return await self._call(Call[models.PlanView](
+            "POST",
+            "/plan",
+            models.PlanView,
             body=body,
             query={"floor_depth_m": floor_depth_m},
         ))

@@ -19,6 +19,7 @@ import type {
   NewSite,
   OrderView,
   PlannerView,
+  PlanView,
   PolygonGeometry,
   PreflightView,
   Problem,
@@ -161,6 +162,13 @@ export const api = {
     request<ForecastView>(`${missionPath(id)}/forecast`, { method: "POST", signal: gone }),
   forecastOf: (mission: NewMission, gone: AbortSignal) =>
     request<ForecastView>("/forecast", {
+      method: "POST",
+      signal: gone,
+      body: JSON.stringify(mission),
+      headers: { "Content-Type": "application/json" },
+    }),
+  plan: (mission: NewMission, gone: AbortSignal) =>
+    request<PlanView>("/plan", {
       method: "POST",
       signal: gone,
       body: JSON.stringify(mission),

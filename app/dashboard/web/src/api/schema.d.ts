@@ -599,6 +599,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan a mission that is being described
+         * @description Return the lines that a mission would begin with, before anyone creates it. Nothing is stored, nothing moves.
+         *
+         *     Takes parts of a second, so it can be asked for while an area is dragged; a client that leaves ends it.
+         */
+        post: operations["previewPlan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/measurements": {
         parameters: {
             query?: never;
@@ -4313,6 +4335,109 @@ export interface components {
             rejected: number;
             /** Parts */
             parts: components["schemas"]["PingPartView"][];
+        };
+        /**
+         * PlanView
+         * @description The lines that a mission would begin with, and what they take: a plan, not a promise.
+         */
+        PlanView: {
+            /** Vehicles */
+            vehicles: components["schemas"]["PlannedVehicleView"][];
+            /**
+             * Distance M
+             * @description Of all vehicles together
+             */
+            distance_m: number;
+            /**
+             * Duration S
+             * @description Until the last vehicle is at the end of its way, by the vehicles' time
+             */
+            duration_s: number;
+            duration_s_range: components["schemas"]["ForecastRange"];
+            /**
+             * Energy Suffices
+             * @description Whether every vehicle's energy lasts; null: of one or more it is not known, the others' does
+             */
+            energy_suffices: boolean | null;
+            /**
+             * Whole
+             * @description Whether this is all; else the ways end where the time for planning was up
+             */
+            whole: boolean;
+            /**
+             * Assumptions
+             * @description What was taken to be so, in words
+             */
+            assumptions: string[];
+        };
+        /**
+         * PlannedVehicleView
+         * @description What one vehicle would do.
+         */
+        PlannedVehicleView: {
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Way
+             * @description From where it begins, [longitude, latitude]
+             */
+            way: [
+                number,
+                number
+            ][];
+            /**
+             * Way Home
+             * @description From the end of that; null: it has no recovery point, or no way leads there
+             */
+            way_home: [
+                number,
+                number
+            ][] | null;
+            /**
+             * Distance M
+             * @description Length of `way`
+             */
+            distance_m: number;
+            /**
+             * Distance Home M
+             * @description Length of `way_home`
+             */
+            distance_home_m: number | null;
+            /**
+             * Duration S
+             * @description Seconds of its time for `way`, turns and fixes by the clock included
+             */
+            duration_s: number;
+            /** @description Without turns and fixes, and with every turn flown as a whole circle */
+            duration_s_range: components["schemas"]["ForecastRange"];
+            /**
+             * Home S
+             * @description Seconds for `way_home`
+             */
+            home_s: number | null;
+            /**
+             * Energy Needs S
+             * @description How long its energy has to last: for its way, the way home, and a reserve
+             */
+            energy_needs_s: number;
+            /**
+             * Energy Left S
+             * @description How long it lasts for sure; null: not known
+             */
+            energy_left_s: number | null;
+            /**
+             * Turn Back
+             * @description Where on its way it has to turn back for want of energy; null: nowhere, or not known
+             */
+            turn_back: [
+                number,
+                number
+            ] | null;
+            /**
+             * Turn Back M
+             * @description How far along its way that is
+             */
+            turn_back_m: number | null;
         };
         /**
          * PlannerOptions
@@ -10351,6 +10476,114 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ForecastView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    previewPlan: {
+        parameters: {
+            query?: {
+                /** @description How deep it is where nothing is known; default: a guess */
+                floor_depth_m?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MissionSpec"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlanView"];
                 };
             };
             /** @description The body cannot be read */

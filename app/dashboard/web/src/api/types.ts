@@ -39,6 +39,7 @@ export type AlarmView = Complete<Schemas["AlarmView"]>;
 export type EventView = Complete<Schemas["EventView"]>;
 export type StepView = Complete<Schemas["StepView"]>;
 export type ForecastView = Complete<Schemas["ForecastView"]>;
+export type PlanView = Complete<Schemas["PlanView"]>;
 export type ProfileView = Complete<Schemas["ProfileView"]>;
 export type TelemetryView = Complete<Schemas["TelemetryView"]>;
 export type PreflightView = Complete<Schemas["PreflightView"]>;
