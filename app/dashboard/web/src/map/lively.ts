@@ -156,7 +156,7 @@ function paintPlan(
   const opacity = old ? 0.45 : 1;
   for (const { colour, way: lines, beyond, home } of ways) {
     line(context, at, lines, { colour: paper.casing, width: 4, opacity: 0.5 * opacity });
-    line(context, at, lines, { colour, width: 1.8, dash: [7, 3], opacity });
+    line(context, at, lines, { colour, width: 2.2, dash: [7, 3], opacity });
     line(context, at, beyond, { colour, width: 1.2, dash: [2, 5], opacity: 0.6 * opacity });
     line(context, at, home, { colour, width: 1.5, dash: [1, 5], opacity });
     const [first, turn] = [lines[0], lines.at(-1)];

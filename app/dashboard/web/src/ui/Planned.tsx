@@ -1,6 +1,6 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { api } from "../api/client";
+import { api, ServiceError } from "../api/client";
 import type { NewMission, PlanView } from "../api/types";
 import { vehicleColour } from "../map/palette";
 import type { Estimate, Share } from "../state/draft";
@@ -25,7 +25,7 @@ export function usePlan(described: string | null): string {
         fault.value = "";
       } else if (current) {
         planned.value = null;
-        fault.value = said(answer.error);
+        fault.value = reasonOf(answer.error);
       }
     },
   );
@@ -43,6 +43,12 @@ export function usePlan(described: string | null): string {
     [],
   );
   return fault.value;
+}
+
+/** What the service says is wrong with single fields, or with all. */
+function reasonOf(error: unknown): string {
+  const faults = error instanceof ServiceError ? error.faults : [];
+  return faults.length > 0 ? faults.map(({ message }) => message).join("; ") : said(error);
 }
 
 type Vehicle = PlanView["vehicles"][number];
@@ -73,16 +79,14 @@ export function Planned({ of: { shares }, fault }: { of: Estimate; fault: string
             ))}
           </tr>
         </thead>
-        <tbody>
-          {shares.map((share, i) => (
-            <Row
-              key={share.name}
-              share={share}
-              colour={vehicleColour(i)}
-              plan={plan?.vehicles.find((one) => one.vehicle === share.name)}
-            />
-          ))}
-        </tbody>
+        {shares.map((share, i) => (
+          <Rows
+            key={share.name}
+            share={share}
+            colour={vehicleColour(i)}
+            plan={plan?.vehicles.find((one) => one.vehicle === share.name)}
+          />
+        ))}
       </table>
       {fault ? (
         <p class="reason" role="status" data-testid="plan-fault">
@@ -103,37 +107,36 @@ export function Planned({ of: { shares }, fault }: { of: Estimate; fault: string
   );
 }
 
-const titles = () => [
-  say("asked.vehicle"),
-  say("asked.time"),
-  say("asked.length"),
-  say("planned.wayHome"),
-  say("asked.energy"),
-];
+const titles = () => [say("asked.time"), say("asked.length"), say("planned.wayHome"), say("asked.energy")];
 
-function Row({ share, colour, plan }: { share: Share; colour: string; plan: Vehicle | undefined }) {
+function Rows({ share, colour, plan }: { share: Share; colour: string; plan: Vehicle | undefined }) {
   const { name } = share;
-  const short = energyOf(share, plan).short;
+  const { short, words } = energyOf(share, plan);
   return (
-    <tr data-testid={`share-${name}`} class={short ? "short" : ""}>
-      <th scope="row">
-        {plan ? <span class="swatch" style={{ background: colour }} aria-hidden="true" /> : null}
-        {name}
-      </th>
-      <td>{plan ? between(plan.duration_s_range) : duration(share.seconds)}</td>
-      <td>
-        {plan
-          ? say("planned.ofAtMost", { planned: distance(plan.distance_m), most: distance(share.metres) })
-          : distance(share.metres)}
-      </td>
-      <td>{homeOf(plan)}</td>
-      <td>
-        {energyOf(share, plan).words}
-        {plan?.turn_back_m != null ? (
-          <span class="turn-back"> {say("planned.turnsBackAfter", { way: distance(plan.turn_back_m) })}</span>
-        ) : null}
-      </td>
-    </tr>
+    <tbody data-testid={`share-${name}`} class={short ? "short" : ""}>
+      <tr>
+        <th scope="rowgroup" colSpan={4}>
+          {plan ? <span class="swatch" style={{ background: colour }} aria-hidden="true" /> : null}
+          {name}
+          {plan?.turn_back_m != null ? (
+            <span class="turn-back">
+              {" "}
+              {say("planned.turnsBackAfter", { way: distance(plan.turn_back_m) })}
+            </span>
+          ) : null}
+        </th>
+      </tr>
+      <tr>
+        <td>{plan ? between(plan.duration_s_range) : duration(share.seconds)}</td>
+        <td>
+          {plan
+            ? say("planned.ofAtMost", { planned: distance(plan.distance_m), most: distance(share.metres) })
+            : distance(share.metres)}
+        </td>
+        <td>{homeOf(plan)}</td>
+        <td>{words}</td>
+      </tr>
+    </tbody>
   );
 }
 
