@@ -1478,11 +1478,38 @@ class ReferenceView(Model):
     notes: list[str]
 
 
+class RefusedRuling(Model):
+    """A sounding that was left as it was."""
+
+    id: int
+    reason: str
+
+
 class RepeatOrder(Model):
     """Which line a vehicle is to fly again."""
 
     near: tuple[float, float] | None = None
     """The line that passes this place closest, [longitude, latitude]; null: the newest"""
+
+
+class RulingRequest(Model):
+    """Which soundings an operator decides about, and what is added to that."""
+
+    ids: list[int]
+    """Ids of soundings of this mission"""
+    note: str = ""
+    """Kept in the mission's log beside the action"""
+
+
+class RulingsView(Model):
+    """What came of an operator's word on many soundings; the map is that of the new choice."""
+
+    changed: list[int]
+    """Ids of those that are otherwise now"""
+    unchanged: int
+    """How many were so already"""
+    refused: list[RefusedRuling]
+    """Those that cannot be so, with the reason"""
 
 
 class Scan(Model):
@@ -1799,6 +1826,26 @@ class SoundingPage(Model):
     total: int
     """Of all pages"""
     items: list[SoundingView]
+    next_after: int | None
+    """Give it as `after` for the next page; null: this is the last"""
+
+
+class SoundingPoints(Model):
+    """Many soundings as points, column by column, in the order they came."""
+
+    total: int
+    """Of all pages"""
+    id: list[int]
+    lon_deg: list[float]
+    lat_deg: list[float]
+    depth_m: list[float]
+    """Below the datum of the map; as it was measured where that is not known"""
+    state: list[int]
+    """Places in `states`"""
+    vehicle: list[int]
+    """Places in `vehicles`"""
+    states: list[SoundingState]
+    vehicles: list[str]
     next_after: int | None
     """Give it as `after` for the next page; null: this is the last"""
 

@@ -788,6 +788,39 @@ class Operations(ABC):
             query={"state": state, "vehicle": vehicle, "after": after, "limit": limit},
         ))
 
+    def list_sounding_points(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.SoundingPoints:
+        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``."""
+        return self._call(Call[models.SoundingPoints](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings/points",
+            models.SoundingPoints,
+            query={"after": after, "limit": limit},
+        ))
+
+    def restore_soundings(self, mission_id: str, body: models.RulingRequest | Mapping[str, Any]) -> models.RulingsView:
+        """Let many soundings count: ``POST /missions/{mission_id}/soundings/restore``."""
+        return self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/restore",
+            models.RulingsView,
+            body=body,
+        ))
+
+    def reject_soundings(self, mission_id: str, body: models.RulingRequest | Mapping[str, Any]) -> models.RulingsView:
+        """Keep many soundings out: ``POST /missions/{mission_id}/soundings/reject``."""
+        return self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/reject",
+            models.RulingsView,
+            body=body,
+        ))
+
     def restore_sounding(
         self,
         mission_id: str,
@@ -1822,6 +1855,47 @@ class AsyncOperations(ABC):
             f"/missions/{part(mission_id)}/soundings",
             models.SoundingPage,
             query={"state": state, "vehicle": vehicle, "after": after, "limit": limit},
+        ))
+
+    async def list_sounding_points(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.SoundingPoints:
+        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``."""
+        return await self._call(Call[models.SoundingPoints](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings/points",
+            models.SoundingPoints,
+            query={"after": after, "limit": limit},
+        ))
+
+    async def restore_soundings(
+        self,
+        mission_id: str,
+        body: models.RulingRequest | Mapping[str, Any],
+    ) -> models.RulingsView:
+        """Let many soundings count: ``POST /missions/{mission_id}/soundings/restore``."""
+        return await self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/restore",
+            models.RulingsView,
+            body=body,
+        ))
+
+    async def reject_soundings(
+        self,
+        mission_id: str,
+        body: models.RulingRequest | Mapping[str, Any],
+    ) -> models.RulingsView:
+        """Keep many soundings out: ``POST /missions/{mission_id}/soundings/reject``."""
+        return await self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/reject",
+            models.RulingsView,
+            body=body,
         ))
 
     async def restore_sounding(
