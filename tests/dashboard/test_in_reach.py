@@ -47,7 +47,7 @@ def expect_on_top(page: Page, name: str) -> None:
 
 
 def expect_orders_in_one_row(page: Page, name: str) -> None:
-    """On narrow screens: what is seldom needed is in a menu, which covers no stop. Elsewhere it is beside the others."""
+    """On narrow screens: what is seldom needed is in a menu, which covers no stop. Elsewhere it is beside them."""
     if page.viewport_size in (size_of("wide"), size_of("tablet")):
         expect(by_id(page, f"more-{name}")).to_be_hidden()
         expect(by_id(page, f"hold-{name}")).to_be_visible()

@@ -26,10 +26,12 @@ import type {
   ProductView,
   ProfileView,
   QualityView,
+  RulingsView,
   SearchGridView,
   SessionView,
   SiteView,
   SoundingPage,
+  SoundingPoints,
   SoundingState,
   SoundingView,
   StepView,
@@ -198,6 +200,10 @@ export const api = {
     request<SoundingPage>(
       `${missionPath(id)}/soundings?limit=200&after=${after}${state ? `&state=${state}` : ""}`,
     ),
+  soundingPoints: (id: string, after: number, gone: AbortSignal) =>
+    request<SoundingPoints>(`${missionPath(id)}/soundings/points?after=${after}`, { signal: gone }),
+  ruleMany: (id: string, ids: readonly number[], ruling: "restore" | "reject", note: string) =>
+    post<RulingsView>(`${missionPath(id)}/soundings/${ruling}`, { ids, note }),
   rule: (id: string, sounding: number, ruling: "restore" | "reject", note: string) =>
     post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }),
   setTide: (id: string, tide: { level_m?: number; table?: string; source: string }) =>

@@ -1,7 +1,7 @@
 import "./VehicleCards.css";
 import { useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import type { VehicleView } from "../api/types";
 import { age, clock, distance, metres, percent, speed } from "../state/format";
 import { localizationWords } from "../state/localization";
@@ -334,6 +334,15 @@ const WIDTH_PX = 230;
 function More({ of, children }: { of: string; children: ComponentChildren }) {
   const open = useSignal(false);
   const menu = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const box = menu.current;
+    // What was chosen is on its way.
+    const fold = () => {
+      if (open.peek()) box?.hidePopover();
+    };
+    box?.addEventListener("click", fold);
+    return () => box?.removeEventListener("click", fold);
+  }, []);
   const flip = (event: MouseEvent) => {
     const button = (event.currentTarget as HTMLElement).getBoundingClientRect();
     const box = menu.current;
@@ -361,10 +370,6 @@ function More({ of, children }: { of: string; children: ComponentChildren }) {
         data-testid={`more-orders-${of}`}
         onToggle={(event) => {
           open.value = event.newState === "open";
-        }}
-        // What was chosen is on its way.
-        onClick={() => {
-          if (open.value) menu.current?.hidePopover();
         }}
       >
         {children}
