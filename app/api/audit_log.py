@@ -16,7 +16,7 @@ from app.storage.models import AuditRow
 
 DATA = frozenset({"postMeasurements", "postScans"})
 """What vehicles send all the time is data, kept with its verdict; only what is refused of it is written down."""
-QUESTIONS = frozenset({"forecastMission", "forecastDescription"})
+QUESTIONS = frozenset({"forecastMission", "forecastDescription", "previewPlan"})
 """Posted, because they are long, but they change nothing."""
 STRANGERS_PER_MINUTE = 60
 MAX_DETAIL_BYTES = 65_536

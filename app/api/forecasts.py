@@ -12,6 +12,7 @@ from app.api.problems import problems
 from app.api.schemas import API
 from app.api.state import Service
 from app.api.while_connected import while_connected
+from app.missions.forecast.preview import PlanView
 from app.missions.forecast.request import ForecastView
 from app.missions.spec.mission import MissionSpec
 
@@ -62,3 +63,26 @@ async def forecast_description(
     Takes half a minute or so, on a busy machine a minute or two; a client that does not wait any more ends it.
     """
     return await while_connected(request, service.forecaster.of_description(spec, floor_depth_m))
+
+
+@router.post(
+    "/plan",
+    operation_id="previewPlan",
+    summary="Plan a mission that is being described",
+    response_model=PlanView,
+    responses=problems("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request"),
+)
+async def preview_plan(
+    spec: Annotated[
+        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
+    ],
+    service: Service,
+    operator: Operator,
+    request: Request,
+    floor_depth_m: _FloorDepth = None,
+) -> Any:
+    """Return the lines that a mission would begin with, before anyone creates it. Nothing is stored, nothing moves.
+
+    Takes parts of a second, so it can be asked for while an area is dragged; a client that leaves ends it.
+    """
+    return await while_connected(request, service.previews.of(spec, floor_depth_m))

@@ -23,6 +23,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
 from app.missions.live.mission import Ending, LiveMission
 from app.missions.operations.imports import Imports
@@ -122,6 +123,8 @@ class MissionService:
         self._compilation = Compilation(self._compiling)
         self.forecaster = Forecaster(self.hub, self._compilation, self.compute)
         """Flies missions ahead."""
+        self.previews = PlanPreviews(self.hub, self._compilation)
+        """Plans of missions that are being described."""
         self._supervisor = MissionSupervisor(
             self.hub, self._claims, self._executor, self.maps, self._compilation, settings.time_scale
         )
@@ -194,6 +197,7 @@ class MissionService:
         self._executor.shutdown(wait=True, cancel_futures=True)
         await self.compute.close()
         self.forecaster.close()
+        self.previews.close()
         self.web_tiles.close()
         self._at_once.close()
 

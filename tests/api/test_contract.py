@@ -52,6 +52,7 @@ BEYOND_THE_SCHEMA = {
     "getTile",
     "getTileJson",
     "importSoundings",
+    "previewPlan",
     "proposeZones",
     "setReference",
     "setSite",

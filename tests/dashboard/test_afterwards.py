@@ -172,3 +172,60 @@ def test_no_serious_fault_for_people_who_see_or_steer_otherwise(page: Page, serv
             if v["impact"] in ("serious", "critical")
         ]
         assert serious == [], prepare
+
+
+def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(page: Page, service: Service) -> None:
+    mission = service.create(vehicles=[{"name": "rover", "kind": "rest"}])
+    items = [
+        {"vehicle": "rover", "time_s": 1.79e9 + 30 * i, "lat_deg": 41.1851 + 4e-5 * (i // 8), "depth_m": 2.0}
+        | {"lon_deg": -8.7049 + 6e-5 * (i % 8), "range_m": 8.0 + 0.1 * (i % 8)}
+        for i in range(64)
+    ]
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    service.get(f"/missions/{mission}/map")
+    show(page, mission)
+    by_id(page, "open-3d").click()
+    by_id(page, "toggle-points").click()
+    chosen = by_id(page, "points-chosen")
+    expect(chosen).to_contain_text("64 soundings")
+    expect(by_id(page, "points-reject")).to_be_disabled()
+
+    def states() -> dict[str, int]:
+        points = service.get(f"/missions/{mission}/soundings/points")
+        names = [points["states"][k] for k in points["state"]]
+        return {name: names.count(name) for name in set(names)}
+
+    # The pointer draws round all of them, the keyboard's frame takes fewer.
+    box = by_id(page, "lasso").bounding_box()
+    assert box is not None
+    left, top, right, bottom = box["x"] + 4, box["y"] + 4, box["x"] + box["width"] - 4, box["y"] + box["height"] - 4
+    page.mouse.move(box["x"] + box["width"] / 2, top + 260)
+    page.mouse.down()
+    for x, y in [(right, top), (right, bottom - 90), (left, bottom - 90), (left, top + 260)]:
+        page.mouse.move(x, y)
+    page.mouse.up()
+    expect(chosen).to_contain_text("of 64 soundings chosen")
+    some = int(chosen.inner_text().split()[0])
+    assert some > 8
+    page.keyboard.press("Escape")
+    expect(chosen).to_contain_text("Draw round")
+    by_id(page, "lasso").focus()
+    for key in ("ArrowDown", "ArrowUp", "+", "Enter"):
+        page.keyboard.press(key)
+    expect(chosen).to_contain_text("of 64 soundings chosen")
+    fewer = int(chosen.inner_text().split()[0])
+    assert 0 < fewer < 64
+    by_id(page, "points-note").fill("fish")
+    by_id(page, "lasso").focus()
+    page.keyboard.press("Delete")
+    expect(by_id(page, "points-undo")).to_be_enabled()
+    assert states() == {"withdrawn": fewer, "used": 64 - fewer}
+    assert (
+        service.get(f"/missions/{mission}/events")[-1]["message"]
+        == f"{fewer} soundings rejected by local operator: fish"
+    )
+    by_id(page, "lasso").focus()
+    page.keyboard.press("Control+z")
+    expect(by_id(page, "points-undo")).to_be_disabled()
+    assert states() == {"restored": fewer, "used": 64 - fewer}
+    by_id(page, "close-3d").click()

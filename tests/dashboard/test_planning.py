@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from app.mapping.s44 import Order, strictest_sd_m
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id
+from tests.support.dashboard.steps import by_id, click_round
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -81,3 +81,47 @@ def test_a_mission_is_described_changed_exported_and_used_again(page: Page, serv
     expect(by_id(page, "field-latitude")).to_be_visible()
     by_id(page, "template").select_option("Multibeam, full coverage")
     expect(by_id(page, "field-sensor")).to_have_value("multibeam")
+
+
+def test_the_plan_is_drawn_before_the_start_and_follows_the_area_as_it_is_dragged(page: Page, service: Service) -> None:
+    before = len(service.get("/missions"))
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    by_id(page, "planner-lawnmower").click()
+    by_id(page, "field-recovery").fill("41.1850 -8.7050")
+    by_id(page, "draw-polygon").click()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
+    click_round(page, [(520, 300), (900, 320), (880, 640), (540, 600)])
+    plan, whole = by_id(page, "planned"), by_id(page, "planned-whole")
+    expect(plan).to_have_attribute("data-plan", "new")
+    expect(whole).to_contain_text(re.compile(r"Planned: \d.* of tracks in \d+ .* to \d+"))
+    # Its way home, and its way beside what it may fly at most.
+    expect(by_id(page, "share-sim-1")).to_contain_text(re.compile(r"\d+ m of 1\.00 km\d+ m, \d+"))
+    expect(by_id(page, "share-sim-1")).to_contain_text("not known")
+    expect(by_id(page, "editing")).to_have_attribute("data-ready", "true")
+
+    drawn, told = middle_of(page), whole.inner_text()
+    page.mouse.move(880, 640)
+    page.mouse.down()
+    for k in range(1, 11):
+        page.mouse.move(880 + 12 * k, 640 + 8 * k)
+    # The button is still down.
+    expect(whole).not_to_have_text(told)
+    expect(plan).to_have_attribute("data-plan", "new")
+    assert middle_of(page) != drawn
+    page.mouse.up()
+
+    page.get_by_text("Single vehicles: speed, endurance").click()
+    by_id(page, "endurance_min-sim-2").fill("6")
+    expect(by_id(page, "share-sim-2")).to_contain_text(
+        re.compile(r"turns back after \d+ m.*▲ \d{3} % of its endurance")
+    )
+    by_id(page, "field-recovery").fill("42.5 -8.7050")
+    expect(by_id(page, "plan-fault")).to_contain_text("No plan: recovery.point lies")
+    assert len(service.get("/missions")) == before
+
+
+def middle_of(page: Page) -> bytes:
+    """What the map shows inside the area that is drawn."""
+    return page.screenshot(clip={"x": 560, "y": 340, "width": 280, "height": 220})

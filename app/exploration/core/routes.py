@@ -253,11 +253,12 @@ class FreeSpace:
         """Return the route (m, 2) from ``start`` (left out) through all ``stops`` (k, 2), round obstacles."""
         if self._open or len(stops) == 0:
             return np.asarray(stops, dtype=np.float64).reshape(-1, 2)
-        pieces, here = [], start
-        for stop in stops:
-            pieces.append(self.way(here, stop))
-            here = stop
-        return np.vstack(pieces)
+        begins = np.vstack([start, stops[:-1]])
+        # All at once: most legs are free, and asking one by one takes far longer.
+        free = shapely.covers(self._loose, shapely.linestrings(np.stack([begins, stops], axis=1)))
+        return np.vstack(
+            [stop[None] if clear else self.way(a, stop) for a, stop, clear in zip(begins, stops, free, strict=True)]
+        )
 
 
 def _corners(region: BaseGeometry) -> FloatArray:

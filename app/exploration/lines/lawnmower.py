@@ -66,6 +66,10 @@ class LawnmowerPlanner(PlannerBase):
         self._routes[vehicle] = rest
         return True
 
+    def ways_ahead_m(self) -> dict[str, FloatArray]:
+        """See :meth:`app.exploration.planner.base.PlannerBase.ways_ahead_m`."""
+        return dict(self._routes)
+
     def _remember(self) -> dict[str, Any]:
         return {"routes": self._routes}
 

@@ -144,6 +144,13 @@ class PlannerBase(ABC):
         """
         return False
 
+    def ways_ahead_m(self) -> dict[str, FloatArray]:
+        """Return where vehicles go after what was proposed last, as planned now, (k, 2) by name.
+
+        Empty where only the next step is planned.
+        """
+        return {}
+
     def snapshot(self) -> bytes:
         """Return the planner's memory."""
         errands = self._errands.remember()

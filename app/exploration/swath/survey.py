@@ -222,6 +222,11 @@ class SwathSurvey:
         sweep.course = None
         return True
 
+    def piece_m(self, vehicle: str) -> FloatArray:
+        """Return the piece of a line that a vehicle was sent along last, (k, 2) east and north; empty: it was not."""
+        sweep = self._sweeps.get(vehicle)
+        return sweep.expected[-1].path if sweep is not None and sweep.expected else np.zeros((0, 2))
+
     def lines_m(self) -> dict[str, FloatArray]:
         """Return what is left of each vehicle's line, (k, 2) east and north."""
         return {name: sweep.course.path for name, sweep in self._sweeps.items() if sweep.course is not None}

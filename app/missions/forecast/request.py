@@ -138,10 +138,7 @@ class Forecaster:
         InvalidRequestError
             When the mission has no vehicle.
         """
-        team = Team(self._hub.capabilities)
-        ours = members or [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
-        if not ours:
-            raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+        ours = members or described_team(self._hub, spec)
         known = np.zeros((0, 4)) if prior is None else prior
         starts, where = await asyncio.to_thread(starts_of, spec, ours)
         if self._compute.elsewhere:
@@ -186,6 +183,15 @@ class Forecaster:
                 return await asyncio.get_running_loop().run_in_executor(self._executor, work)
         finally:
             gone.set()
+
+
+def described_team(hub: FleetHub, spec: MissionSpec) -> list[Member]:
+    """Return the vehicles of a description, none of them in the water yet. Raises InvalidRequestError without any."""
+    team = Team(hub.capabilities)
+    members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+    if not members:
+        raise InvalidRequestError("vehicles", "the mission has no vehicle", "add one: without any nothing is done")
+    return members
 
 
 def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str]:

@@ -171,6 +171,8 @@ class StepFlown:
     seconds: float
     left_m: float
     """How far all of them together may still fly."""
+    here_m: FloatArray
+    """Where their legs end, (vehicles, 2): east, north."""
 
 
 def fly(
@@ -189,7 +191,7 @@ def fly(
     """
     constraints, planner = make_constraints(spec), make_planner(spec)
     rng = np.random.default_rng([spec.seed, 1])
-    swarm = _Swarm(spec, members, starts_m, first_step)
+    swarm = Swarm(spec, members, starts_m, first_step)
     apart = planner.decides_apart and np.isinf(constraints.com_range_m)
     told = first_step - 1
     while (due := swarm.due(apart=apart)).any():
@@ -204,10 +206,10 @@ def fly(
             swarm.fly(int(i), way[1])
         if number > told:
             told = number
-            yield StepFlown(number, swarm.distance_m.copy(), float(swarm.clock_s.max()), float(swarm.left_m.sum()))
+            yield swarm.flown(number)
 
 
-class _Swarm:
+class Swarm:
     """Vehicles without a body: straight legs at their speed, and a while for every turn.
 
     Attributes
@@ -233,6 +235,11 @@ class _Swarm:
             self.left_m = np.full(n, max(spec.steps - first_step + 1, 0) * spec.limits.max_step_m)
         else:
             self.left_m = np.array([member.way_left_m(spec) for member in members])
+
+    def flown(self, step: int) -> StepFlown:
+        """Return how far they have come after a step."""
+        left_m, seconds = float(self.left_m.sum()), float(self.clock_s.max())
+        return StepFlown(step, self.distance_m.copy(), seconds, left_m, self.here[:, :2].copy())
 
     def due(self, *, apart: bool) -> BoolArray:
         """Return who gets the next leg, (n,): all together, or who ends its last one first, with those right after."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import ColumnElement, and_, func, or_, select
+from sqlalchemy import ColumnElement, and_, case, func, or_, select
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.errors import ConflictError, SoundingNotFoundError
@@ -10,11 +10,26 @@ from app.missions.live.mission import LiveMission
 from app.missions.operations.recorrection import report_of
 from app.missions.soundings.gate import implausible_value
 from app.missions.views.mission import Level
-from app.missions.views.soundings import Ruling, SoundingPage, SoundingState, SoundingView, Verdict
+from app.missions.views.soundings import (
+    RefusedRuling,
+    Ruling,
+    RulingsView,
+    SoundingPage,
+    SoundingPoints,
+    SoundingState,
+    SoundingView,
+    Verdict,
+)
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import EventRow, SoundingRow
 from app.storage.uncancellable import to_the_end
+
+NO_DEPTH = "no depth can be had from it"
+COVER_IT = "send a tide table that covers its time, or leave it out"
+
+CHUNK = 500
+"""Soundings that are asked for, or changed, at a time: others get their turn in between."""
 
 Doubts = dict[int, str]
 """Why the map leaves accepted soundings out, by their ids."""
@@ -66,6 +81,116 @@ async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, *, note: str
         return _view(row, await _doubts(live, session))
 
 
+async def rule_many(
+    live: LiveMission, ids: Sequence[int], ruling: Ruling, *, note: str = "", actor: str
+) -> RulingsView:
+    """Restore many soundings or reject them, in one transaction; the map is that of the new choice when this returns.
+
+    Those that no depth can be had from are not restored, and told. Raises SoundingNotFoundError where one is not in
+    this mission: then nothing is changed.
+    """
+    await live.journal.flush()
+    async with live.journal.writing:
+        line, result = await to_the_end(_store_many(live, sorted(set(ids)), ruling, note, actor))
+    if line is not None:
+        live.journal.tell(line)
+        live.changed.set()
+        await live.build_map()
+        live.publish_summary()
+    return result
+
+
+async def _store_many(
+    live: LiveMission, ids: list[int], ruling: Ruling, note: str, actor: str
+) -> tuple[EventRow | None, RulingsView]:
+    changed: list[int] = []
+    refused: list[RefusedRuling] = []
+    accepted = 0
+    said = f": {note}" if note else ""
+    async with live.database.writing() as session:
+        doubts = await _doubts(live, session)
+        for first in range(0, len(ids), CHUNK):
+            part = ids[first : first + CHUNK]
+            query = select(SoundingRow).where(SoundingRow.mission_id == live.id, SoundingRow.id.in_(part))
+            rows = (await session.scalars(query.order_by(SoundingRow.id))).all()
+            if len(rows) < len(part):
+                missing = min(set(part) - {row.id for row in rows})
+                raise SoundingNotFoundError(
+                    f"there is no sounding {missing} in this mission",
+                    "GET /api/v1/missions/{id}/soundings/points lists them",
+                )
+            for row in rows:
+                if row.ruling == ruling:
+                    continue
+                was_accepted = row.verdict == Verdict.ACCEPTED
+                before = row.reason or doubts.get(row.id, "")
+                try:
+                    _decide(live, row, ruling, f"{ruling} by {actor}{said}", before)
+                except ConflictError as error:
+                    refused.append(RefusedRuling(id=row.id, reason=str(error)))
+                    continue
+                accepted += int(row.verdict == Verdict.ACCEPTED) - int(was_accepted)
+                changed.append(row.id)
+            await session.flush()
+            session.expunge_all()
+        result = RulingsView(changed=changed, unchanged=len(ids) - len(changed) - len(refused), refused=refused)
+        if not changed:
+            return None, result
+        what = "sounding" if len(changed) == 1 else "soundings"
+        words = f"{len(changed)} {what} {ruling} by {actor}{said}"
+        line = live.journal.line(
+            Level.INFO, "sounding", words, soundings=len(changed), ruling=str(ruling), actor=actor, note=note
+        )
+        session.add(line)
+        await session.flush()
+        await stored_maps.forget(session, live.id)
+    counts = live.journal.counts
+    live.recount(counts.of_soundings(counts.accepted + accepted, counts.rejected - accepted))
+    return line, result
+
+
+def _decide(live: LiveMission, row: SoundingRow, ruling: Ruling, reason: str, before: str) -> None:
+    """Give a sounding its verdict. Raises ConflictError where it cannot be restored; then it is as it was."""
+    if ruling is Ruling.RESTORED:
+        _correct(live, row)
+        row.verdict = Verdict.ACCEPTED
+        row.reason = reason + (f" (before: {before})" if before else "")
+    else:
+        row.verdict = Verdict.REJECTED
+        row.reason = reason
+    row.ruling = ruling
+
+
+async def sounding_points(live: LiveMission, *, after: int = 0, limit: int) -> SoundingPoints:
+    """Return up to ``limit`` soundings with an id above ``after`` as points, whatever became of them."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        doubts = await _doubts(live, session)
+        whose = SoundingRow.mission_id == live.id
+        total = await session.scalar(select(func.count()).select_from(SoundingRow).where(whose))
+        depth = case((SoundingRow.sd_m > 0, SoundingRow.depth_m), else_=SoundingRow.raw_depth_m)
+        columns = (SoundingRow.id, SoundingRow.lon_deg, SoundingRow.lat_deg, depth)
+        query = select(*columns, SoundingRow.verdict, SoundingRow.ruling, SoundingRow.vehicle)
+        rows = (
+            await session.execute(query.where(whose, SoundingRow.id > after).order_by(SoundingRow.id).limit(limit + 1))
+        ).all()
+    shown = rows[:limit]
+    states, vehicles = list(SoundingState), sorted({row.vehicle for row in shown})
+    place = {name: k for k, name in enumerate(vehicles)}
+    return SoundingPoints(
+        total=total or 0,
+        id=[row.id for row in shown],
+        lon_deg=[row.lon_deg for row in shown],
+        lat_deg=[row.lat_deg for row in shown],
+        depth_m=[row[3] for row in shown],
+        state=[states.index(_state(row.id, row.verdict, row.ruling, doubts)) for row in shown],
+        vehicle=[place[row.vehicle] for row in shown],
+        states=states,
+        vehicles=vehicles,
+        next_after=shown[-1].id if len(rows) > limit else None,
+    )
+
+
 async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str, actor: str) -> EventRow | None:
     """Write verdict and log line down together; None when it was so already."""
     async with live.database.writing() as session:
@@ -79,14 +204,7 @@ async def _store(live: LiveMission, sounding_id: int, ruling: Ruling, note: str,
         was_accepted = row.verdict == Verdict.ACCEPTED
         before = row.reason or (await _doubts(live, session)).get(row.id, "")
         said = f": {note}" if note else ""
-        if ruling is Ruling.RESTORED:
-            _correct(live, row)
-            row.verdict = Verdict.ACCEPTED
-            row.reason = f"restored by {actor}{said}" + (f" (before: {before})" if before else "")
-        else:
-            row.verdict = Verdict.REJECTED
-            row.reason = f"rejected by {actor}{said}"
-        row.ruling = ruling
+        _decide(live, row, ruling, f"{ruling} by {actor}{said}", before)
         words = f"sounding {row.id} of {row.vehicle}, {row.depth_m:.2f} m, {ruling} by {actor}{said}"
         line = live.journal.line(
             Level.INFO, "sounding", words, sounding=row.id, ruling=str(ruling), actor=actor, note=note, before=before
@@ -110,10 +228,7 @@ def _correct(live: LiveMission, row: SoundingRow) -> None:
     found = None if why else live.gate.corrections.apply([report])[0]
     if found is None or found.reason:
         why = why or (found.reason if found is not None else "")
-        raise ConflictError(
-            f"sounding {row.id} cannot be restored, no depth can be had from it: {why}",
-            "send a tide table that covers its time, or leave it out",
-        )
+        raise ConflictError(f"sounding {row.id} cannot be restored, {NO_DEPTH}: {why}", COVER_IT)
     row.east_m, row.north_m, row.depth_m, row.level_m = found.east_m, found.north_m, found.depth_m, found.level_m
 
 
@@ -140,16 +255,16 @@ def _condition(state: SoundingState, doubts: Doubts) -> ColumnElement[bool]:
             return and_(used, SoundingRow.id.not_in(doubts))
 
 
-def _state(row: SoundingRow, doubts: Doubts) -> SoundingState:
-    if row.verdict == Verdict.REJECTED:
-        return SoundingState.WITHDRAWN if row.ruling == Ruling.REJECTED else SoundingState.REJECTED
-    if row.ruling == Ruling.RESTORED:
+def _state(number: int, verdict: str, ruling: str | None, doubts: Doubts) -> SoundingState:
+    if verdict == Verdict.REJECTED:
+        return SoundingState.WITHDRAWN if ruling == Ruling.REJECTED else SoundingState.REJECTED
+    if ruling == Ruling.RESTORED:
         return SoundingState.RESTORED
-    return SoundingState.DOUBTED if row.id in doubts else SoundingState.USED
+    return SoundingState.DOUBTED if number in doubts else SoundingState.USED
 
 
 def _view(row: SoundingRow, doubts: Doubts) -> SoundingView:
-    state = _state(row, doubts)
+    state = _state(row.id, row.verdict, row.ruling, doubts)
     corrected = row.sd_m > 0
     return SoundingView(
         id=row.id,

@@ -66,6 +66,36 @@ class SoundingPage(View):
     next_after: int | None = Field(description="Give it as `after` for the next page; null: this is the last")
 
 
+class SoundingPoints(View):
+    """Many soundings as points, column by column, in the order they came."""
+
+    total: int = Field(description="Of all pages")
+    id: list[int]
+    lon_deg: list[float]
+    lat_deg: list[float]
+    depth_m: list[float] = Field(description="Below the datum of the map; as it was measured where that is not known")
+    state: list[int] = Field(description="Places in `states`")
+    vehicle: list[int] = Field(description="Places in `vehicles`")
+    states: list[SoundingState]
+    vehicles: list[str]
+    next_after: int | None = Field(description="Give it as `after` for the next page; null: this is the last")
+
+
+class RefusedRuling(View):
+    """A sounding that was left as it was."""
+
+    id: int
+    reason: str
+
+
+class RulingsView(View):
+    """What came of an operator's word on many soundings; the map is that of the new choice."""
+
+    changed: list[int] = Field(description="Ids of those that are otherwise now")
+    unchanged: int = Field(description="How many were so already")
+    refused: list[RefusedRuling] = Field(description="Those that cannot be so, with the reason")
+
+
 class ItemVerdict(View):
     """The verdict on one item of a batch."""
 

@@ -11,7 +11,7 @@ from app.missions.operations.history import events_after
 from app.missions.operations.measurements import measure
 from app.missions.operations.mission_maps import newest_map
 from app.missions.operations.recorrection import set_tide
-from app.missions.operations.review import rule, soundings_page
+from app.missions.operations.review import rule, rule_many, sounding_points, soundings_page
 from app.missions.running.mission_views import watched
 from app.missions.service import MissionService
 from app.missions.soundings.measurement import Measurement
@@ -172,3 +172,67 @@ async def test_the_map_of_an_earlier_step_is_that_of_the_soundings_until_then(se
     assert early.built.soundings == 30
     assert early.built.map.count.sum() == 30
     assert np.nanmean(early.built.map.sd_m) > np.nanmean(whole.built.map.sd_m)
+
+
+async def test_many_soundings_are_rejected_and_restored_at_once_with_one_line_in_the_log(
+    service: MissionService,
+) -> None:
+    mission = (await service.create(make_spec())).id
+    items = measured()
+    await measure(await service.get(mission), items)
+    live = await service.get(mission)
+    await newest_map(live, service.maps)
+    before = await sounding_points(live, limit=1000)
+    assert before.total == len(before.id) == len(items)
+    assert before.next_after is None
+    names = [before.states[k] for k in before.state]
+    assert names.count(SoundingState.USED) == 79
+    # The odd one is seen where it was measured, and the first page ends where the next begins.
+    odd = names.index(SoundingState.DOUBTED)
+    assert before.depth_m[odd] == pytest.approx(4.5)
+    first = await sounding_points(live, limit=10)
+    rest = await sounding_points(live, after=first.next_after or 0, limit=1000)
+    assert first.id + rest.id == before.id
+    assert [first.vehicles[k] for k in first.vehicle] == [item.vehicle for item in items[:10]]
+
+    figures = (await view_of(service, mission)).progress
+    events = len(await events_after(live))
+    wrong = [number for number, name in zip(before.id, names, strict=True) if name is SoundingState.USED][:30]
+    done = await rule_many(live, [*wrong, wrong[0]], Ruling.REJECTED, note="fish", actor="Ana")
+    assert (done.changed, done.unchanged, done.refused) == (wrong, 0, [])
+    [line] = (await events_after(live))[events:]
+    assert line.message == "30 soundings rejected by Ana: fish"
+    assert (line.data["soundings"], line.data["actor"]) == (30, "Ana")
+    now = (await view_of(service, mission)).progress
+    assert (now.soundings, now.rejected) == (figures.soundings - 30, figures.rejected + 30)
+    after = await sounding_points(live, limit=1000)
+    assert {
+        number for number, k in zip(after.id, after.state, strict=True) if k == STATES[SoundingState.WITHDRAWN]
+    } == set(wrong)
+
+    assert (await rule_many(live, wrong, Ruling.REJECTED, actor="Ana")).unchanged == 30
+    back = await rule_many(live, wrong, Ruling.RESTORED, actor="Rui")
+    assert back.changed == wrong
+    again = (await view_of(service, mission)).progress
+    assert (again.soundings, again.rejected) == (figures.soundings, figures.rejected)
+    with pytest.raises(SoundingNotFoundError, match="no sounding 999999"):
+        await rule_many(live, [wrong[0], 999_999], Ruling.REJECTED, actor="Ana")
+    assert (await sounding_points(live, limit=1000)).state.count(STATES[SoundingState.RESTORED]) == 30
+
+
+async def test_of_many_those_without_a_depth_are_not_restored_and_told(service: MissionService) -> None:
+    mission = (await service.create(make_spec())).id
+    live = await service.get(mission)
+    broken = measured()[0].model_copy(update={"range_m": -1.0, "depth_m": 2.0})
+    items = [*measured()[1:4], broken]
+    await measure(live, items)
+    points = await sounding_points(live, limit=100)
+    done = await rule_many(live, points.id, Ruling.RESTORED, actor="Ana")
+    assert done.changed == points.id[:-1]
+    [refused] = done.refused
+    assert refused.id == points.id[-1]
+    assert "no depth can be had from it" in refused.reason
+    assert (await sounding_points(live, limit=100)).state[-1] == STATES[SoundingState.REJECTED]
+
+
+STATES = {state: k for k, state in enumerate(SoundingState)}

@@ -290,6 +290,10 @@ class SurveyRegressors:
         self._silent = np.vstack([self._silent, *parts, way])
         return True
 
+    def ways_ahead_m(self) -> dict[str, FloatArray]:
+        """See :meth:`app.exploration.planner.base.PlannerBase.ways_ahead_m`."""
+        return dict(self._plan if self._free else self._backbone)
+
     def remember(self) -> dict[str, Any]:
         """Return the memory."""
         return {

@@ -1150,6 +1150,51 @@ class PingsView(Model):
     parts: list[PingPartView]
 
 
+class PlanView(Model):
+    """The lines that a mission would begin with, and what they take: a plan, not a promise."""
+
+    vehicles: list[PlannedVehicleView]
+    distance_m: float
+    """Of all vehicles together"""
+    duration_s: float
+    """Until the last vehicle is at the end of its way, by the vehicles' time"""
+    duration_s_range: ForecastRange
+    energy_suffices: bool | None
+    """Whether every vehicle's energy lasts; null: of one or more it is not known, the others' does"""
+    whole: bool
+    """Whether this is all; else the ways end where the time for planning was up"""
+    assumptions: list[str]
+    """What was taken to be so, in words"""
+
+
+class PlannedVehicleView(Model):
+    """What one vehicle would do."""
+
+    vehicle: str
+    way: list[tuple[float, float]]
+    """From where it begins, [longitude, latitude]"""
+    way_home: list[tuple[float, float]] | None
+    """From the end of that; null: it has no recovery point, or no way leads there"""
+    distance_m: float
+    """Length of `way`"""
+    distance_home_m: float | None
+    """Length of `way_home`"""
+    duration_s: float
+    """Seconds of its time for `way`, turns and fixes by the clock included"""
+    duration_s_range: ForecastRange
+    """Without turns and fixes, and with every turn flown as a whole circle"""
+    home_s: float | None
+    """Seconds for `way_home`"""
+    energy_needs_s: float
+    """How long its energy has to last: for its way, the way home, and a reserve"""
+    energy_left_s: float | None
+    """How long it lasts for sure; null: not known"""
+    turn_back: tuple[float, float] | None
+    """Where on its way it has to turn back for want of energy; null: nowhere, or not known"""
+    turn_back_m: float | None
+    """How far along its way that is"""
+
+
 class PlannerOptions(Model):
     """Settings of the planners. Every planner reads those that concern it."""
 
@@ -1433,11 +1478,38 @@ class ReferenceView(Model):
     notes: list[str]
 
 
+class RefusedRuling(Model):
+    """A sounding that was left as it was."""
+
+    id: int
+    reason: str
+
+
 class RepeatOrder(Model):
     """Which line a vehicle is to fly again."""
 
     near: tuple[float, float] | None = None
     """The line that passes this place closest, [longitude, latitude]; null: the newest"""
+
+
+class RulingRequest(Model):
+    """Which soundings an operator decides about, and what is added to that."""
+
+    ids: list[int]
+    """Ids of soundings of this mission"""
+    note: str = ""
+    """Kept in the mission's log beside the action"""
+
+
+class RulingsView(Model):
+    """What came of an operator's word on many soundings; the map is that of the new choice."""
+
+    changed: list[int]
+    """Ids of those that are otherwise now"""
+    unchanged: int
+    """How many were so already"""
+    refused: list[RefusedRuling]
+    """Those that cannot be so, with the reason"""
 
 
 class Scan(Model):
@@ -1754,6 +1826,26 @@ class SoundingPage(Model):
     total: int
     """Of all pages"""
     items: list[SoundingView]
+    next_after: int | None
+    """Give it as `after` for the next page; null: this is the last"""
+
+
+class SoundingPoints(Model):
+    """Many soundings as points, column by column, in the order they came."""
+
+    total: int
+    """Of all pages"""
+    id: list[int]
+    lon_deg: list[float]
+    lat_deg: list[float]
+    depth_m: list[float]
+    """Below the datum of the map; as it was measured where that is not known"""
+    state: list[int]
+    """Places in `states`"""
+    vehicle: list[int]
+    """Places in `vehicles`"""
+    states: list[SoundingState]
+    vehicles: list[str]
     next_after: int | None
     """Give it as `after` for the next page; null: this is the last"""
 

@@ -312,6 +312,21 @@ class Operations(ABC):
             query={"floor_depth_m": floor_depth_m},
         ))
 
+    def preview_plan(
+        self,
+        body: models.MissionSpec | Mapping[str, Any],
+        *,
+        floor_depth_m: float | None = None,
+    ) -> models.PlanView:
+        """Plan a mission that is being described: ``POST /plan``."""
+        return self._call(Call[models.PlanView](
+            "POST",
+            "/plan",
+            models.PlanView,
+            body=body,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
     def post_measurements(
         self,
         mission_id: str,
@@ -771,6 +786,39 @@ class Operations(ABC):
             f"/missions/{part(mission_id)}/soundings",
             models.SoundingPage,
             query={"state": state, "vehicle": vehicle, "after": after, "limit": limit},
+        ))
+
+    def list_sounding_points(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.SoundingPoints:
+        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``."""
+        return self._call(Call[models.SoundingPoints](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings/points",
+            models.SoundingPoints,
+            query={"after": after, "limit": limit},
+        ))
+
+    def restore_soundings(self, mission_id: str, body: models.RulingRequest | Mapping[str, Any]) -> models.RulingsView:
+        """Let many soundings count: ``POST /missions/{mission_id}/soundings/restore``."""
+        return self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/restore",
+            models.RulingsView,
+            body=body,
+        ))
+
+    def reject_soundings(self, mission_id: str, body: models.RulingRequest | Mapping[str, Any]) -> models.RulingsView:
+        """Keep many soundings out: ``POST /missions/{mission_id}/soundings/reject``."""
+        return self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/reject",
+            models.RulingsView,
+            body=body,
         ))
 
     def restore_sounding(
@@ -1312,6 +1360,21 @@ class AsyncOperations(ABC):
             query={"floor_depth_m": floor_depth_m},
         ))
 
+    async def preview_plan(
+        self,
+        body: models.MissionSpec | Mapping[str, Any],
+        *,
+        floor_depth_m: float | None = None,
+    ) -> models.PlanView:
+        """Plan a mission that is being described: ``POST /plan``."""
+        return await self._call(Call[models.PlanView](
+            "POST",
+            "/plan",
+            models.PlanView,
+            body=body,
+            query={"floor_depth_m": floor_depth_m},
+        ))
+
     async def post_measurements(
         self,
         mission_id: str,
@@ -1792,6 +1855,47 @@ class AsyncOperations(ABC):
             f"/missions/{part(mission_id)}/soundings",
             models.SoundingPage,
             query={"state": state, "vehicle": vehicle, "after": after, "limit": limit},
+        ))
+
+    async def list_sounding_points(
+        self,
+        mission_id: str,
+        *,
+        after: int | None = None,
+        limit: int | None = None,
+    ) -> models.SoundingPoints:
+        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``."""
+        return await self._call(Call[models.SoundingPoints](
+            "GET",
+            f"/missions/{part(mission_id)}/soundings/points",
+            models.SoundingPoints,
+            query={"after": after, "limit": limit},
+        ))
+
+    async def restore_soundings(
+        self,
+        mission_id: str,
+        body: models.RulingRequest | Mapping[str, Any],
+    ) -> models.RulingsView:
+        """Let many soundings count: ``POST /missions/{mission_id}/soundings/restore``."""
+        return await self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/restore",
+            models.RulingsView,
+            body=body,
+        ))
+
+    async def reject_soundings(
+        self,
+        mission_id: str,
+        body: models.RulingRequest | Mapping[str, Any],
+    ) -> models.RulingsView:
+        """Keep many soundings out: ``POST /missions/{mission_id}/soundings/reject``."""
+        return await self._call(Call[models.RulingsView](
+            "POST",
+            f"/missions/{part(mission_id)}/soundings/reject",
+            models.RulingsView,
+            body=body,
         ))
 
     async def restore_sounding(

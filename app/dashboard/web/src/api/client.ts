@@ -19,16 +19,19 @@ import type {
   NewSite,
   OrderView,
   PlannerView,
+  PlanView,
   PolygonGeometry,
   PreflightView,
   Problem,
   ProductView,
   ProfileView,
   QualityView,
+  RulingsView,
   SearchGridView,
   SessionView,
   SiteView,
   SoundingPage,
+  SoundingPoints,
   SoundingState,
   SoundingView,
   StepView,
@@ -166,6 +169,13 @@ export const api = {
       body: JSON.stringify(mission),
       headers: { "Content-Type": "application/json" },
     }),
+  plan: (mission: NewMission, gone: AbortSignal) =>
+    request<PlanView>("/plan", {
+      method: "POST",
+      signal: gone,
+      body: JSON.stringify(mission),
+      headers: { "Content-Type": "application/json" },
+    }),
   steps: (id: string, after: number) =>
     request<StepView[]>(`${missionPath(id)}/steps?after=${after}&limit=1000`),
   telemetry: (id: string) => request<TelemetryView>(`${missionPath(id)}/telemetry`),
@@ -190,6 +200,10 @@ export const api = {
     request<SoundingPage>(
       `${missionPath(id)}/soundings?limit=200&after=${after}${state ? `&state=${state}` : ""}`,
     ),
+  soundingPoints: (id: string, after: number, gone: AbortSignal) =>
+    request<SoundingPoints>(`${missionPath(id)}/soundings/points?after=${after}`, { signal: gone }),
+  ruleMany: (id: string, ids: readonly number[], ruling: "restore" | "reject", note: string) =>
+    post<RulingsView>(`${missionPath(id)}/soundings/${ruling}`, { ids, note }),
   rule: (id: string, sounding: number, ruling: "restore" | "reject", note: string) =>
     post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }),
   setTide: (id: string, tide: { level_m?: number; table?: string; source: string }) =>

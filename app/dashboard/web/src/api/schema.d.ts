@@ -599,6 +599,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan a mission that is being described
+         * @description Return the lines that a mission would begin with, before anyone creates it. Nothing is stored, nothing moves.
+         *
+         *     Takes parts of a second, so it can be asked for while an area is dragged; a client that leaves ends it.
+         */
+        post: operations["previewPlan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/measurements": {
         parameters: {
             query?: never;
@@ -1271,6 +1293,66 @@ export interface paths {
         get: operations["listSoundings"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings/points": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See all soundings as points
+         * @description Return soundings column by column, whatever became of them: enough to draw them in space.
+         */
+        get: operations["listSoundingPoints"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings/restore": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Let many soundings count
+         * @description Take soundings into the map whatever gate and neighbours say, all at once; the log keeps who did so.
+         */
+        post: operations["restoreSoundings"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/soundings/reject": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Keep many soundings out
+         * @description Take soundings out of the map, all at once; their values stay, the log keeps who did so.
+         */
+        post: operations["rejectSoundings"];
         delete?: never;
         options?: never;
         head?: never;
@@ -4315,6 +4397,109 @@ export interface components {
             parts: components["schemas"]["PingPartView"][];
         };
         /**
+         * PlanView
+         * @description The lines that a mission would begin with, and what they take: a plan, not a promise.
+         */
+        PlanView: {
+            /** Vehicles */
+            vehicles: components["schemas"]["PlannedVehicleView"][];
+            /**
+             * Distance M
+             * @description Of all vehicles together
+             */
+            distance_m: number;
+            /**
+             * Duration S
+             * @description Until the last vehicle is at the end of its way, by the vehicles' time
+             */
+            duration_s: number;
+            duration_s_range: components["schemas"]["ForecastRange"];
+            /**
+             * Energy Suffices
+             * @description Whether every vehicle's energy lasts; null: of one or more it is not known, the others' does
+             */
+            energy_suffices: boolean | null;
+            /**
+             * Whole
+             * @description Whether this is all; else the ways end where the time for planning was up
+             */
+            whole: boolean;
+            /**
+             * Assumptions
+             * @description What was taken to be so, in words
+             */
+            assumptions: string[];
+        };
+        /**
+         * PlannedVehicleView
+         * @description What one vehicle would do.
+         */
+        PlannedVehicleView: {
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Way
+             * @description From where it begins, [longitude, latitude]
+             */
+            way: [
+                number,
+                number
+            ][];
+            /**
+             * Way Home
+             * @description From the end of that; null: it has no recovery point, or no way leads there
+             */
+            way_home: [
+                number,
+                number
+            ][] | null;
+            /**
+             * Distance M
+             * @description Length of `way`
+             */
+            distance_m: number;
+            /**
+             * Distance Home M
+             * @description Length of `way_home`
+             */
+            distance_home_m: number | null;
+            /**
+             * Duration S
+             * @description Seconds of its time for `way`, turns and fixes by the clock included
+             */
+            duration_s: number;
+            /** @description Without turns and fixes, and with every turn flown as a whole circle */
+            duration_s_range: components["schemas"]["ForecastRange"];
+            /**
+             * Home S
+             * @description Seconds for `way_home`
+             */
+            home_s: number | null;
+            /**
+             * Energy Needs S
+             * @description How long its energy has to last: for its way, the way home, and a reserve
+             */
+            energy_needs_s: number;
+            /**
+             * Energy Left S
+             * @description How long it lasts for sure; null: not known
+             */
+            energy_left_s: number | null;
+            /**
+             * Turn Back
+             * @description Where on its way it has to turn back for want of energy; null: nowhere, or not known
+             */
+            turn_back: [
+                number,
+                number
+            ] | null;
+            /**
+             * Turn Back M
+             * @description How far along its way that is
+             */
+            turn_back_m: number | null;
+        };
+        /**
          * PlannerOptions
          * @description Settings of the planners. Every planner reads those that concern it.
          */
@@ -4957,6 +5142,16 @@ export interface components {
             notes: string[];
         };
         /**
+         * RefusedRuling
+         * @description A sounding that was left as it was.
+         */
+        RefusedRuling: {
+            /** Id */
+            id: number;
+            /** Reason */
+            reason: string;
+        };
+        /**
          * RepeatOrder
          * @description Which line a vehicle is to fly again.
          * @example {
@@ -4988,6 +5183,52 @@ export interface components {
          * @enum {string}
          */
         Role: "viewer" | "vehicle" | "operator" | "admin";
+        /**
+         * RulingRequest
+         * @description Which soundings an operator decides about, and what is added to that.
+         * @example {
+         *       "ids": [
+         *         17,
+         *         18,
+         *         19
+         *       ],
+         *       "note": "a school of fish"
+         *     }
+         */
+        RulingRequest: {
+            /**
+             * Note
+             * @description Kept in the mission's log beside the action
+             * @default
+             */
+            note: string;
+            /**
+             * Ids
+             * @description Ids of soundings of this mission
+             */
+            ids: number[];
+        };
+        /**
+         * RulingsView
+         * @description What came of an operator's word on many soundings; the map is that of the new choice.
+         */
+        RulingsView: {
+            /**
+             * Changed
+             * @description Ids of those that are otherwise now
+             */
+            changed: number[];
+            /**
+             * Unchanged
+             * @description How many were so already
+             */
+            unchanged: number;
+            /**
+             * Refused
+             * @description Those that cannot be so, with the reason
+             */
+            refused: components["schemas"]["RefusedRuling"][];
+        };
         /**
          * Scan
          * @description One look round from a vehicle: a laser scanner's turn, or a sweep of an imaging sonar.
@@ -5737,6 +5978,47 @@ export interface components {
             total: number;
             /** Items */
             items: components["schemas"]["SoundingView"][];
+            /**
+             * Next After
+             * @description Give it as `after` for the next page; null: this is the last
+             */
+            next_after: number | null;
+        };
+        /**
+         * SoundingPoints
+         * @description Many soundings as points, column by column, in the order they came.
+         */
+        SoundingPoints: {
+            /**
+             * Total
+             * @description Of all pages
+             */
+            total: number;
+            /** Id */
+            id: number[];
+            /** Lon Deg */
+            lon_deg: number[];
+            /** Lat Deg */
+            lat_deg: number[];
+            /**
+             * Depth M
+             * @description Below the datum of the map; as it was measured where that is not known
+             */
+            depth_m: number[];
+            /**
+             * State
+             * @description Places in `states`
+             */
+            state: number[];
+            /**
+             * Vehicle
+             * @description Places in `vehicles`
+             */
+            vehicle: number[];
+            /** States */
+            states: components["schemas"]["SoundingState"][];
+            /** Vehicles */
+            vehicles: string[];
             /**
              * Next After
              * @description Give it as `after` for the next page; null: this is the last
@@ -10436,6 +10718,114 @@ export interface operations {
             };
         };
     };
+    previewPlan: {
+        parameters: {
+            query?: {
+                /** @description How deep it is where nothing is known; default: a guess */
+                floor_depth_m?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MissionSpec"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlanView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     postMeasurements: {
         parameters: {
             query?: never;
@@ -13811,6 +14201,331 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listSoundingPoints: {
+        parameters: {
+            query?: {
+                /** @description Only soundings with a larger id */
+                after?: number;
+                /** @description Most soundings in the answer */
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SoundingPoints"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restoreSoundings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RulingRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RulingsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such sounding */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    rejectSoundings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RulingRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RulingsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such sounding */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

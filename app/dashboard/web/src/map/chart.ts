@@ -247,6 +247,11 @@ export class Chart {
     this.#show({ draft: { area, keepOut } });
   }
 
+  /** What that mission would begin with. */
+  setPlan(plan: LivelyContent["plan"]): void {
+    this.#show({ plan });
+  }
+
   /** Goes to the area of the mission that is being described, unless enough of it can be seen. */
   goToDraft(padding: () => Padding): void {
     const bounds = this.#draftBounds;

@@ -57,8 +57,25 @@ export async function edit(
   }
   terra.setMode("select");
   terra.selectFeature(added.id);
-  terra.on("finish", () => onChanged(ringOfShape(terra)));
-  return end;
+  let told = JSON.stringify(rounded);
+  const tell = () => {
+    const now = ringOfShape(terra);
+    const text = JSON.stringify(now);
+    if (now.length < 3 || text === told) return;
+    told = text;
+    onChanged(now);
+  };
+  let frame = 0;
+  // While a corner is dragged, too: what follows from the area is drawn anew meanwhile.
+  terra.on("change", () => {
+    cancelAnimationFrame(frame);
+    frame = requestAnimationFrame(tell);
+  });
+  terra.on("finish", tell);
+  return () => {
+    cancelAnimationFrame(frame);
+    end();
+  };
 }
 
 async function begin(chart: Chart, modes: Modes) {

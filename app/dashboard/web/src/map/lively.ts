@@ -19,8 +19,20 @@ export interface Sketch {
   handles: readonly { at: LngLat; strong: boolean }[];
 }
 
+/** What a mission that is being described would begin with; `old` while something else is described by now. */
+export interface PlanLines {
+  old: boolean;
+  ways: readonly {
+    colour: string;
+    way: readonly LngLat[];
+    beyond: readonly LngLat[];
+    home: readonly LngLat[];
+  }[];
+}
+
 export interface LivelyContent {
   draft: { area: PolygonGeometry | null; keepOut: readonly PolygonGeometry[] };
+  plan: PlanLines;
   ranges: readonly { at: LngLat; radius_m: number; colour: string }[];
   tails: readonly Track[];
   swaths: readonly SwathLine[];
@@ -49,6 +61,7 @@ export const WORDS_FONT = "12px sans-serif";
 
 export const NOTHING: LivelyContent = {
   draft: { area: null, keepOut: [] },
+  plan: { old: false, ways: [] },
   ranges: [],
   tails: [],
   swaths: [],
@@ -74,6 +87,7 @@ export function paintLively(
 ): void {
   const {
     draft,
+    plan,
     ranges,
     tails,
     swaths,
@@ -96,6 +110,7 @@ export function paintLively(
       line(context, at, ring as LngLat[], { colour: paper.keepOut, width: 2.5, dash: [5, 5] });
     }
   }
+  paintPlan(context, at, plan, paper);
   for (const { at: place, radius_m, colour } of ranges) {
     line(context, at, circle(place, radius_m, 72), { colour, width: 1, dash: [4, 3] });
   }
@@ -129,6 +144,26 @@ export function paintLively(
     for (const place of measure) dot(context, at, place, 4, paper.casing, { colour: paper.ink, width: 2 });
   }
   if (sketch) paintSketch(context, at, sketch);
+}
+
+/** Lines that are planned; what comes after a vehicle has to turn back is hardly seen. */
+function paintPlan(
+  context: CanvasRenderingContext2D,
+  at: Projection,
+  { old, ways }: PlanLines,
+  paper: Paper,
+): void {
+  const opacity = old ? 0.45 : 1;
+  for (const { colour, way: lines, beyond, home } of ways) {
+    line(context, at, lines, { colour: paper.casing, width: 4, opacity: 0.5 * opacity });
+    line(context, at, lines, { colour, width: 2.2, dash: [7, 3], opacity });
+    line(context, at, beyond, { colour, width: 1.2, dash: [2, 5], opacity: 0.6 * opacity });
+    line(context, at, home, { colour, width: 1.5, dash: [1, 5], opacity });
+    const [first, turn] = [lines[0], lines.at(-1)];
+    if (first) dot(context, at, first, 5, colour, { colour: paper.casing, width: 2, opacity });
+    if (beyond.length > 0 && turn)
+      dot(context, at, turn, 6, paper.casing, { colour: paper.keepOut, width: 3, opacity });
+  }
 }
 
 function paintTarget(

@@ -14,6 +14,8 @@ import {
   Mesh,
   MeshLambertMaterial,
   PerspectiveCamera,
+  Points,
+  PointsMaterial,
   Scene,
   Vector3,
   WebGLRenderer,
@@ -23,7 +25,7 @@ import type { LngLat, Place } from "../api/types";
 import { type Certainty, isMeasured } from "./certainty";
 import type { Range } from "./layers";
 import { colourAt, type Palette } from "./palette";
-import { cellOf, type SeaFloor, valueAt } from "./seafloor";
+import { cellOf, gridPlace, type SeaFloor, valueAt } from "./seafloor";
 
 export interface SceneVehicle {
   name: string;
@@ -34,6 +36,15 @@ export interface SceneVehicle {
   /** Where no depth is known it lies at the vehicle's. */
   way: readonly Place[];
 }
+
+/** Columns of equal length. */
+export interface ScenePoints {
+  lng: readonly number[];
+  lat: readonly number[];
+  depth_m: readonly number[];
+}
+
+const POINT_PX = 4;
 
 function isDrawn(map: SeaFloor, row: number, col: number, { none_m }: Certainty): boolean {
   return (
@@ -49,9 +60,11 @@ export class SeaFloorScene {
   readonly #controls: OrbitControls;
   readonly #world = new Group();
   readonly #fleet = new Group();
+  #points: Points<BufferGeometry, PointsMaterial> | null = null;
   #mesh: Mesh<BufferGeometry, MeshLambertMaterial> | null = null;
   #map: SeaFloor | null = null;
   #placed = false;
+  #floorShown = true;
   #frame = 0;
 
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -73,6 +86,7 @@ export class SeaFloorScene {
     this.#controls.dispose();
     this.#forget(this.#mesh);
     this.#clearFleet();
+    this.#forgetPoints();
     this.#renderer.dispose();
   }
 
@@ -132,6 +146,7 @@ export class SeaFloorScene {
     geometry.computeVertexNormals();
     this.#forget(this.#mesh);
     this.#mesh = new Mesh(geometry, new MeshLambertMaterial({ vertexColors: true, side: DoubleSide }));
+    this.#mesh.visible = this.#floorShown;
     this.#world.add(this.#mesh);
     if (!this.#placed) this.lookFromSouth();
     this.#draw();
@@ -182,6 +197,72 @@ export class SeaFloorScene {
       );
     }
     this.#draw();
+  }
+
+  /** Soundings as points, each with its colour (red, green, blue; 0 to 1); null: none. */
+  setSoundings(points: ScenePoints | null): void {
+    this.#forgetPoints();
+    const map = this.#map;
+    if (map && points) {
+      const places = new Float32Array(3 * points.lng.length);
+      points.lng.forEach((lng, i) => {
+        const { col, row } = gridPlace(map, [lng, points.lat[i] as number]);
+        const depth_m = points.depth_m[i] as number;
+        places.set([(col - map.cols / 2) * map.cell_m, -depth_m, (map.rows / 2 - row) * map.cell_m], 3 * i);
+      });
+      const geometry = new BufferGeometry();
+      geometry.setAttribute("position", new BufferAttribute(places, 3));
+      geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * points.lng.length), 3));
+      this.#points = new Points(
+        geometry,
+        new PointsMaterial({ size: POINT_PX, sizeAttenuation: false, vertexColors: true }),
+      );
+      this.#world.add(this.#points);
+    }
+    this.#draw();
+  }
+
+  /** Colours the points anew; `colours` has red, green and blue of each, 0 to 1. */
+  colourSoundings(colours: Float32Array): void {
+    const attribute = this.#points?.geometry.getAttribute("color");
+    if (!attribute || attribute.array.length !== colours.length) return;
+    attribute.array.set(colours);
+    attribute.needsUpdate = true;
+    this.#draw();
+  }
+
+  /** Where the points are on the canvas, x and y of each; not a number behind the camera. */
+  soundingsOnScreen(): Float32Array {
+    const places = this.#points?.geometry.getAttribute("position").array ?? [];
+    const screen = new Float32Array((places.length / 3) * 2).fill(Number.NaN);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.#scene.updateMatrixWorld();
+    this.#camera.updateMatrixWorld();
+    const at = new Vector3();
+    for (let i = 0; 3 * i < places.length; i++) {
+      at.fromArray(places, 3 * i)
+        .applyMatrix4(this.#world.matrixWorld)
+        .project(this.#camera);
+      if (at.z < -1 || at.z > 1) continue;
+      screen[2 * i] = ((at.x + 1) / 2) * width;
+      screen[2 * i + 1] = ((1 - at.y) / 2) * height;
+    }
+    return screen;
+  }
+
+  /** Whether the sea floor hides nothing of the points: it is left out. */
+  setFloorShown(shown: boolean): void {
+    this.#floorShown = shown;
+    if (this.#mesh) this.#mesh.visible = shown;
+    this.#draw();
+  }
+
+  #forgetPoints(): void {
+    if (!this.#points) return;
+    this.#world.remove(this.#points);
+    this.#points.geometry.dispose();
+    this.#points.material.dispose();
+    this.#points = null;
   }
 
   #at(map: SeaFloor, place: Place, depth_m: number): Vector3 | null {

@@ -10,6 +10,7 @@ import type {
   LngLat,
   MissionSummary,
   MissionView,
+  PlanView,
   PolygonGeometry,
   SoundingView,
   StepView,
@@ -211,6 +212,8 @@ export interface DraftShapes {
   /** Places of a search, and where vehicles come home to. */
   marks: readonly PlaceMark[];
 }
+/** What the mission that is being described would begin with; `old` while something else is described by now. */
+export const planned = signal<{ plan: PlanView; old: boolean } | null>(null);
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);

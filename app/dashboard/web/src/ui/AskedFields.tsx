@@ -5,7 +5,6 @@ import { sizeOf } from "../map/area";
 import {
   canPlan,
   cornersOf,
-  type Estimate,
   estimate,
   faultsOf,
   type LengthChoice,
@@ -15,12 +14,12 @@ import {
   withLength,
 } from "../state/draft";
 import { FIELDS } from "../state/fields";
-import { distance, duration, fixed, percent } from "../state/format";
-import { fleet } from "../state/store";
+import { distance, duration, fixed } from "../state/format";
 import { say } from "../words/say";
 import { Choice } from "./Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
 import { Forecast } from "./Forecast";
+import { Planned, usePlan } from "./Planned";
 
 /** What the survey is to give: how sure, how complete, how long it may take; and what follows from that. */
 export function AskedFields() {
@@ -136,13 +135,16 @@ function Length() {
   );
 }
 
-/** What the mission takes at most, drawn anew with every change, and a simulation of it when asked for. */
+/** What the mission takes at most, its plan drawn anew with every change, and a simulation of it when asked for. */
 function Expected() {
   const { draft } = useForm();
   const corners = cornersOf(draft);
   const found = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
+  const whole =
+    found !== null && Object.keys(faultsOf({ ...draft, name: draft.name || "forecast" })).length === 0;
+  const described = whole ? JSON.stringify(toMission({ ...draft, name: "forecast" })) : null;
+  const fault = usePlan(described);
   if (!found) return null;
-  const whole = Object.keys(faultsOf({ ...draft, name: draft.name || "forecast" })).length === 0;
   return (
     <>
       <p class="hint" data-testid="estimate">
@@ -156,58 +158,13 @@ function Expected() {
               : say("asked.upToFromTheRecoveryPoint", { farthestM: distance(found.farthest_m) }),
         })}
       </p>
-      <Shares of={found} />
-      {whole ? (
+      <Planned of={found} fault={fault} />
+      {described ? (
         <Forecast
-          of={JSON.stringify(toMission({ ...draft, name: "forecast" }))}
+          of={described}
           ask={(gone) => api.forecastOf(toMission({ ...draft, name: draft.name || "forecast" }), gone)}
         />
       ) : null}
     </>
-  );
-}
-
-const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
-const PERCENT = 100;
-
-/** What each vehicle does at most, beside the energy that it has. */
-function Shares({ of: { shares } }: { of: Estimate }) {
-  return (
-    <table class="shares" data-testid="shares">
-      <thead>
-        <tr>
-          {[say("asked.vehicle"), say("asked.time"), say("asked.length"), say("asked.energy")].map(
-            (title) => (
-              <th key={title} scope="col">
-                {title}
-              </th>
-            ),
-          )}
-        </tr>
-      </thead>
-      <tbody>
-        {shares.map(({ name, seconds, metres, endurance_s }) => {
-          const battery_pct = fleet.value.find((v) => v.name === name)?.battery_pct ?? null;
-          const full = endurance_s !== null && seconds > endurance_s;
-          return (
-            <tr key={name} data-testid={`share-${name}`} class={full ? "short" : ""}>
-              <th scope="row">{name}</th>
-              <td>{duration(seconds)}</td>
-              <td>{distance(metres)}</td>
-              <td>
-                {endurance_s !== null
-                  ? say("asked.ofItsEndurance", {
-                      it: full ? "▲ " : "",
-                      seconds: percent(shareOf(seconds, endurance_s)),
-                    })
-                  : battery_pct !== null
-                    ? say("asked.battery", { batteryPct: percent(battery_pct) })
-                    : say("asked.notKnown")}
-              </td>
-            </tr>
-          );
-        })}
-      </tbody>
-    </table>
   );
 }

@@ -2,7 +2,7 @@ import "./SpaceView.css";
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { DEPTH_PALETTES } from "../map/palette";
-import type { SceneVehicle } from "../map/scene";
+import type { SceneVehicle, SeaFloorScene } from "../map/scene";
 import { replayed } from "../state/replay";
 import {
   depthPalette,
@@ -16,7 +16,8 @@ import {
   view,
 } from "../state/store";
 import { say } from "../words/say";
-import { Button, sets } from "./Controls";
+import { Button, flips, sets } from "./Controls";
+import { SoundingsInSpace } from "./SoundingsInSpace";
 
 /** The sea floor in space over the whole map. */
 export function SpaceView() {
@@ -24,6 +25,8 @@ export function SpaceView() {
   const exaggeration = useSignal(4);
   const fault = useSignal("");
   const reset = useRef(() => {});
+  const scene = useSignal<SeaFloorScene | null>(null);
+  const points = useSignal(false);
 
   useEffect(() => {
     const element = canvas.current;
@@ -31,32 +34,34 @@ export function SpaceView() {
     let stop = () => {};
     let closed = false;
     import("../map/scene").then(
-      ({ SeaFloorScene }) => {
+      ({ SeaFloorScene: Made }) => {
         if (closed) return;
-        const scene = new SeaFloorScene(element);
-        reset.current = () => scene.lookFromSouth();
-        const watcher = new ResizeObserver(() => scene.resize(element.clientWidth, element.clientHeight));
+        const made = new Made(element);
+        reset.current = () => made.lookFromSouth();
+        const watcher = new ResizeObserver(() => made.resize(element.clientWidth, element.clientHeight));
         watcher.observe(element);
         const stops = [
           effect(() => {
             const contrast = theme.value === "contrast";
-            scene.setBackground(contrast ? "#ffffff" : isDark.value ? "#0c1922" : "#dfe9f0");
+            made.setBackground(contrast ? "#ffffff" : isDark.value ? "#0c1922" : "#dfe9f0");
           }),
-          effect(() => scene.setExaggeration(exaggeration.value)),
+          effect(() => made.setExaggeration(exaggeration.value)),
           effect(() => {
             const map = seaFloor.value;
             const range = rangeOf("depth");
             const certainty = shownCertainty.value;
             if (map && range && certainty) {
-              scene.setSeaFloor(map, DEPTH_PALETTES[depthPalette.value].palette, range, certainty);
+              made.setSeaFloor(map, DEPTH_PALETTES[depthPalette.value].palette, range, certainty);
             }
           }),
-          effect(() => scene.setVehicles(seaFloor.value ? fleetInSpace() : [])),
+          effect(() => made.setVehicles(seaFloor.value ? fleetInSpace() : [])),
         ];
+        scene.value = made;
         stop = () => {
+          scene.value = null;
           for (const one of stops) one();
           watcher.disconnect();
-          scene.close();
+          made.close();
         };
       },
       (error: unknown) => {
@@ -87,10 +92,14 @@ export function SpaceView() {
           />
         </label>
         <Button onClick={() => reset.current()}>{say("space.fromTheSouth")}</Button>
+        <Button id="toggle-points" aria-pressed={points.value} onClick={flips(points)}>
+          {say("space.soundings")}
+        </Button>
         <Button id="close-3d" kind="command primary" onClick={sets(in3d, false)}>
           {say("space.backToTheMap")}
         </Button>
       </div>
+      {points.value && scene.value ? <SoundingsInSpace scene={scene.value} /> : null}
       {fault.value ? (
         <p class="notice alarm" role="alert">
           {say("space.itCannotBeShownInSpace", { fault: fault.value })}

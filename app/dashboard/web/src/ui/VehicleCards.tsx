@@ -1,7 +1,11 @@
 import "./VehicleCards.css";
+import { useSignal } from "@preact/signals";
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef } from "preact/hooks";
 import type { VehicleView } from "../api/types";
 import { age, clock, distance, metres, percent, speed } from "../state/format";
 import { localizationWords } from "../state/localization";
+import { typingFor } from "../state/orders";
 import { replayed } from "../state/replay";
 import { bringHome, holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../state/session";
 import {
@@ -39,7 +43,7 @@ import { cardsFolded, cardsWidth, shownFolded } from "./room";
 import { SearchCard } from "./SearchCard";
 import { SwathCard } from "./SwathCard";
 import { TargetCards } from "./TargetCards";
-import { LineOrders, OrderLine } from "./VehicleOrders";
+import { LineOrders, OrderLine, TypedPlace } from "./VehicleOrders";
 
 export function VehicleCards() {
   const present = mission.value;
@@ -263,15 +267,16 @@ function Range({ of: v }: { of: VehicleView }) {
   );
 }
 
-/** What can be asked of a vehicle that takes part. */
+/** What can be asked of a vehicle that takes part: one row, on narrow windows what is seldom needed in a menu. */
 function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
   const present = mission.value;
   const again = ended && unstopped.value.has(v.name);
   if (!present || (ended && !again)) return null;
   const led = present.state === "running" && present.ending === null;
+  const surveys = led && v.withdrawn === "";
   return (
     <div class="orders">
-      {led && v.recovery_point !== null && v.withdrawn === "" ? (
+      {surveys && v.recovery_point !== null ? (
         <Button
           id={`return-${v.name}`}
           commands
@@ -281,17 +286,6 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
           {say("cards.bringHome")}
         </Button>
       ) : null}
-      {led && v.withdrawn === "" ? (
-        <Button
-          id={`hold-${v.name}`}
-          commands
-          title={say("cards.letItWaitWhereItIs")}
-          onClick={() => void holdVehicle(v.name)}
-        >
-          {say("cards.hold")}
-        </Button>
-      ) : null}
-      <LineOrders of={v} />
       {led && isThere(v) ? (
         <Button
           id={`resume-${v.name}`}
@@ -301,6 +295,19 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
         >
           {say("cards.resumeSurvey")}
         </Button>
+      ) : null}
+      {surveys ? (
+        <More of={v.name}>
+          <Button
+            id={`hold-${v.name}`}
+            commands
+            title={say("cards.letItWaitWhereItIs")}
+            onClick={() => void holdVehicle(v.name)}
+          >
+            {say("cards.hold")}
+          </Button>
+          <LineOrders of={v} />
+        </More>
       ) : null}
       <Button
         id={`abort-${v.name}`}
@@ -313,7 +320,61 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
       >
         {ended ? say("cards.stopAgain", { v: v.name }) : say("cards.abort", { v: v.name })}
       </Button>
+      {typingFor.value === v.name ? <TypedPlace name={v.name} /> : null}
     </div>
+  );
+}
+
+/** From its button to the menu, pixels. */
+const GAP_PX = 6;
+/** As wide as the menu is at most, pixels. */
+const WIDTH_PX = 230;
+
+/** Further orders: beside the others where there is room, in a menu over the card where there is none. */
+function More({ of, children }: { of: string; children: ComponentChildren }) {
+  const open = useSignal(false);
+  const menu = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const box = menu.current;
+    // What was chosen is on its way.
+    const fold = () => {
+      if (open.peek()) box?.hidePopover();
+    };
+    box?.addEventListener("click", fold);
+    return () => box?.removeEventListener("click", fold);
+  }, []);
+  const flip = (event: MouseEvent) => {
+    const button = (event.currentTarget as HTMLElement).getBoundingClientRect();
+    const box = menu.current;
+    if (!box) return;
+    const left = Math.max(0, Math.min(button.left, window.innerWidth - WIDTH_PX));
+    box.style.setProperty("--left", `${left}px`);
+    box.style.setProperty("--bottom", `${window.innerHeight - button.top + GAP_PX}px`);
+    box.togglePopover();
+  };
+  return (
+    <>
+      <Button
+        id={`more-${of}`}
+        kind="command more"
+        aria-expanded={open.value}
+        aria-label={say("cards.furtherOrders", { name: of })}
+        onClick={flip}
+      >
+        {say("cards.more")}
+      </Button>
+      <div
+        ref={menu}
+        popover="auto"
+        class="more-orders"
+        data-testid={`more-orders-${of}`}
+        onToggle={(event) => {
+          open.value = event.newState === "open";
+        }}
+      >
+        {children}
+      </div>
+    </>
   );
 }
 

@@ -73,13 +73,12 @@ export function LineOrders({ of: v }: { of: VehicleView }) {
       >
         {say("orders.again")}
       </Button>
-      {typing ? <TypedPlace name={v.name} /> : null}
     </>
   );
 }
 
 /** Where a vehicle is to go, typed; the map takes a click meanwhile. */
-function TypedPlace({ name }: { name: string }) {
+export function TypedPlace({ name }: { name: string }) {
   const text = useSignal("");
   const fault = useSignal("");
   useEscape(typingFor);

@@ -9,10 +9,12 @@ import type { Chart, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { outliersOf, placeOf } from "../map/crossings";
 import { paletteOf } from "../map/layers";
+import type { PlanLines } from "../map/lively";
 import type { PlaceMark, Route, Track } from "../map/marks";
 import { Painter } from "../map/painter";
-import { lookupTable } from "../map/palette";
+import { lookupTable, vehicleColour } from "../map/palette";
 import type { Look } from "../map/paper";
+import { cutAt } from "../map/plan";
 import { recoveryMarks, wayHome } from "../map/recovery";
 import { gridPlace, type SeaFloor } from "../map/seafloor";
 import { shipMarks } from "../map/ships";
@@ -42,6 +44,7 @@ import {
   measured,
   mission,
   panelOpen,
+  planned,
   replayStep,
   reviewed,
   seaFloor,
@@ -99,6 +102,7 @@ export function follow(chart: Chart): () => void {
       });
     }),
     followDraft(chart),
+    effect(() => chart.setPlan(planLines())),
     effect(() => chart.setCovers(covers.value)),
     effect(() => {
       stripHeight.value;
@@ -178,6 +182,16 @@ export function follow(chart: Chart): () => void {
   return () => {
     for (const stop of stops) stop();
   };
+}
+
+/** The lines of the plan of what is being described, each cut where its vehicle has to turn back. */
+function planLines(): PlanLines {
+  const { plan, old } = planned.value ?? { plan: null, old: false };
+  const ways = (plan?.vehicles ?? []).map((v, i) => {
+    const [way, beyond] = cutAt(v.way, v.turn_back_m);
+    return { colour: vehicleColour(i), way, beyond, home: v.way_home ?? [] };
+  });
+  return { old, ways };
 }
 
 /** A place that was asked for, and where this device is. */

@@ -114,6 +114,17 @@ export const PLANNING = {
   "asked.ofItsEndurance": { en: "{it}{seconds} of its endurance", pt: "{it}{seconds} da sua autonomia" },
   "asked.battery": { en: "battery {batteryPct}", pt: "bateria {batteryPct}" },
   "asked.notKnown": { en: "not known", pt: "não conhecida" },
+  "planned.planned": {
+    en: "Planned: {length} of tracks in {time}",
+    pt: "Planeado: {length} de trajetos em {time}",
+  },
+  "planned.noPlan": { en: "No plan: {fault}", pt: "Sem plano: {fault}" },
+  "planned.whatIsTakenToBeSo": { en: "What is taken to be so", pt: "O que se supõe" },
+  "planned.wayHome": { en: "Way home", pt: "Regresso" },
+  "planned.ofAtMost": { en: "{planned} of {most}", pt: "{planned} de {most}" },
+  "planned.in": { en: "{way}, {time}", pt: "{way}, {time}" },
+  "planned.ofItsBattery": { en: "{it}{share} of its battery", pt: "{it}{share} da sua bateria" },
+  "planned.turnsBackAfter": { en: "turns back after {way}", pt: "volta para trás após {way}" },
   "asked.steps": { en: "steps", pt: "passos" },
   "beginnings.singleBeamsOrDvlAdaptive": {
     en: "Single beams or DVL, adaptive",

@@ -131,6 +131,26 @@ export const REVIEW = {
   "review.keptOutByAnOperator": { en: "kept out by an operator", pt: "excluída por um operador" },
   "review.used": { en: "used", pt: "usada" },
   "review.restored": { en: "restored", pt: "reposta" },
+  "space.soundings": { en: "Soundings", pt: "Sondas" },
+  "space.seaFloor": { en: "Sea floor", pt: "Fundo" },
+  "space.soundingsAreRead": { en: "Soundings are read…", pt: "A ler as sondas…" },
+  "space.drawRound": {
+    en: "{all} soundings. Draw round those to decide about; Shift adds to them. Without the lasso the view turns.",
+    pt: "{all} sondas. Desenhe à volta das que quer decidir; Shift acrescenta. Sem o laço roda-se a vista.",
+  },
+  "space.chosenOf": { en: "{chosen} of {all} soundings chosen", pt: "{chosen} de {all} sondas escolhidas" },
+  "space.onlyTheFirst": {
+    en: "Only the first of {total} are shown.",
+    pt: "Só se mostram as primeiras de {total}.",
+  },
+  "space.undo": { en: "Undo", pt: "Desfazer" },
+  "space.chosen": { en: "chosen", pt: "escolhidas" },
+  "space.notRestored": { en: "{count} not restored: {reason}", pt: "{count} não repostas: {reason}" },
+  "space.lasso": { en: "Lasso", pt: "Laço" },
+  "space.lassoKeys": {
+    en: "Lasso: draw round soundings, or move the frame with the arrow keys, size it with + and -, choose with Enter, add with Shift and Enter, reject with Delete, undo with Control and Z",
+    pt: "Laço: desenhe à volta das sondas, ou mova a moldura com as setas, ajuste-a com + e -, escolha com Enter, acrescente com Shift e Enter, rejeite com Delete, desfaça com Control e Z",
+  },
   "review.whichSoundings": { en: "Which soundings", pt: "Que sondas" },
   "review.everythingThatIsNotSimply": {
     en: "Everything that is not simply used",

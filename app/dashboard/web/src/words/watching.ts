@@ -45,6 +45,8 @@ export const WATCHING = {
     en: "Let it wait where it is until it is resumed; the others go on",
     pt: "Deixá-lo aguardar onde está até ser retomado; os outros continuam",
   },
+  "cards.more": { en: "More…", pt: "Mais…" },
+  "cards.furtherOrders": { en: "Further orders to {name}", pt: "Outras ordens para {name}" },
   "cards.hold": { en: "Hold", pt: "Aguardar" },
   "cards.letItSurveyAgainForExample": {
     en: "Let it survey again, for example with a new battery",
