@@ -3,6 +3,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+import structlog
 from hypothesis import settings
 
 from tests.support.databases import KINDS, Databases
@@ -15,6 +16,8 @@ share()
 settings.register_profile("project", deadline=None, derandomize=True, max_examples=50)
 settings.register_profile("search", deadline=None, max_examples=300)
 settings.load_profile("project")
+# As the service has it. Frames drawn with their variables would take longer than what fails.
+structlog.get_config()["processors"][-1].exception_formatter = structlog.dev.plain_traceback
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

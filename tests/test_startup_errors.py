@@ -102,12 +102,19 @@ def test_a_database_that_may_only_be_read() -> None:
     check_one_line(said, "the database cannot be used", "readonly", "database_url")
 
 
-def test_a_udp_port_that_is_taken(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def beside_another(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path, int, str]:
+    """A UDP port that somebody has, the folder of a start that wants it, and how that ended."""
+    folder = tmp_path_factory.mktemp("beside")
     (port,) = free_ports(1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         own = {"BATHYFLEET_IMC__ENABLED": "true", "BATHYFLEET_IMC__LOOPBACK_ONLY": "true"}
-        code, said = start(tmp_path, BATHYFLEET_IMC__PORT=str(port), **own)
+        return port, folder, *start(folder, BATHYFLEET_IMC__PORT=str(port), **own)
+
+
+def test_a_udp_port_that_is_taken(beside_another: tuple[int, Path, int, str]) -> None:
+    port, _, code, said = beside_another
     assert code == 1
     check_one_line(said, f"UDP port {port} cannot be bound", "stop it or set another port")
 
@@ -119,10 +126,7 @@ def test_an_interface_that_this_machine_has_not(tmp_path: Path) -> None:
     check_one_line(said, "192.0.2.7")
 
 
-def test_nothing_remains_of_a_start_that_failed(tmp_path: Path) -> None:
-    (port,) = free_ports(1)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind(("127.0.0.1", port))
-        own = {"BATHYFLEET_IMC__ENABLED": "true", "BATHYFLEET_IMC__LOOPBACK_ONLY": "true"}
-        start(tmp_path, BATHYFLEET_IMC__PORT=str(port), **own)
-    assert not [path.name for path in tmp_path.iterdir() if re.search(r"-process-", path.name)]
+def test_nothing_remains_of_a_start_that_failed(beside_another: tuple[int, Path, int, str]) -> None:
+    _, folder, _, _ = beside_another
+    assert (folder / "bathyfleet.db").exists(), "it came so far"
+    assert not [path.name for path in folder.iterdir() if re.search(r"-process-", path.name)]

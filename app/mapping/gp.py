@@ -3,6 +3,7 @@
 import copy
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Literal, Self
 
 import numpy as np
@@ -439,6 +440,7 @@ def _scales(fields: FloatArray) -> LocalScales:
     return local_scales(np.exp(fields[0]), fields[1:])
 
 
+@cache
 def warm_up() -> None:
     """Compile everything a map needs (or load it from the cache), so that no mission step waits for it."""
     east, north = np.meshgrid(np.arange(4.0), np.arange(4.0))

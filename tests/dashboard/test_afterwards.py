@@ -24,7 +24,7 @@ def flown(service: Service) -> str:
     end = time.monotonic() + 120
     while service.get(f"/missions/{mission}")["state"] != "finished":
         assert time.monotonic() < end
-        time.sleep(0.3)
+        time.sleep(0.1)
     return mission
 
 

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy import sparse
@@ -391,6 +392,7 @@ def _scaled(model: DriftModel, nodes: Nodes, fixes: Fixes) -> DriftModel:
     return model.scaled_to(np.array(ends), np.array(off).reshape(-1, 2))
 
 
+@cache
 def warm_up() -> None:
     """Compile what compares sections (or load it from the cache), so that no request waits for it."""
     time_s = np.arange(0.0, 240.0, 0.5)

@@ -1,5 +1,6 @@
 """Improves a survey plan (via points per vehicle) by many small random changes, compiled."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -354,8 +355,9 @@ def improve(
     return best, best_counts, best_value
 
 
+@cache
 def warm_up() -> None:
-    """Compile what improves plans, or load it from the cache of an earlier start."""
+    """Compile what improves plans, or load it from the cache of an earlier start; once in a process is enough."""
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     places, one, none = np.full((1, 2), 0.5), np.ones(1), np.zeros(1, dtype=np.int64)
     plan = ViaPoints(np.zeros((1, 1, 2)), none, none)

@@ -6,6 +6,7 @@ interpolation.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import shapely
@@ -221,6 +222,7 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
     return np.asarray(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
 
 
+@cache
 def warm_up() -> None:
     """Compile what looks for crossings (or load it from the cache), so that no request waits for it."""
     way = np.arange(3.0)

@@ -13,6 +13,7 @@ from tests.support.commands import COMMAND, environment
 from tests.support.missions.specs import AREA
 
 START_LIMIT_S = 180
+GLANCE_S = 0.05
 
 
 class Service:
@@ -31,6 +32,9 @@ class Service:
         self._settings = {f"BATHYFLEET_{name.upper()}": value for name, value in settings.items()}
         self._log = folder / "service.log"
         self._process: subprocess.Popen[bytes] | None = None
+        # Loading certificates that plain HTTP does not need takes longer than a request. No connection outlives one.
+        none_kept = httpx.Limits(max_keepalive_connections=0)
+        self._http = httpx.Client(base_url=self.url, timeout=60, verify=False, limits=none_kept)  # noqa: S501
 
     @property
     def _environment(self) -> dict[str, str]:
@@ -67,8 +71,9 @@ class Service:
         end = time.monotonic() + START_LIMIT_S
         while time.monotonic() < end and self._process.poll() is None:
             with contextlib.suppress(httpx.TransportError):
-                if httpx.get(f"{self.url}/api/v1/health/live").is_success:
+                if self._http.get("/api/v1/health/live").is_success:
                     return
+            time.sleep(GLANCE_S)
         self.kill()
         raise AssertionError(f"the service did not start:\n{self._log.read_text()}")
 
@@ -86,11 +91,11 @@ class Service:
         return self._process.pid
 
     def get(self, path: str) -> Any:
-        answer = httpx.get(f"{self.url}/api/v1{path}", timeout=60)
+        answer = self._http.get(f"/api/v1{path}")
         return answer.raise_for_status().json()
 
     def post(self, path: str, content: dict[str, Any]) -> Any:
-        answer = httpx.post(f"{self.url}/api/v1{path}", json=content, timeout=60)
+        answer = self._http.post(f"/api/v1{path}", json=content)
         return answer.raise_for_status().json()
 
     def create(self, **changes: Any) -> str:
@@ -102,8 +107,8 @@ class Service:
             "vehicles": [{"name": "sim-1", "kind": "sim", "sensor": "dvl"}],
             "planner": {"name": "random"},
         }
-        answer = httpx.post(f"{self.url}/api/v1/missions", json=spec | changes, timeout=60)
+        answer = self._http.post("/api/v1/missions", json=spec | changes)
         return str(answer.raise_for_status().json()["id"])
 
     def act(self, mission: str, action: str) -> None:
-        httpx.post(f"{self.url}/api/v1/missions/{mission}/{action}", timeout=60).raise_for_status()
+        self._http.post(f"/api/v1/missions/{mission}/{action}").raise_for_status()
