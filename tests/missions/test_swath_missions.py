@@ -120,6 +120,7 @@ async def test_cells_and_what_was_left_are_the_same_after_the_service_started_ag
         np.testing.assert_array_equal(before, after)
     again = (await harbour.service.get(live.id)).progress()
     assert progress.minutes_left is not None
+    assert again.minutes_left is not None
     assert again.minutes_left == pytest.approx(progress.minutes_left, abs=0.02)
     assert again.minutes_left < 60.0
 

@@ -255,7 +255,7 @@ class FreeSpace:
             return np.asarray(stops, dtype=np.float64).reshape(-1, 2)
         begins = np.vstack([start, stops[:-1]])
         # All at once: most legs are free, and asking one by one takes far longer.
-        free = shapely.covers(self._loose, shapely.linestrings(np.stack([begins, stops], axis=1)))
+        free = np.asarray(shapely.covers(self._loose, shapely.linestrings(np.stack([begins, stops], axis=1))))
         return np.vstack(
             [stop[None] if clear else self.way(a, stop) for a, stop, clear in zip(begins, stops, free, strict=True)]
         )

@@ -232,7 +232,7 @@ def _flying(spec: MissionSpec, member: Member) -> Flying | None:
 def _cut(corners_m: FloatArray, most_m: float) -> FloatArray:
     """Return a way (k, 2) without repeated corners, and no longer than a vehicle may fly."""
     keep = np.concatenate([[True], np.hypot(*np.diff(corners_m, axis=0).T) > SAME_M])
-    corners = corners_m[keep]
+    corners = np.asarray(corners_m[keep])
     along = _along(corners)
     if along[-1] <= most_m:
         return corners

@@ -262,7 +262,7 @@ def test_the_backbone_is_as_long_as_each_vehicle_can_fly(left: tuple[float, floa
 def most_across_m(left_m: float, legs: int) -> float:
     """Survey a floor that is rough in one corner; return how far the leg goes to the side that does so most."""
     situation = make_situation(belief=make_belief(cell=5.0))
-    rough = (situation.belief.xy_m > 50.0).all(axis=1)
+    rough = np.asarray((situation.belief.xy_m > 50.0).all(axis=1))
     planner, rng = create_planner("cao", PlannerOptions(search=1000), SingleBeam(0.01)), np.random.default_rng(0)
     positions, most = situation.positions, 0.0
     sounded, left = positions[:, :2], np.full(len(positions), left_m)
