@@ -19,7 +19,7 @@ from app.mapping.readers.types import ReadError
 from app.missions.views.imports import ImportOptions
 from simulator.terrain import Terrain, TerrainError
 from simulator.terrain_files import load_terrain, save_npz
-from tests.support.faults.hostile import npy, npz
+from tests.support.faults.hostile import PLACE, npy, npz
 from tests.support.paths import PROJECT
 
 
@@ -82,7 +82,7 @@ def test_a_damaged_terrain_is_read_or_refused(
         assert terrain.cell_m > 0
     if not name.endswith(".npz"):
         with contextlib.suppress(ReadError):
-            read_file(io.BytesIO(bytes(content)), Path(name).suffix)
+            read_file(io.BytesIO(bytes(content)), Path(name).suffix, PLACE)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,12 @@ DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid", ".bag": "BAG"}
 ENC = (".000",)
 S102 = (".h5",)
 
+GSF = ".gsf"
+MULTIBEAM = (GSF,)
+"""Files of multibeam sonars."""
+
 PACKED = ".gz"
-ENDINGS = (*TEXT, *NETCDF, *DRIVERS, *ENC, *S102)
+ENDINGS = (*TEXT, *NETCDF, *DRIVERS, *ENC, *S102, *MULTIBEAM)
 
 
 def ending(filename: str) -> str:

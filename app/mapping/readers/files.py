@@ -2,18 +2,20 @@
 
 from typing import BinaryIO
 
-from app.mapping.readers.endings import ENC, NETCDF, PACKED, S102, TEXT
+from app.mapping.readers.endings import ENC, MULTIBEAM, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.text import read_text
-from app.mapping.readers.types import Points, Raster
+from app.mapping.readers.types import MapExtent, Points, Raster
 
 
-def read_file(file: BinaryIO, kind: str) -> Points | Raster:
+def read_file(file: BinaryIO, kind: str, place: MapExtent) -> Points | Raster:
     """Return what is in an open file; nothing else is opened for it.
 
     Parameters
     ----------
     kind
         Its ending, see :func:`ending`.
+    place
+        Where soundings are of use; of files with very many those elsewhere may only be counted.
 
     Raises
     ------
@@ -22,6 +24,10 @@ def read_file(file: BinaryIO, kind: str) -> Points | Raster:
     """
     if kind.removesuffix(PACKED) in TEXT:
         return read_text(file, packed=kind.endswith(PACKED))
+    if kind in MULTIBEAM:
+        from app.mapping.readers.multibeam.points import read_multibeam
+
+        return read_multibeam(file, kind, place)
     # The libraries for grids look into neighbouring files where they are given a path; in memory there are none.
     content = file.read()
     # Loaded for the files that they are for: text is read in a third less memory without them.

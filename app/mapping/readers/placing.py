@@ -62,13 +62,13 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: MapEx
     ReadError
         When something that has to be known is not, when a value cannot be, or when nothing lies near the grid.
     """
-    notes: list[str] = []
+    notes = list(content.notes) if isinstance(content, Points) else []
     positive = _positive(content, options, notes)
     depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
     _check_depths(depth, content)
     if isinstance(content, Points):
         east, north = _to_local(content.x, content.y, _crs(content.crs, options, notes), place)
-        depth, sd, found = depth, content.sd_m, len(content.z)
+        depth, sd, found = depth, content.sd_m, len(content.z) if content.found is None else content.found
     else:
         found = int(np.isfinite(depth).sum())
         east, north, depth, sd = _cells(content, depth, options, place, notes)
@@ -90,7 +90,7 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
 
     A grid is interpolated linearly, or averaged where it is finer than the map; soundings are averaged in each cell.
     """
-    notes: list[str] = []
+    notes = list(content.notes) if isinstance(content, Points) else []
     positive = _positive(content, options, notes)
     depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
     _check_depths(depth, content)
@@ -108,6 +108,19 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
     if not np.isfinite(sampled).any():
         raise ReadError("file", "none of its depths lies in the mission's grid", "check the file and its crs")
     return sampled, notes
+
+
+def with_margin(place: MapExtent) -> Grid:
+    """Return a mission's grid with as many cells around it as hold the margin."""
+    grid = place.grid
+    border = int(np.ceil(place.margin_m / grid.cell_m))
+    return Grid(
+        grid.west_m - border * grid.cell_m,
+        grid.south_m - border * grid.cell_m,
+        grid.cell_m,
+        grid.rows + 2 * border,
+        grid.cols + 2 * border,
+    )
 
 
 def _positive(content: Points | Raster, options: ReadOptions, notes: list[str]) -> Positive:
@@ -141,7 +154,7 @@ def _check_depths(depth: FloatArray, content: Points | Raster) -> None:
 
 def _where(content: Points | Raster, index: tuple[np.intp, ...]) -> str:
     if isinstance(content, Points):
-        return f"line {content.lines[index[0]]}"
+        return f"{content.counted} {content.lines[index[0]]}"
     return f"row {index[0] + 1}, column {index[1] + 1}"
 
 
@@ -209,15 +222,7 @@ def _cells(
     sides = np.array([east[1:] - east[0], north[1:] - north[0]])
     size = float(np.sqrt(abs(np.linalg.det(sides))))
     if size < 0.99 * place.grid.cell_m:
-        border = int(np.ceil(place.margin_m / place.grid.cell_m))
-        grid = place.grid
-        wide = Grid(
-            grid.west_m - border * grid.cell_m,
-            grid.south_m - border * grid.cell_m,
-            grid.cell_m,
-            grid.rows + 2 * border,
-            grid.cols + 2 * border,
-        )
+        grid, wide = place.grid, with_margin(place)
         notes.append(f"cells of {size:.3g} m were averaged to the map's {grid.cell_m:g} m")
         means = [_resampled(raster, layer, crs, place, wide).ravel() for layer in (depth, raster.sd_m)]
         return *wide.centres_m.T, means[0], means[1]

@@ -31,7 +31,7 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
     if task["what"] == "zones":
         return _zones(file, place, float(task["around_m"]), out)
     options = ReadOptions(**task["options"])
-    content = read_file(file, task["kind"])
+    content = read_file(file, task["kind"], place)
     if task["what"] == "reference":
         depths, notes = place_reference(content, options, place)
         _write(out, depths)

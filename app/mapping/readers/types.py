@@ -77,8 +77,9 @@ class MapExtent:
 class Points:
     """Soundings. Arrays have shape (n,); ``z`` is as in the file, ``sd_m`` NaN where the file states none.
 
-    ``lines`` are their numbers in the file, for messages.
+    ``lines`` are their numbers in the file, for messages, which call them ``counted``.
     ``crs`` is None where the file does not say; then ``x`` and ``y`` are in what the options name.
+    ``found`` is how many the file holds where these are not all of them; ``notes`` say what is to be known of them.
     """
 
     x: FloatArray
@@ -88,6 +89,9 @@ class Points:
     crs: pyproj.CRS | Literal["local"] | None
     positive: Positive | None
     lines: NDArray[np.signedinteger]
+    counted: str = "line"
+    found: int | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import struct
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from affine import Affine
 from netCDF4 import Dataset
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.readers.endings import ENC, NETCDF, PACKED, S102, TEXT
+from app.mapping.readers.endings import ENC, GSF, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES
@@ -55,17 +56,19 @@ def warm_up(task: dict[str, Any]) -> None:
         read_zones(content, MapExtent(frame, _GRID, 1000.0), 10.0)
     elif kind in S102:
         content = _s102(frame)
+    elif kind == GSF:
+        content = _gsf(frame)
     else:
         # BAG is HDF5, and the other grids go through GDAL as this one does.
-        read_file(io.BytesIO(_netcdf(frame)), NETCDF[0])
+        read_file(io.BytesIO(_netcdf(frame)), NETCDF[0], MapExtent(frame, _GRID, _GRID.cell_m))
         kind, content = ".tif", _geotiff(frame)
     place = MapExtent(frame, _GRID, _GRID.cell_m)
-    found = read_file(io.BytesIO(content), kind)
+    found = read_file(io.BytesIO(content), kind, place)
     place_reference(found, _OPTIONS, place)
     place_soundings(found, _OPTIONS, place)
     for content in (b"", b"x,y,z\na,b,c\n", b"\x89HDF\r\n\x1a\n", b"000263LE1 0900201   " + 40 * b"0"):
         with contextlib.suppress(ReadError):
-            read_file(io.BytesIO(content), kind)
+            read_file(io.BytesIO(content), kind, place)
 
 
 def _text(frame: LocalFrame) -> bytes:
@@ -93,6 +96,16 @@ def _s102(frame: LocalFrame) -> bytes:
             instance.attrs[f"gridOrigin{axis}"] = middle - 5e-5
             instance.attrs[f"gridSpacing{axis.removesuffix('e')}inal"] = 1e-5
     return content.getvalue()
+
+
+def _gsf(frame: LocalFrame) -> bytes:
+    """Return a ping of one beam."""
+    at = (round(1e7 * frame.origin_lon_deg), round(1e7 * frame.origin_lat_deg))
+    ping = struct.pack(">iiiiHHHhhiHhhhHHiiih", 0, 0, *at, 1, *[0] * 15)
+    scales = struct.pack(">II", 100 << 24 | 28, 2) + b"".join(struct.pack(">Bxxxii", kind, 10, 0) for kind in (1, 2))
+    arrays = struct.pack(">IHIh", 1 << 24 | 2, 50, 2 << 24 | 2, 0)
+    records = ((1, b"GSF-v03.09\0\0"), (2, ping + scales + arrays))
+    return b"".join(struct.pack(">II", len(content), kind) + content for kind, content in records)
 
 
 def _geotiff(frame: LocalFrame) -> bytes:

@@ -134,7 +134,7 @@ def test_what_is_no_cell_is_refused(content: bytes, tmp_path: Path) -> None:
     file = tmp_path / "a.000"
     file.write_bytes(content)
     with file.open("rb") as opened, pytest.raises(ReadError, match="ENC cell"):
-        read_file(opened, ".000")
+        read_file(opened, ".000", PLACE)
 
 
 @settings(max_examples=20, deadline=None)

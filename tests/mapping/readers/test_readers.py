@@ -38,7 +38,7 @@ SD = ReadOptions(sd_m=0.3)
 
 def read_path(path: Path) -> Points | Raster:
     with path.open("rb") as file:
-        return read_file(file, ending(path.name))
+        return read_file(file, ending(path.name), PLACE)
 
 
 def read_words(text: str) -> Points:

@@ -16,6 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from app.mapping.georeference import LocalFrame
+from app.mapping.readers.types import MapExtent
+from app.mapping.types import Grid
+
+PLACE = MapExtent(LocalFrame(41.0, -8.0), Grid(0.0, 0.0, 2.0, 20, 20), 10.0)
 MEMORY_BYTES = 2 * 2**30
 HUGE = 10**6
 """Of 10^6 by 10^6 cells there are 10^12."""
@@ -45,6 +50,7 @@ def npy_header(shape: str, kind: str = "<f8") -> bytes:
 
 
 CELL = npy(np.array(2.0))
+GSF_BEGIN = struct.pack(">II", 12, 1) + b"GSF-v03.09\0\0"
 
 
 def terrains() -> dict[str, bytes]:
@@ -111,6 +117,11 @@ def soundings() -> dict[str, bytes]:
         "one_long_line.csv": b"x,y,z\n" + b"a," * 2**20,
         "many_columns.csv": b"x,y,z" + b",a" * 10**5 + b"\nnan,1,2\n",
         "infinite.csv": b"x,y,z\n1,2,inf\n",
+        "huge_record.gsf": GSF_BEGIN + struct.pack(">II", 2**32 - 4, 2) + bytes(2**20),
+        "endless.gsf": GSF_BEGIN + struct.pack(">II", 2**32 - 4, 12) + bytes(2**20),
+        "zeros.gsf": GSF_BEGIN + bytes(2**22),
+        "many_small.gsf": GSF_BEGIN + struct.pack(">III", 4, 12, 0) * 10**5,
+        "rubbish.gsf": bytes(range(256)) * 8,
     }
     return kept
 
@@ -153,7 +164,7 @@ def read(reader: str, path: Path) -> str:
 
     try:
         with path.open("rb") as file:
-            read_file(file, ending(path.name))
+            read_file(file, ending(path.name), PLACE)
     except ReadError as error:
         return f"{error.field}: {error}; {error.remedy}"
     return ""

@@ -1,0 +1,212 @@
+"""Soundings of multibeam files near a place: which are kept, which are left out, and what is said about it."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pyproj
+from numpy.typing import NDArray
+
+from app.arrays import BoolArray, FloatArray
+from app.mapping.counting import cell_numbers
+from app.mapping.readers.multibeam.types import FilePing, damaged
+from app.mapping.readers.placing import with_margin
+from app.mapping.readers.types import LOCAL, MAX_DEPTH_M, MAX_SOUNDINGS, MapExtent, Points, ReadError
+from app.mapping.types import Grid, Soundings
+
+BATCH_SOUNDINGS = 1 << 16
+"""So many are placed together."""
+REACH_M = 15_000.0
+"""Farther aside no sonar sees; what lies beyond is damaged."""
+NEAR_M = 180_000.0
+"""Of a ping from the frame's origin; farther away the flat frame is not meant to be used."""
+
+_AHEAD_M = 100.0
+_GEOD = pyproj.Geod(ellps="WGS84")
+
+
+class SwathTable:
+    """Soundings of one file near a place, ping after ping.
+
+    Of more than ``MAX_SOUNDINGS`` the mean of each cell of the mission's grid is kept, so that memory has an end
+    whatever the file's length.
+    """
+
+    def __init__(self, place: MapExtent) -> None:
+        self._place = place
+        self._grid = with_margin(place)
+        self._waiting: list[FilePing] = []
+        self._waiting_soundings = 0
+        self._parts: list[FloatArray] = []
+        """Each (4, n): east, north, depth, standard deviation."""
+        self._numbers: list[NDArray[np.int32]] = []
+        self._kept = 0
+        self._means: _CellMeans | None = None
+        self._usable = self._beams = self._rejected = self._without_depth = self._pings = 0
+        self._first_s, self._last_s = np.inf, -np.inf
+
+    def add(self, ping: FilePing) -> None:
+        """Take a ping. Raises ReadError when a sounding of it cannot be."""
+        usable = ping.detected & ~ping.rejected
+        self._pings += 1
+        self._first_s, self._last_s = min(self._first_s, ping.time_s), max(self._last_s, ping.time_s)
+        self._beams += len(ping)
+        self._rejected += int(np.count_nonzero(ping.rejected))
+        self._without_depth += int(np.count_nonzero(~ping.rejected & ~ping.detected))
+        values = np.stack([ping.depth_m, ping.forward_m, ping.starboard_m])[:, usable]
+        limits = np.array([[MAX_DEPTH_M], [REACH_M], [REACH_M]])
+        if not (np.abs(values) <= limits).all():  # NaN is none, too
+            raise damaged(
+                f"ping {ping.number}", f"a sounding of it is deeper than {MAX_DEPTH_M:g} m or farther than a sonar sees"
+            )
+        self._usable += values.shape[1]
+        if values.shape[1]:
+            self._waiting.append(ping)
+            self._waiting_soundings += len(ping)
+        if self._waiting_soundings >= BATCH_SOUNDINGS:
+            self._place_waiting()
+
+    def points(self, notes: list[str], incomplete: int) -> Points:
+        """Return the soundings, with notes about them before ``notes``.
+
+        Parameters
+        ----------
+        incomplete
+            Pings that were passed over.
+
+        Raises
+        ------
+        ReadError
+            When there is none.
+        """
+        self._place_waiting()
+        if not self._kept:
+            if self._usable:
+                raise ReadError(
+                    "file", "none of its depths lies near the mission's area", "send lines that cross the area"
+                )
+            raise ReadError(
+                "file",
+                f"no sounding in it can be used: of {self._beams} in {self._pings} pings {self._rejected} are rejected "
+                f"in the file and {self._without_depth} have no depth; {incomplete} pings are incomplete",
+                "send a file with accepted soundings",
+            )
+        about = self._summary(incomplete)
+        if self._means is None:
+            table, numbers = np.concatenate(self._parts, axis=1), np.concatenate(self._numbers)
+        else:
+            self._fold()
+            table, numbers = self._means.table()
+            about += f"; {self._kept} near the area were averaged to the map's cells of {self._grid.cell_m:g} m"
+        return Points(
+            *table,
+            crs=LOCAL,
+            positive="down",
+            lines=numbers,
+            counted="ping",
+            found=self._usable,
+            notes=(about, *notes),
+        )
+
+    def _place_waiting(self) -> None:
+        """Place the pings that wait, and keep those of their soundings that lie near."""
+        pings, self._waiting, self._waiting_soundings = self._waiting, [], 0
+        lat = np.array([ping.lat_deg for ping in pings])
+        lon = np.array([ping.lon_deg for ping in pings])
+        frame = self._place.frame
+        away = np.full(len(pings), frame.origin_lon_deg), np.full(len(pings), frame.origin_lat_deg)
+        near = np.flatnonzero(_GEOD.inv(*away, lon, lat)[2] <= NEAR_M) if pings else []
+        pings = [pings[i] for i in near]
+        if not pings:
+            return
+        lat, lon = lat[near], lon[near]
+        forward = self._forward(lat, lon, np.array([ping.heading_deg for ping in pings]))
+        ping_of = np.repeat(np.arange(len(pings)), [len(ping) for ping in pings])
+        usable = np.concatenate([ping.detected & ~ping.rejected for ping in pings])
+        ping_of = ping_of[usable]
+
+        def column(name: str) -> FloatArray:
+            return np.concatenate([getattr(ping, name) for ping in pings])[usable]
+
+        along, across = column("forward_m"), column("starboard_m")
+        east0, north0 = frame.to_local(lat, lon)
+        east = east0[ping_of] + forward[0, ping_of] * along + forward[1, ping_of] * across
+        north = north0[ping_of] + forward[1, ping_of] * along - forward[0, ping_of] * across
+        inside = self._inside(east, north)
+        if inside.any():
+            table = np.stack([east, north, column("depth_m"), column("sd_m")])[:, inside]
+            numbers = np.array([ping.number for ping in pings], np.int32)
+            self._keep(table, numbers[ping_of[inside]])
+
+    def _forward(self, lat: FloatArray, lon: FloatArray, heading: FloatArray) -> FloatArray:
+        """Return where forward points in the frame, east and north for each metre, (2, n)."""
+        ahead_lon, ahead_lat, _ = _GEOD.fwd(lon, lat, heading, np.full(len(lat), _AHEAD_M))
+        here = np.array(self._place.frame.to_local(lat, lon))
+        return np.asarray((np.array(self._place.frame.to_local(ahead_lat, ahead_lon)) - here) / _AHEAD_M)
+
+    def _inside(self, east: FloatArray, north: FloatArray) -> BoolArray:
+        grid, margin_m = self._place.grid, self._place.margin_m
+        wide, high = grid.cols * grid.cell_m, grid.rows * grid.cell_m
+        across = (east >= grid.west_m - margin_m) & (east <= grid.west_m + wide + margin_m)
+        return np.asarray(across & (north >= grid.south_m - margin_m) & (north <= grid.south_m + high + margin_m))
+
+    def _keep(self, table: FloatArray, numbers: NDArray[np.int32]) -> None:
+        self._parts.append(table)
+        self._numbers.append(numbers)
+        self._kept += table.shape[1]
+        if self._kept > MAX_SOUNDINGS:
+            self._means = self._means or _CellMeans(self._grid)
+            if sum(len(part) for part in self._numbers) >= 4 * BATCH_SOUNDINGS:
+                self._fold()
+
+    def _fold(self) -> None:
+        if self._means is not None and self._parts:
+            self._means.add(np.concatenate(self._parts, axis=1), np.concatenate(self._numbers))
+        self._parts, self._numbers = [], []
+
+    def _summary(self, incomplete: int) -> str:
+        begin, end = (
+            datetime.fromtimestamp(time, UTC).isoformat(timespec="seconds") for time in (self._first_s, self._last_s)
+        )
+        told = f"{self._pings} pings from {begin} to {end}"
+        told += f"; {self._rejected} of {self._beams} soundings are rejected in the file and left out"
+        if self._without_depth:
+            told += f", {self._without_depth} have no depth"
+        if incomplete:
+            told += f"; {incomplete} pings are incomplete and left out"
+        return told
+
+
+class _CellMeans:
+    """Mean of the soundings in each cell, and the mean of the variances that are stated."""
+
+    def __init__(self, grid: Grid) -> None:
+        self._grid = grid
+        cells = grid.rows * grid.cols
+        self._count = np.zeros(cells, np.int64)
+        self._stated = np.zeros(cells, np.int64)
+        self._sums = np.zeros((4, cells))
+        """East, north, depth, variance."""
+        self._number = np.zeros(cells, np.int32)
+
+    def add(self, table: FloatArray, numbers: NDArray[np.int32]) -> None:
+        """Add soundings (4, n) of some pings."""
+        cells = cell_numbers(self._grid, Soundings(*table))
+        inside = cells >= 0
+        table, cells = table[:, inside], cells[inside]
+        stated = table[3] > 0.0
+        size = len(self._count)
+        for row in range(3):
+            self._sums[row] += np.bincount(cells, table[row], size)
+        self._sums[3] += np.bincount(cells[stated], table[3, stated] ** 2, size)
+        self._count += np.bincount(cells, minlength=size)
+        self._stated += np.bincount(cells[stated], minlength=size)
+        self._number[cells] = numbers[inside]
+
+    def table(self) -> tuple[FloatArray, NDArray[np.int32]]:
+        """Return the means, (4, cells with any), and for each cell the number of one of its pings."""
+        full = np.flatnonzero(self._count)
+        means = self._sums[:, full]
+        means[:3] /= self._count[full]
+        with np.errstate(invalid="ignore"):
+            means[3] = np.sqrt(means[3] / self._stated[full])
+        return means, self._number[full]
