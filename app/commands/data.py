@@ -143,8 +143,8 @@ def import_file(
             exists=True,
             dir_okay=False,
             readable=True,
-            help="Soundings or a map: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or "
-            ".000 (ENC cell).",
+            help="Soundings or a map: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102), "
+            ".000 (ENC cell) or .gsf (multibeam sonar).",
         ),
     ],
     reference: Annotated[

@@ -3,6 +3,7 @@
 import asyncio
 import gzip
 import io
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -15,6 +16,7 @@ from app.mapping.georeference import LocalFrame
 from app.settings import Settings
 from tests.support.faults.hostile import sparse_tif
 from tests.support.missions.specs import AREA
+from tests.support.multibeam import line, write_gsf
 from tests.support.rest import make_client, mission_spec, prior_text, running, soundings
 
 FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])
@@ -89,6 +91,29 @@ async def test_an_import_survives_a_restart(make_settings: Any) -> None:
             quality.pop("version")  # counts how often the map was made since the service began
             first = first or quality
             assert quality == first
+
+
+async def test_a_mission_begins_with_the_soundings_of_a_multibeam_file(
+    client: httpx.AsyncClient, path: str, tmp_path: Path
+) -> None:
+    middle = LocalFrame(*FRAME.to_geographic(30.0, 28.0))
+    pings = line(middle, error_95_m=np.full(21, 0.392), flags=np.arange(21) == 3)
+    content = await asyncio.to_thread(write_gsf, tmp_path / "a.gsf", pings, {"TIDE_COMPENSATED": "YES"})
+    cut_off = await send(client, path, content[:-4], filename="line_7.GSF")
+    assert cut_off.status_code == 422
+    assert cut_off.json()["errors"][0]["field"] == "record 14"
+    assert (await client.get(f"{path}/imports")).json() == []
+    answer = await send(client, path, content, filename="line_7.GSF", datum_offset_m=0.5)
+    assert answer.status_code == 201, answer.text
+    taken = answer.json()
+    assert (taken["found"], taken["taken"]) == (240, 240)
+    assert taken["median_sd_m"] == pytest.approx(0.2, rel=0.01)
+    assert taken["min_depth_m"] == pytest.approx(0.5 + min(ping.depth_m.min() for ping in pings), abs=0.001)
+    assert "12 of 252 soundings are rejected in the file and left out" in taken["notes"][0]
+    assert "reduced for the tide" in taken["notes"][1]
+    reference = await client.put(f"{path}/reference", content=content, params={"filename": "line_7.gsf"})
+    assert reference.status_code == 200, reference.text
+    assert reference.json()["cells"] > 50
 
 
 @pytest.mark.parametrize(

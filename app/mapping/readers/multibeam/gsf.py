@@ -39,7 +39,7 @@ NO_CORRECTOR_CM = 9999
 _FRAME = struct.Struct(">II")
 _WORD = struct.Struct(">I")
 _PING = struct.Struct(">iiiiHHHhhiHhhhHH")
-"""Time (2), longitude, latitude, beams, centre, flags, -, tide, depth corrector, heading, attitude (3), course, speed."""
+"""Time, longitude, latitude, beams, centre, flags, spare, tide, depth corrector, heading, attitude, course, speed."""
 
 _BEHIND_PING = {2: struct.Struct(""), 3: struct.Struct(">iiih")}
 """Height, separation, tide by GPS and a spare, which version 3 adds to a ping's head."""

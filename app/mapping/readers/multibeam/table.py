@@ -10,7 +10,7 @@ from app.arrays import BoolArray, FloatArray
 from app.mapping.counting import cell_numbers
 from app.mapping.readers.multibeam.types import FilePing, damaged
 from app.mapping.readers.placing import with_margin
-from app.mapping.readers.types import LOCAL, MAX_DEPTH_M, MAX_SOUNDINGS, MapExtent, Points, ReadError
+from app.mapping.readers.types import MAX_DEPTH_M, MAX_SOUNDINGS, MapExtent, Points, ReadError
 from app.mapping.types import Grid, Soundings
 
 BATCH_SOUNDINGS = 1 << 16
@@ -99,7 +99,7 @@ class SwathTable:
             about += f"; {self._kept} near the area were averaged to the map's cells of {self._grid.cell_m:g} m"
         return Points(
             *table,
-            crs=LOCAL,
+            crs=self._place.frame.crs,
             positive="down",
             lines=numbers,
             counted="ping",
