@@ -144,7 +144,7 @@ def import_file(
             dir_okay=False,
             readable=True,
             help="Soundings or a map: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102), "
-            ".000 (ENC cell) or .gsf (multibeam sonar).",
+            ".000 (ENC cell), .gsf or .kmall (multibeam sonars).",
         ),
     ],
     reference: Annotated[

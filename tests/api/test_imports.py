@@ -16,7 +16,7 @@ from app.mapping.georeference import LocalFrame
 from app.settings import Settings
 from tests.support.faults.hostile import sparse_tif
 from tests.support.missions.specs import AREA
-from tests.support.multibeam import line, write_gsf
+from tests.support.multibeam import line, write_gsf, write_kmall
 from tests.support.rest import make_client, mission_spec, prior_text, running, soundings
 
 FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])
@@ -93,7 +93,7 @@ async def test_an_import_survives_a_restart(make_settings: Any) -> None:
             assert quality == first
 
 
-async def test_a_mission_begins_with_the_soundings_of_a_multibeam_file(
+async def test_a_mission_begins_with_the_soundings_of_multibeam_files(
     client: httpx.AsyncClient, path: str, tmp_path: Path
 ) -> None:
     middle = LocalFrame(*FRAME.to_geographic(30.0, 28.0))
@@ -114,6 +114,12 @@ async def test_a_mission_begins_with_the_soundings_of_a_multibeam_file(
     reference = await client.put(f"{path}/reference", content=content, params={"filename": "line_7.gsf"})
     assert reference.status_code == 200, reference.text
     assert reference.json()["cells"] > 50
+
+    content = await asyncio.to_thread(write_kmall, tmp_path / "a.kmall", line(middle))
+    unsaid = await send(client, path, content, filename="a.kmall")
+    assert unsaid.json()["errors"][0]["field"] == "sd_m", unsaid.text
+    answer = await send(client, path, content, filename="a.kmall", sd_m=0.3)
+    assert (answer.status_code, answer.json()["taken"]) == (201, 252), answer.text
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Small files of multibeam sonars, written by libraries that are not ours."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from GSFU.gsfu import gsf, new_name_value_parameters, new_swath_bathymetry_ping
+from KMALL.kmall import kmall
 
 from app.mapping.georeference import LocalFrame
 
@@ -25,7 +27,9 @@ class SonarPing:
     error_95_m: Any = None
     flags: Any = None
     more: dict[str, Any] = field(default_factory=dict)
-    """Fields of the ping in GSF, by the names of gsfu."""
+    """Fields of the ping in GSF, by the names of gsfu; in KMALL those of its information, by the names of pykmall."""
+    beams: dict[str, Any] = field(default_factory=dict)
+    """Fields of soundings in KMALL, (n,) each, by the names of pykmall."""
 
 
 def line(
@@ -89,3 +93,65 @@ def write_gsf(
         file.write_swath_bathymetry_ping(record)
     file.closeFile()
     return path.read_bytes()
+
+
+WATER_LINE_M = -0.75
+"""Of KMALL files: the vessel's reference point lies so far below the water surface, which counts upwards."""
+
+
+def write_kmall(path: Path, pings: Sequence[SonarPing], version: int = 3) -> bytes:
+    """Write a KMALL file of depths by pykmall, and return what is in it."""
+    file = kmall(str(path))
+    file.OpenFiletoWrite()
+    for number, ping in enumerate(pings):
+        file.write_EMdgmMRZ(_datagram(ping, number, version))
+    file.FID.close()
+    return path.read_bytes()
+
+
+def _datagram(ping: SonarPing, number: int, version: int) -> dict[str, Any]:
+    n, sectors, information = len(ping.depth_m), 2, {0: 144, 1: 152}.get(version, 156)
+    sector_bytes = 36 if version == 0 else 48
+    frame = LocalFrame(ping.lat_deg, ping.lon_deg)
+    heading = np.radians(ping.heading_deg)
+    forward, starboard = np.asarray(ping.forward_m), np.asarray(ping.starboard_m)
+    lat, lon = frame.to_geographic(
+        np.sin(heading) * forward + np.cos(heading) * starboard, np.cos(heading) * forward - np.sin(heading) * starboard
+    )
+    beams: dict[str, Any] = defaultdict(lambda: [0] * n)
+    beams |= {
+        "detectionMethod": [1] * n,
+        "deltaLatitude_deg": lat - ping.lat_deg,
+        "deltaLongitude_deg": lon - ping.lon_deg,
+        "z_reRefPoint_m": np.asarray(ping.depth_m) + WATER_LINE_M,
+        "y_reRefPoint_m": starboard,
+        "x_reRefPoint_m": forward,
+    }
+    beams |= ping.beams
+    size = 20 + 4 + 12 + information + sectors * sector_bytes + 32 + n * 120 + 4
+    return {
+        "header": {
+            "numBytesDgm": size, "dgmVersion": version, "systemID": 0, "echoSounderID": 2040, "dgtime": ping.time_s,
+        },
+        "partition": {"numOfDgms": 1, "dgmNum": 1},
+        "cmnPart": defaultdict(int, numBytesCmnPart=12, pingCnt=number),
+        "pingInfo": defaultdict(
+            int,
+            {
+                "numBytesInfoData": information,
+                "numTxSectors": sectors,
+                "numBytesPerTxSector": sector_bytes,
+                "headingVessel_deg": ping.heading_deg,
+                "txTransducerDepth_m": 1.5,
+                "z_waterLevelReRefPoint_m": WATER_LINE_M,
+                "latitude_deg": ping.lat_deg,
+                "longitude_deg": ping.lon_deg,
+            }
+            | ping.more,
+        ),
+        "txSectorInfo": defaultdict(lambda: [0] * sectors),
+        "rxInfo": defaultdict(
+            int, numBytesRxInfo=32, numSoundingsMaxMain=n, numSoundingsValidMain=n, numBytesPerSounding=120
+        ),
+        "sounding": beams,
+    }  # fmt: skip

@@ -12,8 +12,8 @@ DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid", ".bag": "BAG"}
 ENC = (".000",)
 S102 = (".h5",)
 
-GSF = ".gsf"
-MULTIBEAM = (GSF,)
+GSF, KMALL = ".gsf", ".kmall"
+MULTIBEAM = (GSF, KMALL)
 """Files of multibeam sonars."""
 
 PACKED = ".gz"

@@ -82,7 +82,10 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: MapEx
         raise ReadError("file", f"{near.sum()} depths are more than {MAX_SOUNDINGS}", "thin the file")
     if not near.all():  # else two million soundings need not be copied
         east, north, depth, sd = east[near], north[near], depth[near], sd[near]
-    return Placed(Soundings(east, north, depth, _deviations(sd, depth, options, notes)), found, notes)
+    total = _deviations(sd, depth, options, notes)
+    if isinstance(content, Points) and content.detection_sd_m is not None:
+        total = np.where(sd > 0.0, total, np.minimum(np.hypot(total, content.detection_sd_m[near]), MAX_SD_M))
+    return Placed(Soundings(east, north, depth, total), found, notes)
 
 
 def place_reference(content: Points | Raster, options: ReadOptions, place: MapExtent) -> tuple[FloatArray, list[str]]:

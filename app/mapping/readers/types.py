@@ -79,6 +79,7 @@ class Points:
 
     ``lines`` are their numbers in the file, for messages, which call them ``counted``.
     ``crs`` is None where the file does not say; then ``x`` and ``y`` are in what the options name.
+    ``detection_sd_m`` is what the sonar's detection alone adds to the deviation that is assumed where ``sd_m`` is NaN.
     ``found`` is how many the file holds where these are not all of them; ``notes`` say what is to be known of them.
     """
 
@@ -91,6 +92,7 @@ class Points:
     lines: NDArray[np.signedinteger]
     counted: str = "line"
     found: int | None = None
+    detection_sd_m: FloatArray | None = None
     notes: tuple[str, ...] = ()
 
 

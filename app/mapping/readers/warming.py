@@ -15,7 +15,7 @@ from affine import Affine
 from netCDF4 import Dataset
 
 from app.mapping.georeference import LocalFrame
-from app.mapping.readers.endings import ENC, GSF, NETCDF, PACKED, S102, TEXT
+from app.mapping.readers.endings import ENC, GSF, KMALL, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES
@@ -58,6 +58,8 @@ def warm_up(task: dict[str, Any]) -> None:
         content = _s102(frame)
     elif kind == GSF:
         content = _gsf(frame)
+    elif kind == KMALL:
+        content = _kmall(frame)
     else:
         # BAG is HDF5, and the other grids go through GDAL as this one does.
         read_file(io.BytesIO(_netcdf(frame)), NETCDF[0], MapExtent(frame, _GRID, _GRID.cell_m))
@@ -106,6 +108,17 @@ def _gsf(frame: LocalFrame) -> bytes:
     arrays = struct.pack(">IHIh", 1 << 24 | 2, 50, 2 << 24 | 2, 0)
     records = ((1, b"GSF-v03.09\0\0"), (2, ping + scales + arrays))
     return b"".join(struct.pack(">II", len(content), kind) + content for kind, content in records)
+
+
+def _kmall(frame: LocalFrame) -> bytes:
+    """Return a ping of one beam straight down."""
+    at = (frame.origin_lat_deg, frame.origin_lon_deg)
+    ping = struct.pack("<H90xHH16x8x4xdd4x", 144, 0, 0, *at)
+    receiver = struct.pack("<HHHH16x8x", 32, 1, 1, 120)
+    sounding = struct.pack("<4xB91xf20x", 1, 5.0)
+    content = struct.pack("<HHH10x", 1, 1, 12) + ping + receiver + sounding
+    size = 24 + len(content)
+    return struct.pack("<I4s12x", size, b"#MRZ") + content + struct.pack("<I", size)
 
 
 def _geotiff(frame: LocalFrame) -> bytes:

@@ -20,7 +20,7 @@ class ImportOptions(BaseModel):
         max_length=200,
         pattern=r"^[^/\\\x00-\x1f\x7f]+$",
         description="Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, "
-        ".h5 (S-102), .000 (ENC cell) or .gsf (multibeam sonar)",
+        ".h5 (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars)",
         examples=["harbour_2019.xyz"],
     )
     source: str = Field(default="", max_length=500, description="Where it comes from, kept with the mission")

@@ -121,6 +121,10 @@ def soundings() -> dict[str, bytes]:
         "endless.gsf": GSF_BEGIN + struct.pack(">II", 2**32 - 4, 12) + bytes(2**20),
         "zeros.gsf": GSF_BEGIN + bytes(2**22),
         "many_small.gsf": GSF_BEGIN + struct.pack(">III", 4, 12, 0) * 10**5,
+        "huge_datagram.kmall": struct.pack("<I4s12x", 2**32 - 1, b"#MRZ") + bytes(2**20),
+        "endless.kmall": struct.pack("<I4s12x", 2**32 - 1, b"#MWC") + bytes(2**20),
+        "many_small.kmall": struct.pack("<I4s12xI", 24, b"#SPO", 24) * 10**5,
+        "rubbish.kmall": bytes(range(256)) * 8,
         "rubbish.gsf": bytes(range(256)) * 8,
     }
     return kept

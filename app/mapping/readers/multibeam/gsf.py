@@ -149,6 +149,7 @@ class GsfFile:
             starboard_m=arrays[ACROSS],
             depth_m=depth,
             sd_m=self._error_m / NORMAL_95 if self._error_m is not None and stated else np.full(beams, np.nan),
+            detection_sd_m=np.zeros(beams),
             rejected=np.ones(beams, bool) if flags & IGNORED else rejected,
             # The format writes depth 0 where a beam found no bottom.
             detected=np.abs(depth) > 0.5 / self._scales[DEPTH].multiplier,

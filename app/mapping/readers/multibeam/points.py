@@ -2,13 +2,14 @@
 
 from typing import BinaryIO
 
-from app.mapping.readers.endings import GSF
+from app.mapping.readers.endings import GSF, KMALL
 from app.mapping.readers.multibeam.gsf import GsfFile
+from app.mapping.readers.multibeam.kmall import KmallFile
 from app.mapping.readers.multibeam.table import SwathTable
 from app.mapping.readers.multibeam.types import MultibeamFile
 from app.mapping.readers.types import MapExtent, Points
 
-OPENERS: dict[str, type[GsfFile]] = {GSF: GsfFile}
+OPENERS: dict[str, type[GsfFile | KmallFile]] = {GSF: GsfFile, KMALL: KmallFile}
 """What reads which ending."""
 
 

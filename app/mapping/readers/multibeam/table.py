@@ -37,7 +37,7 @@ class SwathTable:
         self._waiting: list[FilePing] = []
         self._waiting_soundings = 0
         self._parts: list[FloatArray] = []
-        """Each (4, n): east, north, depth, standard deviation."""
+        """Each (5, n): east, north, depth, its standard deviation and the detection's."""
         self._numbers: list[NDArray[np.int32]] = []
         self._kept = 0
         self._means: _CellMeans | None = None
@@ -98,7 +98,8 @@ class SwathTable:
             table, numbers = self._means.table()
             about += f"; {self._kept} near the area were averaged to the map's cells of {self._grid.cell_m:g} m"
         return Points(
-            *table,
+            *table[:4],
+            detection_sd_m=table[4],
             crs=self._place.frame.crs,
             positive="down",
             lines=numbers,
@@ -133,7 +134,7 @@ class SwathTable:
         north = north0[ping_of] + forward[1, ping_of] * along - forward[0, ping_of] * across
         inside = self._inside(east, north)
         if inside.any():
-            table = np.stack([east, north, column("depth_m"), column("sd_m")])[:, inside]
+            table = np.stack([east, north, *map(column, ("depth_m", "sd_m", "detection_sd_m"))])[:, inside]
             numbers = np.array([ping.number for ping in pings], np.int32)
             self._keep(table, numbers[ping_of[inside]])
 
@@ -177,36 +178,37 @@ class SwathTable:
 
 
 class _CellMeans:
-    """Mean of the soundings in each cell, and the mean of the variances that are stated."""
+    """Mean of the soundings in each cell; of their variances, too, as far as they are stated."""
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
         cells = grid.rows * grid.cols
         self._count = np.zeros(cells, np.int64)
         self._stated = np.zeros(cells, np.int64)
-        self._sums = np.zeros((4, cells))
-        """East, north, depth, variance."""
+        self._sums = np.zeros((5, cells))
+        """East, north, depth, its variance and the detection's."""
         self._number = np.zeros(cells, np.int32)
 
     def add(self, table: FloatArray, numbers: NDArray[np.int32]) -> None:
-        """Add soundings (4, n) of some pings."""
-        cells = cell_numbers(self._grid, Soundings(*table))
+        """Add soundings (5, n) of some pings."""
+        cells = cell_numbers(self._grid, Soundings(*table[:4]))
         inside = cells >= 0
         table, cells = table[:, inside], cells[inside]
         stated = table[3] > 0.0
         size = len(self._count)
-        for row in range(3):
-            self._sums[row] += np.bincount(cells, table[row], size)
+        for row, values in ((0, table[0]), (1, table[1]), (2, table[2]), (4, table[4] ** 2)):
+            self._sums[row] += np.bincount(cells, values, size)
         self._sums[3] += np.bincount(cells[stated], table[3, stated] ** 2, size)
         self._count += np.bincount(cells, minlength=size)
         self._stated += np.bincount(cells[stated], minlength=size)
         self._number[cells] = numbers[inside]
 
     def table(self) -> tuple[FloatArray, NDArray[np.int32]]:
-        """Return the means, (4, cells with any), and for each cell the number of one of its pings."""
+        """Return the means, (5, cells with any), and for each cell the number of one of its pings."""
         full = np.flatnonzero(self._count)
         means = self._sums[:, full]
-        means[:3] /= self._count[full]
+        means[[0, 1, 2, 4]] /= self._count[full]
         with np.errstate(invalid="ignore"):
-            means[3] = np.sqrt(means[3] / self._stated[full])
+            means[3] /= self._stated[full]
+        means[3:] = np.sqrt(means[3:])
         return means, self._number[full]

@@ -1,8 +1,9 @@
 """A ping as multibeam files have it."""
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import BinaryIO, Protocol
+from typing import Any, BinaryIO, Protocol
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.readers.types import ReadError
@@ -32,6 +33,8 @@ class FilePing:
         Place on the bottom, level; depth below the water surface with ``level_m`` added.
     sd_m : (n,)
         Standard deviation of the depth; NaN: not stated.
+    detection_sd_m : (n,)
+        Of the detection alone, where the depth's is not stated; 0: not stated either.
     rejected, detected : (n,)
         What the file says not to use, and where the sonar found a bottom.
     """
@@ -47,6 +50,7 @@ class FilePing:
     starboard_m: FloatArray
     depth_m: FloatArray
     sd_m: FloatArray
+    detection_sd_m: FloatArray
     rejected: BoolArray
     detected: BoolArray
 
@@ -117,6 +121,17 @@ class Content:
         if self._at > len(self._content):
             raise damaged(self._where, "it ends before what it should hold")
         return self._content[begin : self._at]
+
+    def structure(self, layout: struct.Struct) -> tuple[Any, ...]:
+        """Return the begin of a structure that says its size first, and go behind it, wherever it ends.
+
+        Raises ReadError where it is smaller than the layout or there is less of it than it says.
+        """
+        values = layout.unpack(self.take(layout.size))
+        if values[0] < layout.size:
+            raise damaged(self._where, "a structure of it is smaller than it can be")
+        self.take(values[0] - layout.size)
+        return values
 
 
 def damaged(where: str, why: str) -> ReadError:

@@ -40,6 +40,7 @@ def pings(count: int, frame: LocalFrame = FRAME, step_m: float = 0.01, sd_m: flo
             starboard_m=starboard,
             depth_m=floor(starboard, north),
             sd_m=np.full(BEAMS, sd_m),
+            detection_sd_m=np.full(BEAMS, 0.3),
             rejected=no,
             detected=~no,
         )
@@ -61,6 +62,7 @@ def test_more_soundings_than_are_kept_become_means_of_cells(monkeypatch: pytest.
     assert len(means.z) < 600
     np.testing.assert_allclose(means.z, floor(means.x, means.y), atol=1e-3)  # a plane stays a plane
     assert means.sd_m == pytest.approx(0.3)
+    assert place_soundings(means, ReadOptions(), PLACE).soundings.sd_m == pytest.approx(0.3)
     assert "20000 near the area were averaged to the map's cells of 2 m" in means.notes[0]
     # A reference is the same, whichever way the means are taken.
     first, second = (place_reference(found, ReadOptions(), PLACE)[0] for found in (whole, means))
@@ -71,7 +73,8 @@ def test_a_cell_whose_soundings_state_no_deviation_states_none(monkeypatch: pyte
     monkeypatch.setattr(table, "MAX_SOUNDINGS", 1000)
     found = filled(pings(10, step_m=2.0)).points([], 0)
     assert np.isnan(found.sd_m).all()
-    assert place_soundings(found, ReadOptions(sd_m=0.4), PLACE).soundings.sd_m == pytest.approx(0.4)
+    # What is assumed, and what the sonar says of its detections.
+    assert place_soundings(found, ReadOptions(sd_m=0.4), PLACE).soundings.sd_m == pytest.approx(0.5)
 
 
 def test_memory_does_not_grow_with_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
