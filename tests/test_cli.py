@@ -17,9 +17,11 @@ import pytest
 import rasterio
 
 from app.cli import main
+from app.mapping.georeference import LocalFrame
 from tests.support import commands
 from tests.support.commands import serving
 from tests.support.imc import log_writer as writer
+from tests.support.multibeam import line, write_gsf, write_kmall
 from tests.support.paths import PROJECT
 from tests.support.rest import mission_spec, soundings
 
@@ -236,6 +238,15 @@ def test_a_mission_is_served_exported_and_found_again(
     assert imported.code == 1
     assert imported.stdout == "Data.lsf: lauv-log-1, 20 soundings accepted, 0 rejected, 0 there before\n"
     assert "nowhere.lsf cannot be read: No such file" in imported.stderr
+    pings = line(LocalFrame(41.18525, -8.7047))
+    write_kmall(tmp_path / "line.kmall", pings)
+    write_gsf(tmp_path / "line.gsf", pings)
+    imported = bathyfleet("import-log", mission["id"][:8], "line.kmall", "--vehicle", "wam-v")
+    first, *notes = imported.stdout.splitlines()
+    assert first.endswith("wam-v, 0 soundings accepted, 0 rejected, 0 there before, 12 pings accepted, 0 rejected")
+    assert "  depths are below the water surface of their time, not reduced for the tide" in notes
+    prior = bathyfleet("import", mission["id"][:8], "line.gsf", "--sd", "0.3")
+    assert prior.stdout.startswith("252 of 252 depths imported: "), prior.stderr
     bathyfleet("export", mission["id"], "--format", "png")
     assert (tmp_path / "output" / "harbour-basin.png").stat().st_size > 1000
     bathyfleet("report", mission["id"][:8])

@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 def import_logs(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="DUNE logs: Data.lsf or Data.lsf.gz.")],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG...", help="DUNE logs: Data.lsf or Data.lsf.gz; a multibeam's own files: .gsf or .kmall."
+        ),
+    ],
     vehicle: Annotated[
         str | None, typer.Option(help="Name of the vehicle [default: the one that the log announces]")
     ] = None,
@@ -65,12 +70,20 @@ def import_logs(
 def _import_lines(view: "LogImportView") -> Iterator[str]:
     yield (
         f"{view.file}: {view.vehicle}, {view.soundings} soundings accepted, {view.rejected} rejected, "
-        f"{view.duplicate} there before" + (" (imported before, nothing new)" if view.known else "")
+        f"{view.duplicate} there before"
+        + (
+            f", {view.pings} pings accepted, {view.pings_rejected} rejected"
+            if view.pings or view.pings_rejected
+            else ""
+        )
+        + (" (imported before, nothing new)" if view.known else "")
     )
     for reason, count in sorted(view.reasons.items(), key=lambda item: -item[1]):
         yield f"  {count} rejected: {reason}"
     for reason, count in sorted(view.refused.items(), key=lambda item: -item[1]):
-        yield f"  {count} ranges refused: {reason}"
+        yield f"  {count} refused: {reason}"
+    for note in view.notes:
+        yield f"  {note}"
     for reason, count in view.unreadable.items():
         yield f"  {count} packets unreadable: {reason}"
     if view.skipped_bytes:

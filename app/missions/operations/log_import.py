@@ -15,11 +15,12 @@ from shapely.geometry import Polygon
 
 from app.missions.clock import now
 from app.missions.errors import InvalidRequestError
-from app.missions.fleet.interface import PingReport, SoundingReport, VehicleReport
+from app.missions.fleet.interface import PingReport, Position, SoundingReport, VehicleReport
 from app.missions.fleet.links.imc import bridge_settings, ping_report, sounding_report, vehicle_report
 from app.missions.live.journal import TRACK_SPACING_M, position_row, track_length_m
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicles import local_place
+from app.missions.operations.multibeam_log import MultibeamLog, is_multibeam
 from app.missions.settings import ServiceSettings
 from app.missions.spec.base import Name
 from app.missions.views.mission import Level
@@ -119,10 +120,9 @@ class LogImport:
 
     def __init__(self, live: LiveMission, settings: ServiceSettings, path: Path, vehicle: str | None) -> None:
         self._live = live
-        bridge = bridge_settings(settings.imc, settings.time_scale)
         try:
             self._digest = _digest(path)
-            self._log = VehicleLog(path, bridge, vehicle)
+            self._log = _opened(live, settings, path, vehicle)
         except LogError as error:
             raise InvalidRequestError("log", str(error), error.remedy) from None
         except OSError as error:
@@ -258,8 +258,28 @@ class LogImport:
             unreadable=self._log.faults,
             skipped_bytes=file.skipped_bytes,
             cut_off=file.cut_off,
+            notes=self._log.notes if isinstance(self._log, MultibeamLog) else [],
             known=tally.was_known and tally.known > 0,
         )
+
+
+def _opened(live: LiveMission, settings: ServiceSettings, path: Path, vehicle: str | None) -> VehicleLog | MultibeamLog:
+    """Return the log in a file. Raises LogError, InvalidRequestError and OSError where there is none."""
+    if not is_multibeam(path):
+        return VehicleLog(path, bridge_settings(settings.imc, settings.time_scale), vehicle)
+    if live.spec.sound_speed is not None:
+        raise InvalidRequestError(
+            "sound_speed",
+            f"{path.name} has depths with the sound speed applied, and the mission's profile would be applied again",
+            f"take that away first: DELETE /api/v1/missions/{live.id}/sound-speed",
+        )
+    zone = Polygon(live.area).buffer(live.margin_m)
+
+    def near(lat_deg: float, lon_deg: float) -> bool:
+        place = local_place(live.frame, Position(lat_deg, lon_deg, 0.0))
+        return place is not None and bool(shapely.contains_xy(zone, *place))
+
+    return MultibeamLog(path, vehicle, near)
 
 
 def _digest(path: Path) -> str:

@@ -134,6 +134,7 @@ class LogImportView(View):
     unreadable: dict[str, int] = Field(description="Packets that could not be read, by reason")
     skipped_bytes: int = Field(description="Bytes that are no packet")
     cut_off: bool = Field(description="The file ends in the middle, as after a power loss; what came before is used")
+    notes: list[str] = Field(default=[], description="What was assumed or done, in words")
     known: bool = Field(description="The whole log had been imported before; nothing was written")
 
 

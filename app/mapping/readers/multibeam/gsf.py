@@ -106,6 +106,11 @@ class GsfFile:
             elif record.kind == SINGLE_BEAM:
                 self._single += 1
 
+    @property
+    def reduced_unknown(self) -> bool:
+        """Whether the pings that were read are reduced for the tide, and none says by how much."""
+        return self._parameters.reduced and not self._levelled
+
     def notes(self) -> list[str]:
         """Return what is to be known of all pings that were read, in words."""
         told = self._parameters.notes(levelled=self._levelled)
@@ -243,11 +248,16 @@ class _Parameters:
             if (name := name.strip().upper()) in self._said:
                 self._said[name].add(value.strip(b" \0\r\n").upper())
 
+    @property
+    def reduced(self) -> bool:
+        """Whether they say that depths are reduced for the tide."""
+        return b"YES" in self._said[b"TIDE_COMPENSATED"]
+
     def notes(self, *, levelled: bool) -> list[str]:
         """Return what follows for who takes the depths; ``levelled``: whether pings name a correction for the tide."""
         told = []
-        if self._said[b"TIDE_COMPENSATED"] == {b"YES"} or levelled:
-            told.append("the file says that its depths are reduced for the tide; datum_offset_m brings another datum")
+        if self.reduced or levelled:
+            told.append("the file says that its depths are reduced for the tide")
         else:
             told.append("the file does not say that its depths are reduced for the tide; they are taken as they are")
         if b"NO" in self._said[b"HEAVE_COMPENSATED"]:

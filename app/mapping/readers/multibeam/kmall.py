@@ -87,11 +87,14 @@ class KmallFile:
             else:
                 yield ping
 
+    @property
+    def reduced_unknown(self) -> bool:
+        """Whether the pings are reduced for the tide, and none says by how much."""
+        return False
+
     def notes(self) -> list[str]:
         """Return what is to be known of all pings that were read, in words."""
-        told = ["depths are below the water surface of their time, not reduced for the tide; see datum_offset_m"]
-        if self._pings:
-            told.append("the sonar's own deviations are of its detections alone; they are added to what is assumed")
+        told = ["depths are below the water surface of their time, not reduced for the tide"]
         if self._extra:
             told.append(f"{self._extra} extra detections in the water above the bottom are left out")
         return told

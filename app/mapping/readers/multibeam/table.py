@@ -97,6 +97,8 @@ class SwathTable:
             self._fold()
             table, numbers = self._means.table()
             about += f"; {self._kept} near the area were averaged to the map's cells of {self._grid.cell_m:g} m"
+        if table[4].any():
+            notes = [*notes, "the sonar's deviations are of its detections alone; they are added to what is assumed"]
         return Points(
             *table[:4],
             detection_sd_m=table[4],

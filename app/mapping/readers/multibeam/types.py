@@ -77,6 +77,11 @@ class MultibeamFile(Protocol):
         """Return what is to be known of all pings that were read, in words."""
         ...
 
+    @property
+    def reduced_unknown(self) -> bool:
+        """Whether the pings that were read are reduced for the tide, and none says by how much."""
+        ...
+
 
 def take(file: BinaryIO, size: int, where: str) -> bytes:
     """Read so many bytes, in blocks: what a file claims and does not have takes no memory.
