@@ -96,7 +96,7 @@ async def test_an_import_survives_a_restart(make_settings: Any) -> None:
 async def test_a_mission_begins_with_the_soundings_of_multibeam_files(
     client: httpx.AsyncClient, path: str, tmp_path: Path
 ) -> None:
-    middle = LocalFrame(*FRAME.to_geographic(30.0, 28.0))
+    middle = LocalFrame(*map(float, FRAME.to_geographic(30.0, 28.0)))
     pings = line(middle, error_95_m=np.full(21, 0.392), flags=np.arange(21) == 3)
     content = await asyncio.to_thread(write_gsf, tmp_path / "a.gsf", pings, {"TIDE_COMPENSATED": "YES"})
     cut_off = await send(client, path, content[:-4], filename="line_7.GSF")

@@ -99,9 +99,13 @@ class SwathTable:
             about += f"; {self._kept} near the area were averaged to the map's cells of {self._grid.cell_m:g} m"
         if table[4].any():
             notes = [*notes, "the sonar's deviations are of its detections alone; they are added to what is assumed"]
+        east, north, depth, sd, detection_sd = table
         return Points(
-            *table[:4],
-            detection_sd_m=table[4],
+            east,
+            north,
+            depth,
+            sd,
+            detection_sd_m=detection_sd,
             crs=self._place.frame.crs,
             positive="down",
             lines=numbers,
@@ -117,7 +121,7 @@ class SwathTable:
         lon = np.array([ping.lon_deg for ping in pings])
         frame = self._place.frame
         away = np.full(len(pings), frame.origin_lon_deg), np.full(len(pings), frame.origin_lat_deg)
-        near = np.flatnonzero(_GEOD.inv(*away, lon, lat)[2] <= NEAR_M) if pings else []
+        near = np.flatnonzero(np.asarray(_GEOD.inv(*away, lon, lat)[2]) <= NEAR_M)
         pings = [pings[i] for i in near]
         if not pings:
             return
@@ -128,7 +132,7 @@ class SwathTable:
         ping_of = ping_of[usable]
 
         def column(name: str) -> FloatArray:
-            return np.concatenate([getattr(ping, name) for ping in pings])[usable]
+            return np.asarray(np.concatenate([getattr(ping, name) for ping in pings])[usable])
 
         along, across = column("forward_m"), column("starboard_m")
         east0, north0 = frame.to_local(lat, lon)
