@@ -206,12 +206,12 @@ def _records(file: BinaryIO) -> Iterator[_Record]:
             if size > MAX_RECORD_BYTES:
                 raise damaged(where, f"it claims {size} bytes")
             content = take(file, size, where)
-            total = _sum(content)
+            total = 0 if checksum is None else _sum(content)
         else:
             content, total, left = b"", 0, size
             while left:
                 block = take(file, min(left, BLOCK_BYTES), where)
-                total, left = total + _sum(block), left - len(block)
+                total, left = total + (0 if checksum is None else _sum(block)), left - len(block)
         if checksum is not None and total % (1 << 32) != checksum:
             raise damaged(where, "its checksum is another")
         yield _Record(where, kind, content)

@@ -201,12 +201,12 @@ class _CellMeans:
         inside = cells >= 0
         table, cells = table[:, inside], cells[inside]
         stated = table[3] > 0.0
-        size = len(self._count)
+        # In place: of many cells few are met at a time.
         for row, values in ((0, table[0]), (1, table[1]), (2, table[2]), (4, table[4] ** 2)):
-            self._sums[row] += np.bincount(cells, values, size)
-        self._sums[3] += np.bincount(cells[stated], table[3, stated] ** 2, size)
-        self._count += np.bincount(cells, minlength=size)
-        self._stated += np.bincount(cells[stated], minlength=size)
+            np.add.at(self._sums[row], cells, values)
+        np.add.at(self._count, cells, 1)
+        np.add.at(self._sums[3], cells[stated], table[3, stated] ** 2)
+        np.add.at(self._stated, cells[stated], 1)
         self._number[cells] = numbers[inside]
 
     def table(self) -> tuple[FloatArray, NDArray[np.int32]]:
