@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sqlalchemy import URL, make_url
 
-from app.storage import postgres_archive, private
+from app.storage import migrate, postgres_archive, private
 from app.storage.ping_files import PingFileError, PingFiles, digest_in
 from app.storage.postgres_archive import BackupError as BackupError
 
@@ -143,10 +143,18 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
     Raises
     ------
     BackupError
-        When the backup is damaged or of another kind, or there is a database already and ``replace`` is False, or
-        somebody has it open.
+        When the backup is damaged, of another kind or of a newer version, or there is a database already and
+        ``replace`` is False, or somebody has it open.
     """
     contents = contents_of(file)
+    revision = contents.revision if contents.rows else postgres_archive.revision(file)
+    if not revision:
+        raise BackupError(f"{file} holds no database of bathyfleet")
+    if not migrate.is_known(revision):
+        raise BackupError(
+            f"{file} is at revision {revision}, which this version does not know (its newest is {migrate.head()})",
+            "Restore it with the version that wrote it; nothing was changed",
+        )
     parsed = make_url(url)
     files, beside = pings or PingFiles.beside(url), files_beside(file)
     before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"

@@ -14,6 +14,7 @@ from sqlalchemy import URL
 
 from app.storage.models import Base, MissionOwnerRow, ProcessRow
 
+VERSION_TABLE = "alembic_version"
 _LEFT_OUT = tuple(row.__tablename__ for row in (MissionOwnerRow, ProcessRow))
 """The list of live processes, and what they lead, is of no use later, and their secrets are private."""
 
@@ -44,6 +45,13 @@ def dump(url: URL, target: Path) -> None:
 def check(archive: Path) -> None:
     """Read an archive from end to end. Raises BackupError when it is damaged."""
     _run([_program("pg_restore"), "--file=/dev/null", str(archive)])
+
+
+def revision(archive: Path) -> str:
+    """Return the revision of an archive's tables; empty when it is none of ours. Raises BackupError."""
+    read = [_program("pg_restore"), "--data-only", f"--table={VERSION_TABLE}", "--file=-"]
+    found = re.search(rf"^COPY \S*{VERSION_TABLE} .*\n(\S+)\n", _run([*read, str(archive)]), re.MULTILINE)
+    return found[1] if found else ""
 
 
 def put_back(url: URL, archive: Path, *, replace: bool) -> None:

@@ -228,6 +228,11 @@ async def test_postgresql_is_copied_by_its_own_programs(
     assert before["processes"] > 0
     # Who lives now, and what he leads, is not copied.
     assert await counts(other) == before | {"mission_owners": 0, "processes": 0}
+    query(url, "update alembic_version set version_num = '9999'")
+    newer, _ = await asyncio.to_thread(back_up, url, tmp_path / "newer.dump", files)
+    with pytest.raises(BackupError, match="is at revision 9999, which this version does not know"):
+        await asyncio.to_thread(restore_to, other, newer, replace=True, pings=others)
+    assert await counts(other) == before | {"mission_owners": 0, "processes": 0}
     half = tmp_path / "half.dump"
     half.write_bytes(copy.read_bytes()[:-2000])
     with pytest.raises(BackupError, match="pg_restore"):
