@@ -250,32 +250,33 @@ async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
     if shutil.which("pg_dump") is None:
         pytest.skip("pg_dump is not installed")
     url = databases.fresh("postgresql")
-    database = Database(url)
-    await fill(database)
+    database, files = Database(url), PingFiles(str(tmp_path / "files"))
+    await fill(database, files)
     await database.close()
-    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump")
+    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
     statement = "select id, alarm_id, recipient, state, attempts, process_id from alarm_deliveries"
     assert query(url, statement) == [("d1", "a1", "bridge", "waiting", 0, 1)]
     waiting = [("d1", "a1", "bridge", "waiting", 0, None)]
 
     empty = databases.empty("postgresql")
-    await asyncio.to_thread(restore_to, empty, copy, replace=False)
+    await asyncio.to_thread(restore_to, empty, copy, replace=False, pings=files)
     assert query(empty, statement) == waiting, "some other process delivers it now"
     with pytest.raises(DBAPIError, match="fk_alarm_deliveries_process_id_processes"):
         query(empty, "update alarm_deliveries set process_id = 7")
 
-    await asyncio.to_thread(restore_to, url, copy, replace=True)
+    await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
     assert query(url, statement) == waiting, "over the row that named a process"
 
 
 async def test_an_archive_goes_into_postgresql_as_a_whole_or_not_at_all(databases: Databases, tmp_path: Path) -> None:
     if shutil.which("pg_dump") is None:
         pytest.skip("pg_dump is not installed")
-    copy, _ = await asyncio.to_thread(back_up, databases.fresh("postgresql"), tmp_path / "fleet.dump")
+    files = PingFiles(str(tmp_path / "files"))
+    copy, _ = await asyncio.to_thread(back_up, databases.fresh("postgresql"), tmp_path / "fleet.dump", files)
     url = databases.empty("postgresql")
     query(url, "create table waypoints (depth_m real)")  # the last table of all is in the way
     with pytest.raises(BackupError, match=r"psql failed: .*relation \"waypoints\" already exists"):
-        await asyncio.to_thread(restore_to, url, copy, replace=False)
+        await asyncio.to_thread(restore_to, url, copy, replace=False, pings=files)
     assert query(url, "select tablename from pg_tables where schemaname = 'public'") == [("waypoints",)]
 
 
