@@ -22,7 +22,8 @@ from pathlib import Path
 import yaml
 
 from benchmarks.installation.dockerfile import Stage, context_of, options_of, stages_of, variables_of, words_of
-from benchmarks.installation.rooted import Root, base, missing, serving
+from benchmarks.installation.rooted import NEEDS, Root, base, missing, serving
+from benchmarks.installation.steps import Step, StepError
 
 PROJECT = Path(__file__).resolve().parents[2]
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
@@ -35,10 +36,6 @@ assert answer.status == 200 and "<script" in text, text[:500]
 """
 
 
-class StepError(Exception):
-    """A step failed."""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -46,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--pass", dest="names", action="append", default=[])
     parser.add_argument("--base", type=Path, help="a root that was made before, in place of a new one")
     options = parser.parse_args(arguments)
-    if lacking := missing():
+    if lacking := missing(*NEEDS):
         print(f"this machine lacks: {', '.join(lacking)}", file=sys.stderr)
         return 2
     passed = {name: os.environ[name] for name in options.names if name in os.environ}
@@ -125,20 +122,6 @@ class Image:
         done = there.run(["sh", "-c", line], user=self.user, directory=self.directory)
         if done.returncode:
             raise StepError(f"exit code {done.returncode}\n{(done.stdout + done.stderr)[-4000:]}")
-
-
-class Step:
-    """A line about something that is done, and how long it took."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what if len(what) <= 100 else f"{what[:99]}…"
-
-    def __enter__(self) -> None:
-        self._begun = time.monotonic()
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        outcome = "ok" if kind is None else "FAILED"
-        print(f"{outcome:6} {time.monotonic() - self._begun:6.1f} s  {self._what}", flush=True)
 
 
 def run_it(root: Root, image: Image) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 SUITE = "bookworm"
 PACKAGES = ("ca-certificates", "python3", "python3-venv")
-NEEDS = ("mmdebstrap", "unshare", "nsenter", "chroot", "setpriv", "ip", "mount")
+NEEDS = ("unshare", "chroot", "setpriv", "ip", "mount")
 
 
 @dataclass
@@ -118,13 +118,16 @@ def serving(command: Sequence[str], log: Path) -> Iterator[Service]:
             process.kill()
 
 
-def base(folder: Path, suite: str = SUITE) -> None:
+def base(folder: Path, packages: Sequence[str] = ()) -> None:
     """Make a root of Debian's packages with Python, as images of Python are."""
-    words = ["mmdebstrap", "--quiet", "--variant=minbase", f"--include={','.join(PACKAGES)}", suite, str(folder)]
+    included = ",".join((*PACKAGES, *packages))
+    words = ["mmdebstrap", "--quiet", "--variant=minbase", f"--include={included}", SUITE, str(folder)]
     subprocess.run(words, check=True)
     (folder / "usr/local/bin/python").symlink_to("/usr/bin/python3")
 
 
-def missing() -> list[str]:
+def missing(*needed: str) -> list[str]:
     """Return what this machine lacks for all this."""
-    return [name for name in NEEDS if shutil.which(name) is None] + ([] if os.geteuid() == 0 else ["root's rights"])
+    return [name for name in ("mmdebstrap", "nsenter", *needed) if shutil.which(name) is None] + (
+        [] if os.geteuid() == 0 else ["root's rights"]
+    )
