@@ -31,7 +31,7 @@ PATIENCE_S = 600.0
 PROGRAM = "/opt/bathyfleet/bin/bathyfleet"
 UNITS = "/opt/bathyfleet/lib/systemd/system"
 STATE = "/var/lib/bathyfleet"
-WATCHDOG = "[Service]\nWatchdogSec=10\n"
+WATCHDOG = "[Service]\nWatchdogSec=20\n"
 """Sooner than the unit's own, for the sake of whoever waits."""
 MISSION = {
     "name": "Trial",
