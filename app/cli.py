@@ -156,10 +156,13 @@ def migrate(
     from sqlalchemy.exc import SQLAlchemyError
 
     from app.storage import migrate as migrations
+    from app.storage.prepare import of_another_version
 
     async def run() -> tuple[str | None, str | None]:
         url = settings.database_url
         before = await migrations.current(url)
+        if before is not None and not migrations.is_known(before):
+            raise of_another_version(url, before, migrations.head())
         if down_to is None:
             await migrations.upgrade(url)
         else:

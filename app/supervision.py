@@ -4,6 +4,7 @@ The protocol is sd_notify(3): datagrams to the socket that the environment names
 """
 
 import asyncio
+import faulthandler
 import os
 import socket
 from collections.abc import AsyncIterator, Coroutine, Mapping
@@ -56,7 +57,9 @@ class Supervisor:
 
     @asynccontextmanager
     async def watching(self) -> AsyncIterator[None]:
-        """Send signs of life as long as the event loop turns."""
+        """Send signs of life as long as the event loop turns; whoever is ended without any says where it hung."""
+        if self.patience_s is not None:
+            faulthandler.enable()
         async with _beside(self._live()):
             yield
 

@@ -5,9 +5,11 @@ import os
 import re
 import signal
 import socket
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -217,6 +219,46 @@ def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathy
     assert {line["origin"] for line in lines} == {"command line"}
     assert "Maria" in bathyfleet("audit").stdout
     assert bathyfleet("audit", "--format", "csv").stdout.startswith("id,time,actor,role,origin,action")
+
+
+def at_revision(file: Path, revision: str) -> None:
+    with closing(sqlite3.connect(file)) as connection:
+        connection.execute("update alembic_version set version_num = ?", (revision,))
+        connection.commit()
+
+
+def test_a_newer_version_s_database_is_neither_changed_nor_put_in_place(bathyfleet: Run, tmp_path: Path) -> None:
+    bathyfleet("token", "create", "Maria")
+    assert bathyfleet("backup", "copy.db").code == 0
+    file, copy = tmp_path / "bathyfleet.db", tmp_path / "copy.db"
+    at_revision(copy, "9999")
+    before = file.read_bytes()
+    refused = bathyfleet("restore", str(copy), "--replace")
+    assert (refused.code, refused.stdout) == (1, "")
+    assert "copy.db is at revision 9999, which this version does not know" in refused.stderr
+    assert "Restore it with the version that wrote it; nothing was changed" in refused.stderr
+    assert file.read_bytes() == before
+    assert list(tmp_path.glob("*.before*")) == []
+
+    at_revision(file, "9999")
+    for words in (["migrate"], ["migrate", "--down-to", "0001"], ["token", "list"]):
+        refused = bathyfleet(*words)
+        assert refused.code == 1
+        assert "bathyfleet.db is at revision 9999, which this version does not know" in refused.stderr
+        assert re.search(r"let it go back by 'bathyfleet migrate --down-to \d{4}' there", refused.stderr)
+    made = bathyfleet("backup", "newer.db")
+    assert (made.code, "revision 9999" in made.stdout) == (0, True)
+    assert "the database is another version's" in made.stderr
+
+
+def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_path: Path) -> None:
+    """A service of the older version may still be running on it."""
+    bathyfleet("migrate")
+    bathyfleet("migrate", "--down-to", "0018")
+    made = bathyfleet("backup", "older.db")
+    assert (made.code, "revision 0018" in made.stdout) == (0, True)
+    assert "it stays as it is" in made.stderr
+    assert "from revision 0018 to" in bathyfleet("migrate").stdout
 
 
 def test_a_mission_is_served_exported_and_found_again(

@@ -4,8 +4,10 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +15,14 @@ import yaml
 
 from app.missions.settings import ImcSettings
 from app.settings import PREFIX, Settings, _variable_names, load_settings
+from benchmarks.installation.dockerfile import (
+    DockerfileError,
+    context_of,
+    options_of,
+    stages_of,
+    variables_of,
+    words_of,
+)
 from tests.support.paths import PROJECT
 from tests.support.rest import running_in_thread
 
@@ -70,6 +80,29 @@ def test_what_the_image_copies_is_what_the_package_is_made_of() -> None:
     assert {"app", "imc_bridge", "simulator", "migrations", "hatch_build.py", "pyproject.toml"} <= allowed
     assert all((PROJECT / name).exists() for name in allowed)
     assert "operator.token" not in allowed
+
+
+def test_a_stand_in_for_a_container_engine_understands_every_step() -> None:
+    """``python -m benchmarks.installation.image`` carries them out; here is looked at what it would do."""
+    build, last = stages_of((PROJECT / "Dockerfile").read_text())
+    assert (build.name, [word for word, _ in last.instructions][-2:]) == ("build", ["ENTRYPOINT", "CMD"])
+    said = dict(last.instructions)
+    assert words_of(said["ENTRYPOINT"]) + words_of(said["CMD"]) == ["bathyfleet", "serve"]
+    assert ("from", "build") in options_of(said["COPY"])[0]
+    assert variables_of("PATH=/opt/x:$PATH A=1", {"PATH": "/bin"}) == {"PATH": "/opt/x:/bin", "A": "1"}
+    with pytest.raises(DockerfileError, match="ADD"):
+        stages_of("FROM x\nADD a b\n")
+
+
+def test_what_the_image_is_built_from_is_the_source_and_nothing_that_was_built(tmp_path: Path) -> None:
+    shutil.copy(PROJECT / ".dockerignore", tmp_path)
+    kept = ["app/main.py", "app/dashboard/web/package.json", "migrations/env.py", "pyproject.toml", "README.md"]
+    left = ["app/dashboard/static/index.html", "app/dashboard/web/node_modules/x.js", "bathyfleet.db", "docs/a.md"]
+    left += ["app/__pycache__/main.pyc", "operator.token", "app/fleet.db-wal"]
+    for name in kept + left:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert [str(path) for path in context_of(tmp_path)] == sorted(kept, key=Path)
 
 
 def test_the_service_has_no_rights_that_it_does_not_need() -> None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import socket
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,6 +65,44 @@ def test_the_service_is_ready_lives_and_ends(listening: socket.socket, tmp_path:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
             sock.sendto(b"enough", str(tmp_path / "notify"))
         reading.join()
+
+
+THAT_CAN_HANG = """
+import signal, sys
+sys.argv[0] = "bathyfleet"
+
+def hang(*_):
+    print("it hangs", file=sys.stderr, flush=True)
+    while True:
+        signal.pause()
+
+signal.signal(signal.SIGUSR1, hang)
+from app.cli import main
+main()
+"""
+
+
+def test_a_service_whose_loop_hangs_is_silent_and_says_where_it_hung_when_it_is_ended(
+    listening: socket.socket, tmp_path: Path
+) -> None:
+    supervised = environment(NOTIFY_SOCKET=str(tmp_path / "notify"), WATCHDOG_USEC="150000")
+    with serving(tmp_path, supervised, command=[sys.executable, "-c", THAT_CAN_HANG]) as (process, _):
+        waiting(listening)
+        listening.settimeout(240)
+        assert listening.recv(100).startswith(b"WATCHDOG=1")
+        process.send_signal(signal.SIGUSR1)
+        assert process.stderr is not None
+        assert any(line == "it hangs\n" for line in process.stderr)
+        waiting(listening)
+        # Other threads go on meanwhile, of several signs of life that were due comes none.
+        listening.settimeout(0.5)
+        with pytest.raises(TimeoutError):
+            listening.recv(100)
+        process.send_signal(signal.SIGABRT)  # as systemd does
+        said = process.stderr.read()
+        assert process.wait(240) == -signal.SIGABRT
+        assert "Fatal Python error: Aborted" in said
+        assert "in hang" in said
 
 
 async def test_who_hangs_gives_no_sign_of_life(listening: socket.socket, tmp_path: Path) -> None:

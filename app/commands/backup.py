@@ -26,6 +26,7 @@ def backup(
     """Copy the database to a file while the service goes on writing, and check the copy."""
     from app.storage.backup import BackupError, back_up, contents_of
     from app.storage.ping_files import PingFiles
+    from app.storage.prepare import is_up_to_date
 
     if verify is not None and file is not None:
         raise typer.BadParameter("check a backup or write one, not both", param_hint="--verify")
@@ -38,9 +39,12 @@ def backup(
         path, contents = back_up(settings.database_url, file or Path("backups"), files)
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None
-    # In the database, not in the copy: a copy of everything is worth an audit entry.
-    asyncio.run(noted(settings, "backup", str(path)))
     _tell(path, contents, "is written and checked")
+    # In the database, not in the copy: a copy of everything is worth an audit entry, though not an upgrade.
+    if asyncio.run(is_up_to_date(settings.database_url)):
+        asyncio.run(noted(settings, "backup", str(path)))
+    else:
+        typer.echo("the database is another version's: it stays as it is, the copy is in no audit log", err=True)
 
 
 def restore(

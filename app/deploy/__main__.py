@@ -5,11 +5,13 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
+from zipfile import ZipFile
 
 import typer
 
 from app.deploy.bundle import MACHINES, BundleError, bundle, machine
 
+PAGE = "app/dashboard/static/index.html"
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -30,6 +32,9 @@ def main(
     with tempfile.TemporaryDirectory() as folder:
         try:
             own = wheel if wheel is not None else _built(Path(folder))
+            with ZipFile(own) as archive:
+                if PAGE not in archive.namelist():
+                    raise BundleError(f"{own.name} has no dashboard: build it without BATHYFLEET_SKIP_DASHBOARD")
             for name in machines or [machine()]:
                 path = bundle(own, name, out, command="bathyfleet")
                 typer.echo(f"{path}: {path.stat().st_size / 2**20:.0f} MiB")

@@ -4,7 +4,6 @@ import dataclasses
 import os
 import shutil
 import sqlite3
-import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -13,23 +12,12 @@ from pathlib import Path
 
 from sqlalchemy import URL, make_url
 
-from app.storage import private
+from app.storage import migrate, postgres_archive, private
 from app.storage.ping_files import PingFileError, PingFiles, digest_in
+from app.storage.postgres_archive import BackupError as BackupError
 
 SQLITE_MAGIC = b"SQLite format 3\0"
 ARCHIVE_MAGIC = b"PGDMP"
-_WITHOUT_PROCESSES = tuple(
-    f"--exclude-table-data={table}" for table in ("mission_owners", "alarm_deliveries", "processes")
-)
-"""The list of live processes, and what they are at, is of no use later, and their secrets are private."""
-
-
-class BackupError(Exception):
-    """A backup cannot be made, is damaged, or cannot be restored; ``remedy`` says what to do."""
-
-    def __init__(self, message: str, remedy: str = "") -> None:
-        super().__init__(message)
-        self.remedy = remedy
 
 
 @dataclass(frozen=True)
@@ -81,7 +69,7 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
             if contents.rows != expected:
                 raise BackupError(f"the copy has other rows than the database: {contents.rows}, not {expected}")
         else:
-            _run_postgres("pg_dump", parsed, "--format=custom", *_WITHOUT_PROCESSES, f"--file={part}")
+            postgres_archive.dump(parsed, part)
             contents = _database_of(part)
         # Whatever is in the copy has had its file before.
         source = pings or PingFiles.beside(url)
@@ -117,7 +105,7 @@ def _database_of(file: Path) -> Contents:
     with file.open("rb") as opened:
         begin = opened.read(len(SQLITE_MAGIC))
     if begin.startswith(ARCHIVE_MAGIC):
-        _run([_program("pg_restore"), "--file=/dev/null", str(file)])
+        postgres_archive.check(file)
         return Contents(file.stat().st_size, "", {})
     if begin != SQLITE_MAGIC:
         raise BackupError(f"{file} is neither an SQLite database nor an archive of pg_dump")
@@ -155,20 +143,26 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
     Raises
     ------
     BackupError
-        When the backup is damaged or of another kind, or there is a database already and ``replace`` is False, or
-        somebody has it open.
+        When the backup is damaged, of another kind or of a newer version, or there is a database already and
+        ``replace`` is False, or somebody has it open.
     """
     contents = contents_of(file)
+    revision = contents.revision if contents.rows else postgres_archive.revision(file)
+    if not revision:
+        raise BackupError(f"{file} holds no database of bathyfleet")
+    if not migrate.is_known(revision):
+        raise BackupError(
+            f"{file} is at revision {revision}, which this version does not know (its newest is {migrate.head()})",
+            "Restore it with the version that wrote it; nothing was changed",
+        )
     parsed = make_url(url)
     files, beside = pings or PingFiles.beside(url), files_beside(file)
     before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     if parsed.get_backend_name() != "sqlite":
         if contents.revision:
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
-        options = ["--clean", "--if-exists"] if replace else []
-        arguments = ["--exit-on-error", "--single-transaction", "--no-owner", *options, str(file)]
         with _put_back(files, beside, beside.names(), before if replace else ""):
-            _run_postgres("pg_restore", parsed, *arguments)
+            postgres_archive.put_back(parsed, file, replace=replace)
         return contents, None
     if not contents.revision:
         raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
@@ -278,29 +272,3 @@ def _to_disk(path: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def _program(name: str) -> str:
-    found = shutil.which(name)
-    if found is None:
-        raise BackupError(
-            f"PostgreSQL's {name} is not installed here",
-            f"Install PostgreSQL's client programs (postgresql-client), or run {name} where the database is: "
-            "docker compose exec database pg_dump --username bathyfleet --format custom bathyfleet > FILE",
-        )
-    return found
-
-
-def _run_postgres(name: str, url: URL, *arguments: str) -> None:
-    """Run one of PostgreSQL's programs; the password goes by the environment, where no other user sees it."""
-    place = ["--host", url.host or "localhost", "--port", str(url.port or 5432), "--no-password"]
-    user = ["--username", url.username] if url.username else []
-    environment = os.environ | ({"PGPASSWORD": str(url.password)} if url.password else {})
-    _run([_program(name), *place, *user, "--dbname", url.database or "postgres", *arguments], environment)
-
-
-def _run(command: list[str], environment: dict[str, str] | None = None) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)  # noqa: S603 - no shell
-    if done.returncode != 0:
-        reason = (done.stderr.strip() or f"exit code {done.returncode}").splitlines()[0]
-        raise BackupError(f"{Path(command[0]).name} failed: {reason}")

@@ -39,11 +39,7 @@ async def prepare_database(url: str, *, may_upgrade: bool) -> None:
         if present is None:
             await _check_that_empty(url)
         elif not await asyncio.to_thread(migrate.is_known, present):
-            raise DatabaseNotReadyError(
-                f"the database {_name(url)} is at revision {present}, which this version does not know (its newest is "
-                f"{newest}): a newer version wrote it, or another program. Install the version that wrote it, or name "
-                "another database with database_url"
-            )
+            raise of_another_version(url, present, newest)
         if not may_upgrade:
             found = f"is at revision {present}" if present else "is empty"
             raise DatabaseNotReadyError(f"the database {found}, this version needs {newest}: run 'bathyfleet migrate'")
@@ -52,6 +48,20 @@ async def prepare_database(url: str, *, may_upgrade: bool) -> None:
         reason = str(getattr(error, "orig", None) or error).partition("\n")[0]
         raise DatabaseNotReadyError(f"the database cannot be used: {reason}; check database_url") from error
     log.info("database migrated", before=present, now=newest)
+
+
+def of_another_version(url: str, present: str, newest: str) -> DatabaseNotReadyError:
+    """Return the error that a database is at a revision that this version does not know."""
+    return DatabaseNotReadyError(
+        f"the database {_name(url)} is at revision {present}, which this version does not know (its newest is "
+        f"{newest}): a newer version wrote it, or another program. Install the version that wrote it, let it go back "
+        f"by 'bathyfleet migrate --down-to {newest}' there, or name another database with database_url"
+    )
+
+
+async def is_up_to_date(url: str) -> bool:
+    """Tell whether a database has the tables of this version."""
+    return await migrate.current(url) == await asyncio.to_thread(migrate.head)
 
 
 def _try_to_open(url: str) -> None:

@@ -9,8 +9,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
 from app.deploy import bundle as module
+from app.deploy.__main__ import main
 from app.deploy.bundle import BundleError, bundle
 
 MACHINE = platform.machine()
@@ -134,6 +137,14 @@ def test_another_kind_of_computer_gets_its_own_wheels_and_refuses_others(
 def test_the_same_wheels_give_the_same_file(boat: Path, index: Path) -> None:
     digests = {hashlib.sha256(made(boat, index).read_bytes()).hexdigest() for _ in range(2)}
     assert len(digests) == 1
+
+
+def test_a_wheel_without_the_dashboard_is_refused(boat: Path, tmp_path: Path) -> None:
+    command = typer.Typer()
+    command.command()(main)
+    said = CliRunner().invoke(command, ["--wheel", str(boat), "--out", str(tmp_path / "dist")])
+    assert (said.exit_code, "boat-1.0-py3-none-any.whl has no dashboard" in said.output) == (1, True)
+    assert not (tmp_path / "dist").exists()
 
 
 def test_what_cannot_be_put_in_is_said(

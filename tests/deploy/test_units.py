@@ -38,6 +38,18 @@ def test_systemd_understands_them(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+@pytest.mark.parametrize("name", ["bathyfleet.service", "bathyfleet-backup.service"])
+def test_they_give_little_away(tmp_path: Path, name: str) -> None:
+    """As systemd itself reckons: 0 is sealed, 10 is what a service without any of this has."""
+    (tmp_path / name).write_text((UNITS / name).read_text().replace(PROGRAM, "/bin/true"))
+    words = ["systemd-analyze", "security", "--offline=true", "--no-pager", "--threshold=20", str(tmp_path / name)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if "unrecognized option" in done.stderr:
+        pytest.skip("this systemd judges only what is installed")
+    assert done.returncode == 0, done.stdout[-300:] + done.stderr
+
+
 def test_the_service_is_watched_and_has_time_to_stop_its_vehicles() -> None:
     service = unit("bathyfleet.service")["Service"]
     assert (service["Type"], service["Restart"], service["KillMode"]) == ("notify", "always", "mixed")
@@ -46,6 +58,10 @@ def test_the_service_is_watched_and_has_time_to_stop_its_vehicles() -> None:
     assert float(service["TimeoutStopSec"]) > GRACE_S + 20
     assert service["WorkingDirectory"] == "/var/lib/" + service["StateDirectory"]
     assert service["CapabilityBoundingSet"] == ""
+    assert service["LimitCORE"] == "0"
+    cache = unit("bathyfleet-backup.service")["Service"]["CacheDirectory"]
+    assert f"XDG_CACHE_HOME=/var/cache/{cache}" in (UNITS / "bathyfleet.service").read_text()
+    assert service["CacheDirectory"] == cache
 
 
 def test_copies_are_made_daily_by_a_command_that_there_is() -> None:

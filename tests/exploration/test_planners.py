@@ -1,4 +1,5 @@
 import itertools
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -125,6 +126,27 @@ def test_a_restored_planner_continues_as_if_nothing_had_happened(kind: str, sens
             np.testing.assert_array_equal(again.positions, proposal.positions)
             assert restored.snapshot() == planner.snapshot()
         memory = planner.snapshot()
+
+
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+def test_a_memory_that_lacks_a_field_leaves_nothing_behind(kind: str) -> None:
+    """As one that another version wrote: it is refused, and the planner can begin anew."""
+    planner = make(*kind)
+    for _ in fly(planner, 2):
+        pass
+    whole = json.loads(planner.snapshot())
+    blank = make(*kind).snapshot()
+    refused = 0
+    for field in whole["memory"]:
+        again = make(*kind)
+        lacking = whole | {"memory": {name: value for name, value in whole["memory"].items() if name != field}}
+        try:
+            again.restore(json.dumps(lacking).encode())
+        except ValueError:
+            refused += 1
+            again.restore(blank)
+            assert again.snapshot() == blank
+    assert refused
 
 
 @pytest.mark.parametrize("memory", [b"", b"{}", b"[1]", b"\xff", b'{"kind":"cao","version":1,"memory":{}}'])

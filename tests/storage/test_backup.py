@@ -13,13 +13,14 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import func, select
+from sqlalchemy.exc import DBAPIError
 
 from app.storage.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
 from app.storage.retention import ended_before, finish_removing, give_space_back, remove
-from tests.support.databases import Databases
+from tests.support.databases import Databases, query
 from tests.support.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
 
 WRITER = """
@@ -225,9 +226,13 @@ async def test_postgresql_is_copied_by_its_own_programs(
     await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
     assert others.names() == [PING_FILE_NAME]
     assert before["processes"] > 0
-    # Who lives now, and what he is at, is not copied.
-    nobody = {"mission_owners": 0, "alarm_deliveries": 0, "processes": 0}
-    assert await counts(other) == before | nobody
+    # Who lives now, and what he leads, is not copied.
+    assert await counts(other) == before | {"mission_owners": 0, "processes": 0}
+    query(url, "update alembic_version set version_num = '9999'")
+    newer, _ = await asyncio.to_thread(back_up, url, tmp_path / "newer.dump", files)
+    with pytest.raises(BackupError, match="is at revision 9999, which this version does not know"):
+        await asyncio.to_thread(restore_to, other, newer, replace=True, pings=others)
+    assert await counts(other) == before | {"mission_owners": 0, "processes": 0}
     half = tmp_path / "half.dump"
     half.write_bytes(copy.read_bytes()[:-2000])
     with pytest.raises(BackupError, match="pg_restore"):
@@ -237,6 +242,42 @@ async def test_postgresql_is_copied_by_its_own_programs(
     with pytest.raises(BackupError, match="pg_dump is not installed") as refused:
         back_up(url, tmp_path / "again.dump")
     assert "docker compose exec database pg_dump" in refused.value.remedy
+
+
+async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
+    databases: Databases, tmp_path: Path
+) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url = databases.fresh("postgresql")
+    database, files = Database(url), PingFiles(str(tmp_path / "files"))
+    await fill(database, files)
+    await database.close()
+    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    statement = "select id, alarm_id, recipient, state, attempts, process_id from alarm_deliveries"
+    assert query(url, statement) == [("d1", "a1", "bridge", "waiting", 0, 1)]
+    waiting = [("d1", "a1", "bridge", "waiting", 0, None)]
+
+    empty = databases.empty("postgresql")
+    await asyncio.to_thread(restore_to, empty, copy, replace=False, pings=files)
+    assert query(empty, statement) == waiting, "some other process delivers it now"
+    with pytest.raises(DBAPIError, match="fk_alarm_deliveries_process_id_processes"):
+        query(empty, "update alarm_deliveries set process_id = 7")
+
+    await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
+    assert query(url, statement) == waiting, "over the row that named a process"
+
+
+async def test_an_archive_goes_into_postgresql_as_a_whole_or_not_at_all(databases: Databases, tmp_path: Path) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    files = PingFiles(str(tmp_path / "files"))
+    copy, _ = await asyncio.to_thread(back_up, databases.fresh("postgresql"), tmp_path / "fleet.dump", files)
+    url = databases.empty("postgresql")
+    query(url, "create table waypoints (depth_m real)")  # the last table of all is in the way
+    with pytest.raises(BackupError, match=r"psql failed: .*relation \"waypoints\" already exists"):
+        await asyncio.to_thread(restore_to, url, copy, replace=False, pings=files)
+    assert query(url, "select tablename from pg_tables where schemaname = 'public'") == [("waypoints",)]
 
 
 async def test_a_password_is_given_to_no_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

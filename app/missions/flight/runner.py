@@ -144,7 +144,7 @@ class Runner:
             rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
             newest = await mission_queries.newest_waypoints(session, live.id)
             way_m = await mission_queries.committed_way(session, live.id)
-        self._decider.planner.restore(step.memory)
+        await self._remember(step.memory)
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}
         for member in live.team:
@@ -156,6 +156,19 @@ class Runner:
             Level.INFO, "resumed", f"going on after step {step.number} of {live.spec.steps}", step=step.number
         )
         return True
+
+    async def _remember(self, memory: bytes) -> None:
+        """Let the planner take up what it had in mind; where it cannot read that it begins anew, on the same map."""
+        planner = self._decider.planner
+        blank = planner.snapshot()
+        try:
+            planner.restore(memory)
+        except ValueError as error:
+            planner.restore(blank)
+            said = (
+                f"what the planner had in mind was written by another version: it plans anew on the same map ({error})"
+            )
+            await self._live.journal.log(Level.WARNING, "resumed", said)
 
     def _leave_out_passed(self, member: Member) -> None:
         """Leave out the legs that a vehicle had flown before anybody could write that down."""

@@ -1,0 +1,184 @@
+"""Copies of a PostgreSQL database, made and put back by PostgreSQL's own programs."""
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, NamedTuple
+
+from sqlalchemy import URL
+
+from app.storage.models import Base, MissionOwnerRow, ProcessRow
+
+VERSION_TABLE = "alembic_version"
+_LEFT_OUT = tuple(row.__tablename__ for row in (MissionOwnerRow, ProcessRow))
+"""The list of live processes, and what they lead, is of no use later, and their secrets are private."""
+
+_REFERENCES = {
+    str(key.name): key.column_keys[0]
+    for table in Base.metadata.sorted_tables
+    if table.name not in _LEFT_OUT
+    for key in table.foreign_key_constraints
+    if key.referred_table.name == ProcessRow.__tablename__
+}
+"""The columns of foreign keys to processes, of tables that are in archives."""
+
+
+class BackupError(Exception):
+    """A backup cannot be made, is damaged, or cannot be restored; ``remedy`` says what to do."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+def dump(url: URL, target: Path) -> None:
+    """Write an archive of one consistent moment. Raises BackupError."""
+    without = (f"--exclude-table-data={table}" for table in _LEFT_OUT)
+    _run([*_on_server("pg_dump", url), "--format=custom", *without, f"--file={target}"], url)
+
+
+def check(archive: Path) -> None:
+    """Read an archive from end to end. Raises BackupError when it is damaged."""
+    _run([_program("pg_restore"), "--file=/dev/null", str(archive)])
+
+
+def revision(archive: Path) -> str:
+    """Return the revision of an archive's tables; empty when it is none of ours. Raises BackupError."""
+    read = [_program("pg_restore"), "--data-only", f"--table={VERSION_TABLE}", "--file=-"]
+    found = re.search(rf"^COPY \S*{VERSION_TABLE} .*\n(\S+)\n", _run([*read, str(archive)]), re.MULTILINE)
+    return found[1] if found else ""
+
+
+def put_back(url: URL, archive: Path, *, replace: bool) -> None:
+    """Write what an archive holds into a database: all in one transaction, or nothing. Raises BackupError.
+
+    Rows that name a process keep everything but that: the process is in no archive. The references are made again
+    when the names are gone.
+    """
+    read = [_program("pg_restore"), "--no-owner"]
+    listed = _run([*read, "--list", str(archive)]).splitlines(keepends=True)
+    references = [reference for line in listed if (reference := _Reference.to_a_process(line)) is not None]
+    with tempfile.TemporaryDirectory() as folder:
+        tables, later = Path(folder, "tables"), Path(folder, "later")
+        tables.write_text("".join(line for line in listed if _Reference.to_a_process(line) is None))
+        later.write_text("".join(reference.line for reference in references))
+        with _transaction(url) as script:
+            if replace:
+                for reference in references:
+                    _write(script, reference.dropped)
+            clean = ["--clean", "--if-exists"] if replace else []
+            _run([*read, *clean, f"--use-list={tables}", "--file=-", str(archive)], output=script)
+            for reference in references:
+                _write(script, reference.forgotten)
+            if references:
+                _run([*read, f"--use-list={later}", "--file=-", str(archive)], output=script)
+
+
+class _Reference(NamedTuple):
+    """A foreign key to the processes that some row of an archive may hold."""
+
+    line: str
+    """The archive's list names it so."""
+    table: str
+    column: str
+    name: str
+
+    @classmethod
+    def to_a_process(cls, line: str) -> "_Reference | None":
+        found = re.match(r"\d+; \d+ \d+ FK CONSTRAINT (\S+) (\S+) (\S+) ", line)
+        if found is None or found[3] not in _REFERENCES:
+            return None
+        return cls(line, f"{_quoted(found[1])}.{_quoted(found[2])}", _quoted(_REFERENCES[found[3]]), _quoted(found[3]))
+
+    @property
+    def dropped(self) -> str:
+        return f"ALTER TABLE IF EXISTS {self.table} DROP CONSTRAINT IF EXISTS {self.name};\n"
+
+    @property
+    def forgotten(self) -> str:
+        return f"UPDATE {self.table} SET {self.column} = NULL WHERE {self.column} IS NOT NULL;\n"  # noqa: S608 - quoted
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
+
+
+@contextmanager
+def _transaction(url: URL) -> Iterator[IO[bytes]]:
+    """Run what is written to it in one transaction that ends well only when the caller does. Raises BackupError."""
+    command = [*_on_server("psql", url), "--no-psqlrc", "--quiet", "--set=ON_ERROR_STOP=1"]
+    with (
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen(  # noqa: S603 - no shell
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, env=_with_password(url)
+        ) as psql,
+    ):
+        assert psql.stdin is not None  # noqa: S101 - it is a pipe
+        failed: BackupError | None = None
+        try:
+            _write(psql.stdin, "BEGIN;\n")
+            yield psql.stdin
+            _write(psql.stdin, "COMMIT;\n")
+        except BackupError as error:
+            failed = error
+        finally:
+            # Without its last word the server takes everything back.
+            with suppress(BrokenPipeError):
+                psql.stdin.close()
+            code = psql.wait()
+            said.seek(0)
+            reason = said.read().decode(errors="replace").strip()
+        if code != 0:
+            raise BackupError(f"psql failed: {(reason or f'exit code {code}').splitlines()[0]}") from failed
+        if failed is not None:
+            raise failed
+
+
+def _write(script: IO[bytes], text: str) -> None:
+    try:
+        script.write(text.encode())
+        script.flush()
+    except BrokenPipeError:
+        raise BackupError("psql ended early") from None
+
+
+def _program(name: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        raise BackupError(
+            f"PostgreSQL's {name} is not installed here",
+            f"Install PostgreSQL's client programs (postgresql-client), or run {name} where the database is: "
+            "docker compose exec database pg_dump --username bathyfleet --format custom bathyfleet > FILE",
+        )
+    return found
+
+
+def _on_server(name: str, url: URL) -> list[str]:
+    place = ["--host", url.host or "localhost", "--port", str(url.port or 5432), "--no-password"]
+    user = ["--username", url.username] if url.username else []
+    return [_program(name), *place, *user, "--dbname", url.database or "postgres"]
+
+
+def _with_password(url: URL) -> dict[str, str]:
+    """Return an environment with the password, which no other user sees there."""
+    return os.environ | ({"PGPASSWORD": str(url.password)} if url.password else {})
+
+
+def _run(command: list[str], url: URL | None = None, output: IO[bytes] | None = None) -> str:
+    """Run one of PostgreSQL's programs; returns what it prints, unless that goes elsewhere."""
+    done = subprocess.run(  # noqa: S603 - no shell
+        command,
+        stdout=output or subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=None if url is None else _with_password(url),
+        check=False,
+    )
+    if done.returncode != 0:
+        reason = (done.stderr.decode(errors="replace").strip() or f"exit code {done.returncode}").splitlines()[0]
+        raise BackupError(f"{Path(command[0]).name} failed: {reason}")
+    return "" if done.stdout is None else done.stdout.decode()
