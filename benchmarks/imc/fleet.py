@@ -2,10 +2,11 @@
 
 A second process plays the vehicles on real UDP sockets: each announces itself, takes our FollowReference plan, echoes
 every Reference and sends the mix of packets that DUNE sends, most of which nobody here needs. Printed is one JSON
-object with the CPU seconds per second (``cpu_share``, of one core) of the process that holds the bridge. It only counts
-where ``sent_per_s`` is what was asked for: a busy machine does not let the vehicles send as much. ``diverted_per_s`` are
-the loud messages that the system keeps from the bridge; of the others, ``received_of_sent`` came and ``dropped`` found
-its socket full. ``--before TREE`` compares with the bridge of another work tree, each measured in turn.
+object with the CPU seconds per second (``cpu_share``, of one core) of the process that holds the bridge. It counts
+only where ``sent_per_s`` is what was asked for: a busy machine does not let the vehicles send as much.
+``diverted_per_s`` are the loud messages that the system keeps from the bridge; of the others, ``received_of_sent``
+came and ``dropped`` found its socket full. ``--before TREE`` compares with the bridge of another work tree, each
+measured in turn.
 """
 
 import argparse
