@@ -145,14 +145,14 @@ def _evenly(n: int) -> FloatArray:
 
 def predicted_without(process: Conditioned, rows: IntArray, neighbours: IntArray) -> HeldOut:
     """Predict the fine soundings ``rows`` from the given ones, (h, k), -1 for none."""
-    points = process.levels.points
+    points, metric, amplitude, _ = process.sounded
     error, noise_part, model_part = krige_holes(
         KERNEL_CODES[process.kernel],
         points,
-        process.levels.soundings.depth_m - process.trend(points),
+        process.residual_m,
         process.noise_variance,
-        process.scales.scaled_metric(process.length_m),
-        process.amplitude_m * process.scales.amplitude,
+        metric,
+        amplitude,
         rows,
         neighbours,
     )

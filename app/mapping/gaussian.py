@@ -11,6 +11,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.counting import cell_numbers
 from app.mapping.kernels import exp_minus
 from app.mapping.neighbours import nearest
+from app.mapping.supersoundings import merge_soundings
 from app.mapping.threads import each
 from app.mapping.types import BathymetricMap, Grid, Soundings
 
@@ -22,6 +23,9 @@ MANY_SOUNDINGS = 20_000
 
 MODEL = "Gaussian interpolation"
 
+AT_ONCE = 500_000
+"""So many soundings are taken in at a time: bounds the memory."""
+
 BANDS = 8
 BLOCK_CELLS = 16
 PADDING = 8
@@ -29,6 +33,7 @@ PADDING = 8
 GAP_LIMIT = 0.1
 GAP_CELLS = 20_000
 CV_SOUNDINGS = 1000
+MANY_TO_CHOOSE_BY = 200_000  # from so many on, those within half a cell count as one
 CV_NEIGHBOURS = 64
 ROUGHNESS_PRIOR_WEIGHT = 4.0
 
@@ -77,9 +82,13 @@ class GaussianInterpolator:
         soundings.check()
         if self._reference is None:
             self._reference = float(soundings.depth_m[0])
+        for first in range(0, len(soundings), AT_ONCE):
+            self._add(soundings.take(slice(first, first + AT_ONCE)), self._reference)
+
+    def _add(self, soundings: Soundings, reference_m: float) -> None:
         col = (soundings.east_m - self.grid.west_m) / self.grid.cell_m - 0.5
         row = (soundings.north_m - self.grid.south_m) / self.grid.cell_m - 0.5
-        depth = soundings.depth_m - self._reference
+        depth = soundings.depth_m - reference_m
         precision = 1.0 / soundings.sd_m**2
         width = self.width_m / self.grid.cell_m
         # one block after the other: their cells are still in the processor's cache
@@ -180,6 +189,8 @@ def choose_width(soundings: Soundings, grid: Grid) -> float:
     soundings.check()
     if len(soundings) == 0:
         raise ValueError("soundings is empty; a kernel width needs soundings")
+    if len(soundings) > MANY_TO_CHOOSE_BY:
+        soundings, _ = merge_soundings(soundings, 0.5 * grid.cell_m)
     points = np.column_stack([soundings.east_m, soundings.north_m])
     tree = cKDTree(points)
     gap, _ = nearest(tree, grid.centres_m[:: max(1, grid.rows * grid.cols // GAP_CELLS)], 1)

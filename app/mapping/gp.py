@@ -117,7 +117,9 @@ class GaussianProcessMap:
         Bound on the soundings predicted across holes.
     merge_m
         Side of the squares whose soundings are merged into one; by default 1/100 of the extent of the
-        soundings.
+        soundings, less where there are many.
+    least_merge_m
+        The squares do not get smaller than that however many soundings there are, unless 1/100 of the extent is.
     reject_outliers
         Leave out soundings that ``flag_outliers`` rejects.
     hole_m
@@ -148,6 +150,7 @@ class GaussianProcessMap:
         learning_points: int = 350,
         hole_points: int | None = None,
         merge_m: float | None = None,
+        least_merge_m: float = 0.0,
         hole_m: float | None = None,
         reject_outliers: bool = True,
         calibrate: bool = True,
@@ -161,6 +164,7 @@ class GaussianProcessMap:
         self.learning_points = learning_points
         self.hole_points = hole_points
         self.merge_m = merge_m
+        self.least_merge_m = least_merge_m
         self.hole_m = hole_m
         self.reject_outliers = reject_outliers
         self.calibrate = calibrate
@@ -193,7 +197,10 @@ class GaussianProcessMap:
             soundings = soundings.take(~self.outliers_.rejected)
         self.soundings_ = soundings
         extent = max(float(np.ptp(soundings.east_m)), float(np.ptp(soundings.north_m)), 1e-3)
-        self._unit_m = self.merge_m or extent / max(LEAST_RESOLUTION, math.sqrt(len(soundings)))
+        resolution = math.sqrt(len(soundings))
+        if self.least_merge_m > 0.0:
+            resolution = min(resolution, extent / self.least_merge_m)
+        self._unit_m = self.merge_m or extent / max(LEAST_RESOLUTION, resolution)
         self._levels = two_levels(soundings, self._unit_m, COARSE_FACTOR * self._unit_m)
         learn = learn or not hasattr(self, "hyperparameters_")
         subset = spread_subset(self._levels.fine_tree, self.learning_points)

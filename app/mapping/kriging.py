@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -306,6 +307,16 @@ class Conditioned:
     trend: Trend
     scales: LocalScales
 
+    @cached_property
+    def sounded(self) -> Places:
+        """All these soundings' places."""
+        return self._places(self.levels.points, self.scales)
+
+    @cached_property
+    def residual_m(self) -> FloatArray:
+        """Their depths without the trend, (n,)."""
+        return np.asarray(self.levels.soundings.depth_m - self.trend(self.levels.points))
+
     def predict(
         self,
         grid: Grid,
@@ -325,9 +336,7 @@ class Conditioned:
         side
             Tiles are ``side`` x ``side`` cells.
         """
-        points = self.levels.points
-        residual = self.levels.soundings.depth_m - self.trend(points)
-        sounded = self._places(points, self.scales)
+        sounded, residual = self.sounded, self.residual_m
         depth = np.empty((grid.rows, grid.cols))
         variance = np.empty((grid.rows, grid.cols))
 

@@ -52,8 +52,8 @@ class OutlierReport:
         What the neighbours say; NaN for soundings never suspected.
     deviations : (n,)
         Distance from the prediction in standard deviations; NaN for soundings never suspected.
-    reasons
-        One line per sounding, empty where accepted.
+    depth_m : (n,)
+        What was judged.
     hyperparameters
         The stationary model behind the verdicts.
     """
@@ -61,8 +61,22 @@ class OutlierReport:
     rejected: BoolArray
     predicted_m: FloatArray
     deviations: FloatArray
-    reasons: tuple[str, ...]
+    depth_m: FloatArray
     hyperparameters: Hyperparameters
+
+    def reason(self, i: int) -> str:
+        """Say why a sounding was rejected; empty where it was accepted."""
+        if not self.rejected[i]:
+            return ""
+        return (
+            f"depth {self.depth_m[i]:.2f} m is {self.deviations[i]:.1f} standard deviations from the "
+            f"{self.predicted_m[i]:.2f} m that its neighbours predict"
+        )
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """One line per sounding."""
+        return tuple(map(self.reason, range(len(self.rejected))))
 
 
 def flag_outliers(
@@ -154,13 +168,7 @@ def flag_outliers(
             _, heard = misses(accused, np.hstack([near[accused], witnesses]))
             deviations[rows[accused]] = np.where(agrees, 0.0, np.fmin(deviations[rows[accused]], heard))
     rejected = np.nan_to_num(deviations) > CONVICTION
-    reasons = [""] * n
-    for i in np.flatnonzero(rejected):
-        reasons[i] = (
-            f"depth {soundings.depth_m[i]:.2f} m is {deviations[i]:.1f} standard deviations from the "
-            f"{predicted[i]:.2f} m that its neighbours predict"
-        )
-    return OutlierReport(rejected, predicted, deviations, tuple(reasons), hyperparameters)
+    return OutlierReport(rejected, predicted, deviations, soundings.depth_m, hyperparameters)
 
 
 def _agrees(error: FloatArray, others: IntArray, distance: FloatArray, closest: FloatArray) -> BoolArray:

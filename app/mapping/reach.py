@@ -56,6 +56,9 @@ RELIEF = 0.5
 LEAST_CELLS = 1.0
 """So many cells from a sounding are supported in any case."""
 
+MOST_SQUARES_EACH = 16
+"""Up to so many squares for each point are kept in a table; more are found by sorting."""
+
 ROUNDING = 1e-9
 """Of a square's side: a point at its edge lies in the same square wherever the origin is."""
 
@@ -147,8 +150,7 @@ def _checked_m(levels: TwoLevels, unit_m: float) -> float:
 
 def _checkable(points: FloatArray, radius_m: float) -> bool:
     """Whether predictions over ``radius_m`` can be checked at enough places, in enough directions each."""
-    _, first = np.unique(_squares(points, 0.5 * radius_m), axis=0, return_index=True)
-    thinned = points[np.sort(first)]
+    thinned = points[_first_of_each(_squares(points, 0.5 * radius_m))]
     places = _spread(thinned, TESTS)
     distance, index = nearest(cKDTree(thinned), places, RING_POINTS)
     offset = thinned[index] - places[:, None]
@@ -173,6 +175,19 @@ def _count(points: FloatArray, side_m: float) -> int:
 def _squares(points: FloatArray, side_m: float) -> IntArray:
     """Return the squares that points lie in, (n, 2), counted from their own corner: the origin does not matter."""
     return np.asarray(np.floor((points - points.min(axis=0)) / side_m + ROUNDING), dtype=np.int64)
+
+
+def _first_of_each(squares: IntArray) -> IntArray:
+    """Return the first point of each square that holds one, ascending; ``squares`` is (n, 2)."""
+    columns = int(squares[:, 0].max()) + 1
+    number = squares[:, 1] * columns + squares[:, 0]
+    total = (int(squares[:, 1].max()) + 1) * columns
+    if total > MOST_SQUARES_EACH * max(len(number), 1):
+        return np.sort(np.unique(number, return_index=True)[1])
+    first = np.full(total, -1, np.int64)
+    # Backwards: the first one is written last.
+    first[number[::-1]] = np.arange(len(number))[::-1]
+    return np.sort(first[first >= 0])
 
 
 def _steepness(levels: TwoLevels) -> float:

@@ -51,14 +51,14 @@ class Soundings:
 
     @classmethod
     def of_rows(cls, rows: SoundingRows) -> "Soundings":
-        """Return what stands in rows."""
-        return cls(*rows.T.copy())
+        """Return what stands in rows; a column that lies together in memory is not copied."""
+        return cls(*(np.ascontiguousarray(column) for column in rows.T))
 
     def __len__(self) -> int:
         return len(self.depth_m)
 
-    def take(self, rows: IntArray | BoolArray) -> "Soundings":
-        """Return the soundings with the given numbers, or where a boolean array is True."""
+    def take(self, rows: IntArray | BoolArray | slice) -> "Soundings":
+        """Return the soundings with the given numbers, of a slice, or where a boolean array is True."""
         return Soundings(self.east_m[rows], self.north_m[rows], self.depth_m[rows], self.sd_m[rows])
 
     def check(self) -> None:

@@ -160,6 +160,18 @@ async def all_soundings(session: AsyncSession, mission_id: str) -> Sequence[Soun
     return (await session.scalars(query)).all()
 
 
+def columns_query(mission_id: str, names: Sequence[str]) -> Select[*tuple[Any, ...]]:
+    """Return the query of some columns, numbers and texts, of every sounding, in the order they came."""
+    columns = [getattr(SoundingRow, name) for name in names]
+    return select(*columns).where(SoundingRow.mission_id == mission_id).order_by(SoundingRow.id)
+
+
+async def soundings_after(session: AsyncSession, mission_id: str, after: int, most: int) -> Sequence[SoundingRow]:
+    """Return the next ``most`` soundings with an id above ``after``, rejected ones included, in the order they came."""
+    query = select(SoundingRow).where(SoundingRow.mission_id == mission_id, SoundingRow.id > after)
+    return (await session.scalars(query.order_by(SoundingRow.id).limit(most))).all()
+
+
 def accepted_after(
     mission_ids: Sequence[str] | None,
     after: int,

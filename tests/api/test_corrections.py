@@ -59,6 +59,22 @@ async def test_a_tide_set_afterwards_corrects_what_was_measured_before(client: h
     assert (await client.get(f"{path}/quality")).json()["common_sd_m"] == 0.1
 
 
+async def test_soundings_are_corrected_and_written_piece_by_piece(
+    client: httpx.AsyncClient, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.missions.operations.recorrection.AT_ONCE", 3)
+    await client.post(f"{path}/measurements", json={"items": soundings(7, start_s=START_S)})
+    await client.put(f"{path}/tide", json={"table": tide_table(START_S + 2.5)})
+    partly = await rows(client, path)
+    assert {row["verdict"] for row in partly} == {"accepted", "rejected"}
+    assert all((row["level_m"] == "") == (row["verdict"] == "rejected") for row in partly)
+    shown = (await client.put(f"{path}/tide", json={"level_m": 0.5, "datum_epsg": 5861})).json()
+    assert (shown["accepted"], shown["rejected"]) == (7, 0)
+    whole = await rows(client, path)
+    assert [row["id"] for row in whole] == [row["id"] for row in partly]
+    assert all(float(row["depth_m"]) == pytest.approx(float(row["raw_depth_m"]) - 0.5) for row in whole)
+
+
 async def test_beyond_the_table_soundings_are_refused_until_a_table_covers_them(
     client: httpx.AsyncClient, path: str
 ) -> None:

@@ -1,5 +1,6 @@
 """The Gaussian-process map against the exact dense answer and against what any map must do."""
 
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -247,6 +248,35 @@ def test_taking_in_soundings_without_learning_keeps_the_hyperparameters() -> Non
     assert gp.hyperparameters_ == learned
     assert after.count.sum() == before.count.sum() + 100
     assert after.sd_m.mean() < before.sd_m.mean()
+
+
+def test_what_was_learned_makes_the_same_map_without_the_soundings_it_was_learned_on() -> None:
+    soundings = scattered(300)
+    whole = GaussianProcessMap().fit(soundings)
+    kept = whole.learned()
+    assert not hasattr(kept, "soundings_")
+    assert len(pickle.dumps(kept)) < 10_000 < len(pickle.dumps(whole))
+    with pytest.raises(ValueError, match="call fit"):
+        kept.predict(GRID)
+    again = kept.fit(soundings, learn=False).predict(GRID)
+    expected = whole.predict(GRID)
+    np.testing.assert_array_equal(again.depth_m, expected.depth_m)
+    np.testing.assert_array_equal(again.sd_m, expected.sd_m)
+    np.testing.assert_array_equal(again.claim_sd_m, expected.claim_sd_m)
+
+
+def test_many_soundings_of_one_cell_count_as_one_and_the_map_stays_as_good() -> None:
+    rng = np.random.default_rng(1)
+    east, north = rng.uniform(0, 20, (2, 40_000))
+    depth = 8.0 + np.sin(east / 4.0) + 0.1 * north
+    soundings = Soundings(east, north, depth + rng.normal(0.0, 0.1, len(east)), np.full(len(east), 0.1))
+    grid = Grid(0.0, 0.0, 1.0, 20, 20)
+    centre = grid.centres_m
+    truth = (8.0 + np.sin(centre[:, 0] / 4.0) + 0.1 * centre[:, 1]).reshape(20, 20)
+    fine, merged = (GaussianProcessMap(least_merge_m=m).fit(soundings).predict(grid) for m in (0.0, 0.5))
+    off = [float(np.sqrt(np.mean((found.depth_m - truth) ** 2))) for found in (fine, merged)]
+    assert off[1] <= 1.2 * off[0] < 0.05
+    np.testing.assert_array_equal(merged.count, fine.count)
 
 
 def test_learning_again_starts_from_what_was_learned() -> None:

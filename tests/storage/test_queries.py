@@ -4,14 +4,15 @@ import random
 
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from app.storage import events as event_queries
 from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import telemetry as telemetry_queries
-from app.storage.bulk import read_in_pieces
+from app.storage.bulk import read_in_pieces, read_numbers
 from app.storage.database import Database
-from app.storage.models import EventRow, ImportRow, MissionRow, ReferenceRow
+from app.storage.models import EventRow, ImportRow, MissionRow, ReferenceRow, SoundingRow
 from tests.support.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
 
 
@@ -90,6 +91,30 @@ async def test_a_large_batch_is_stored_whole(database: Database) -> None:
     assert [row[2] for row in found] == [float(i) for i in range(0, 5000, 3)]
     assert not any(row[4] for row in found)
     await read_in_pieces(database, sounding_queries.accepted_query("m2"), lambda part: pytest.fail(f"{part}"))
+
+
+async def test_numbers_are_read_as_arrays_in_their_order(database: Database) -> None:
+    await _two_missions(database)
+    rows = [sounding(time_s=float(i), depth_m=i / 3.0, ruling="restored" if i % 2 else None) for i in range(2500)]
+    async with database.writing() as session:
+        await sounding_queries.insert_new(session, rows)
+    pieces: list[np.ndarray] = []
+    await read_numbers(database, sounding_queries.accepted_query("m1"), pieces.append)
+    table = np.concatenate(pieces)
+    assert table.shape == (2500, 5)
+    assert table.dtype == np.float64
+    np.testing.assert_array_equal(table[:, 2], np.arange(2500) / 3.0)
+    np.testing.assert_array_equal(table[:, 4], np.arange(2500) % 2)
+    await read_numbers(database, sounding_queries.accepted_query("m2"), lambda part: pytest.fail(f"{part}"))
+
+
+async def test_numbers_that_are_missing_are_not_read_as_others(database: Database) -> None:
+    await _two_missions(database)
+    async with database.writing() as session:
+        await sounding_queries.insert_new(session, [sounding(position_sd_m=None)])
+    query = select(SoundingRow.position_sd_m, SoundingRow.depth_m).where(SoundingRow.mission_id == "m1")
+    with pytest.raises(ValueError, match="is missing there"):
+        await read_numbers(database, query, lambda part: pytest.fail(f"{part}"))
 
 
 async def test_newest_waypoints_are_one_for_each_vehicle(database: Database) -> None:

@@ -7,14 +7,16 @@ import numpy as np
 import structlog
 
 from app.arrays import BoolArray, FloatArray
+from app.mapping.types import SoundingRows
 from app.missions.clock import now
 from app.missions.live.journal import Journal
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.codec import pack, unpack
 from app.missions.maps.queue import Replacement
+from app.missions.maps.table import SoundingTable
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
-from app.storage.bulk import read_in_pieces
+from app.storage.bulk import read_numbers
 from app.storage.database import Database
 from app.storage.stored_maps import Stored
 from app.storage.uncancellable import to_the_end
@@ -155,36 +157,28 @@ async def accepted(
     """Return the accepted soundings, about as many as ``expected``, in the order they came."""
     found = Rows(expected)
     query = sounding_queries.accepted_query(mission_id, until_id=until_id, until_step=until_step)
-    await read_in_pieces(database, query, found.take)
+    await read_numbers(database, query, found.take)
     return found
 
 
 class Rows:
-    """Grows by pieces of rows: east, north, depth, deviation, and whether an operator restored it."""
+    """Grows by pieces: east, north, depth, deviation, and whether an operator restored it."""
 
     def __init__(self, expected: int) -> None:
-        self._table = np.empty((max(expected, 1), 4))
-        self._trusted = np.empty(max(expected, 1), dtype=bool)
-        self._count = 0
+        self._table = SoundingTable(expected)
+        self._trusted: list[BoolArray] = []
 
-    def take(self, rows: Any) -> None:
-        """Take a piece in."""
-        piece = np.array([tuple(row) for row in rows], dtype=float)
-        end = self._count + len(piece)
-        if end > len(self._table):
-            more = max(end, int(1.5 * len(self._table)))
-            self._table.resize((more, 4), refcheck=False)
-            self._trusted.resize(more, refcheck=False)
-        self._table[self._count : end] = piece[:, :4]
-        self._trusted[self._count : end] = piece[:, 4] != 0
-        self._count = end
+    def take(self, piece: FloatArray) -> None:
+        """Take a piece in, (k, 5)."""
+        self._table.extend(piece[:, :4])
+        self._trusted.append(piece[:, 4] != 0)
 
     @property
-    def table(self) -> FloatArray:
+    def table(self) -> SoundingRows:
         """The soundings, (n, 4)."""
-        return self._table[: self._count]
+        return self._table.rows
 
     @property
     def trusted(self) -> BoolArray:
         """Which of them were restored, (n,)."""
-        return self._trusted[: self._count]
+        return np.concatenate([np.zeros(0, dtype=bool), *self._trusted])

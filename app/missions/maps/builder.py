@@ -24,6 +24,7 @@ from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
 from app.missions.maps.live_grid import LiveGrid
 from app.missions.maps.queue import MapQueue, Replacement
 from app.missions.maps.swath_grid import SwathGrid
+from app.missions.maps.table import SoundingTable
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""
@@ -40,6 +41,9 @@ Doubted = list[tuple[FloatArray, str]]
 HEAVY = 20_000
 """Of so many soundings on maps are made elsewhere, where that is possible: of fewer it would hardly be quicker."""
 
+FINEST_CELLS = 0.5
+"""Soundings that lie in one square of this part of a cell count as one, where there are so many."""
+
 RELEARN_GROWTH = 1.15
 """Hyperparameters are learned again when the soundings grew by this factor."""
 
@@ -48,20 +52,12 @@ RELEARN_GROWTH = 1.15
 class _Learned:
     """The model with its hyperparameters, and of the soundings that it was learned on why outliers are left out.
 
-    ``soundings``, shape (n, 4), are those it was learned on; ``reasons`` has an entry for each, empty where it is used.
+    ``rejected``, shape (n,), has an entry for each that it was learned on; ``doubted`` are those where it is True.
     """
 
     model: GaussianProcessMap
-    soundings: SoundingRows = field(default_factory=lambda: np.zeros((0, 4)))
-    reasons: tuple[str, ...] = ()
-
-    @cached_property
-    def rejected(self) -> BoolArray:
-        return np.array([bool(reason) for reason in self.reasons], dtype=bool)
-
-    @cached_property
-    def doubted(self) -> Doubted:
-        return [(row, reason) for row, reason in zip(self.soundings, self.reasons, strict=True) if reason]
+    rejected: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    doubted: Doubted = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -147,11 +143,11 @@ class MapBuilder:
         self._beams_mapped = 0
         self._believed: BathymetricMap | None = None
         """The newest map with depths where it shows none; None: the map as it is."""
-        self._soundings = np.zeros((0, 4))
+        self._table = SoundingTable()
         # Those that an operator restored: they are no outliers whatever their neighbours say.
         self._trusted = np.zeros(0, dtype=bool)
         self._prior: BathymetricMap | None = None
-        self._learned = _Learned(_new_model())
+        self._learned = _Learned(self._new_model())
         self._building = threading.Lock()
         self._learning = threading.Lock()
         self._newest: BuiltMap | None = None
@@ -185,12 +181,16 @@ class MapBuilder:
             if self._learning.acquire(blocking=False):
                 if self.arrivals.rest():
                     self._doubted = self.doubted()
-                    self._soundings, self._trusted = np.zeros((0, 4)), np.zeros(0, dtype=bool)
-                    self._prior, self._learned = None, _Learned(_new_model())
+                    self._table, self._trusted = SoundingTable(), np.zeros(0, dtype=bool)
+                    self._prior, self._learned = None, _Learned(self._new_model())
                     if self.live is not None:
                         self.live.release()
                 self._learning.release()
             self._building.release()
+
+    def _new_model(self) -> GaussianProcessMap:
+        # Outliers are judged by ``learn``.
+        return GaussianProcessMap(reject_outliers=False, least_merge_m=FINEST_CELLS * self.grid.cell_m)
 
     @property
     def true(self) -> bool:
@@ -228,14 +228,13 @@ class MapBuilder:
             if not len(self._soundings) and self._prior is None and not beams:
                 self._newest = None
                 return None
-            if thorough:
-                self._learn(self._compute(thorough=True), always=True)
+            own = self._learn(self._compute(thorough=True), always=True, mapping=not beams) if thorough else None
             if came[0] or beams != self._beams_mapped or (self._newest is not None and thorough):
-                self._newest = self._build(thorough=thorough)
+                self._newest = self._build(own, thorough=thorough)
                 self._beams_mapped = beams
                 self._replaced_mapped = came[1]
                 if self.live is not None:
-                    self.live.settle(upto)
+                    self.live.settle(self._soundings, upto)
             return self._newest
 
     def _take_in(self, came: list[SoundingRows | Replacement]) -> None:
@@ -248,20 +247,22 @@ class MapBuilder:
                 )
                 if item.soundings is not None:
                     self._generation += 1
-                    arrived, self._soundings, self._trusted = [], item.soundings, item.trusted
-                    self._learned = _Learned(_new_model())
+                    arrived, self._table, self._trusted = [], SoundingTable.of(item.soundings), item.trusted
+                    self._learned = _Learned(self._new_model())
             else:
                 arrived.append(item)
         if arrived:
-            self._soundings = np.concatenate([self._soundings, *arrived])
-            new = np.zeros(len(self._soundings) - len(self._trusted), dtype=bool)
+            for rows in arrived:
+                self._table.extend(rows)
+            new = np.zeros(len(self._table) - len(self._trusted), dtype=bool)
             self._trusted = np.concatenate([self._trusted, new])
 
-    def _build(self, *, thorough: bool) -> BuiltMap | None:
+    def _build(self, own: BathymetricMap | None, *, thorough: bool) -> BuiltMap | None:
+        """Make a map; ``own`` is that of the mission's own soundings, where it was made already."""
         bathymetry = self._prior
         measured = self.swath.map(self._soundings) if self.swath.beams else None
         if measured is None and len(self._soundings):
-            measured = self._measured(self._compute(thorough=thorough))
+            measured = own if own is not None else self._measured(self._compute(thorough=thorough))
         if measured is not None:
             bathymetry = measured if bathymetry is None else fuse(measured, bathymetry)
         if bathymetry is None:
@@ -312,10 +313,10 @@ class MapBuilder:
     def _measured(self, compute: Callable[..., Any]) -> BathymetricMap:
         """Return the map of the mission's own soundings."""
         learned = self._learned
-        used = np.ones(len(self._soundings), dtype=bool)
-        used[: len(learned.reasons)] = ~learned.rejected
-        bathymetry, model = compute(mapped, self._soundings[used], learned.model, self.grid, self.mask)
-        if not learned.reasons:
+        used = np.ones(len(self._table), dtype=bool)
+        used[: len(learned.rejected)] = ~learned.rejected
+        bathymetry, model = compute(mapped, self._soundings, used, learned.model, self.grid, self.mask)
+        if not len(learned.rejected):
             # The first fit had to learn; keep what it found.
             self._learned = _Learned(model)
         return bathymetry  # type: ignore[no-any-return]
@@ -327,21 +328,28 @@ class MapBuilder:
         """
         self._learn(_here, always=always)
 
-    def _learn(self, compute: Callable[..., Any], *, always: bool) -> None:
+    def _learn(self, compute: Callable[..., Any], *, always: bool, mapping: bool = False) -> BathymetricMap | None:
+        """Do so; with ``mapping`` return the map of what is no outlier, None where nothing was learned."""
         if not self._learning.acquire(blocking=always):
-            return  # somebody is at it
+            return None  # somebody is at it
         try:
             generation = self._generation
-            model, before = self._learned.model, self._learned.reasons
+            model, before = self._learned.model, len(self._learned.rejected)
             known, trusted = self._soundings, self._trusted
-            if not len(known) or (len(known) < RELEARN_GROWTH * len(before) and not always):
-                return
+            if not len(known) or (len(known) < RELEARN_GROWTH * before and not always):
+                return None
             # Both were taken while soundings may have been added: the shorter one says for how many.
             restored = np.zeros(len(known), dtype=bool)
             restored[: len(trusted)] = trusted[: len(known)]
-            fitted, reasons = compute(judged, known, restored, model)
-            if generation == self._generation:
-                self._learned = _Learned(fitted, known, tuple(reasons.get(i, "") for i in range(len(known))))
+            place = (self.grid, self.mask) if mapping else ()
+            fitted, reasons, made = compute(judged, known, restored, model, *place)
+            if generation != self._generation:
+                return None
+            rejected = np.zeros(len(known), dtype=bool)
+            rejected[list(reasons)] = True
+            doubted = [(known[i].copy(), reason) for i, reason in reasons.items()]
+            self._learned = _Learned(fitted, rejected, doubted)
+            return made  # type: ignore[no-any-return]
         finally:
             self._learning.release()
 
@@ -350,12 +358,16 @@ class MapBuilder:
 
         Does not wait for a map that is being made.
         """
-        return self._learned.doubted if self._learned.reasons else self._doubted
+        return self._learned.doubted if len(self._learned.rejected) else self._doubted
 
     @property
     def soundings(self) -> SoundingRows:
         """All that the newest map was made of, (n, 4), those left out as outliers included."""
         return self._soundings
+
+    @property
+    def _soundings(self) -> SoundingRows:
+        return self._table.rows
 
     def as_of(self, soundings: SoundingRows) -> BathymetricMap:
         """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
@@ -368,7 +380,7 @@ class MapBuilder:
                 raise ValueError("there is no sounding to make a map of")
             return prior
         compute = self.elsewhere if len(soundings) >= HEAVY else _here
-        measured: BathymetricMap = compute(mapped, soundings[used], learned.model, self.grid, self.mask)[0]
+        measured: BathymetricMap = compute(mapped, soundings, used, learned.model, self.grid, self.mask)[0]
         return measured if prior is None else fuse(measured, prior)
 
     def coverage_pct(self) -> float:
@@ -433,7 +445,7 @@ class MapBuilder:
 
         What came since the newest map was begun counts as sounded.
         """
-        places = np.concatenate([self._soundings, *self.arrivals.noted()])[:, :2]
+        places = np.concatenate([rows[:, :2] for rows in (self._soundings, *self.arrivals.noted())])
         if self.swath.beams and self._newest is not None:
             seen = self._nodes & self._newest.map.sounded
             return np.concatenate([places, self.grid.centres_m[seen.ravel()]]), np.zeros((0, 2))
@@ -445,7 +457,3 @@ class MapBuilder:
 
 def _here(work: Callable[..., Any], *arguments: Any) -> Any:
     return work(*arguments)
-
-
-def _new_model() -> GaussianProcessMap:
-    return GaussianProcessMap(reject_outliers=False)  # outliers are judged by ``learn``

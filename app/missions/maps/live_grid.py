@@ -61,6 +61,7 @@ class LiveGrid:
         self._taken = 0
         self._chosen_of = 0
         self._lock = threading.Lock()
+        self._base: tuple[SoundingRows, int] = np.zeros((0, 4)), 0
         self._interpolator: GaussianInterpolator | None = None
         self._fresh: LiveCells | None = None
         self.version = 0
@@ -70,28 +71,25 @@ class LiveGrid:
         self._noted.append(soundings)
         self.version += len(soundings)
 
-    def settle(self, upto: int) -> None:
-        """Take note that the considered map holds the soundings ``upto`` here."""
+    def settle(self, soundings: SoundingRows, upto: int) -> None:
+        """Take note that the considered map holds these, which were the mission's ``upto`` here."""
         with self._lock:
             self._take()
+            if self._interpolator is None:
+                self._base = soundings, upto
             while self._recent and self._recent[0][0] <= upto:
                 self._recent.popleft()
             self._fresh = None
 
     def begin_anew(self, soundings: SoundingRows, upto: int) -> None:
-        """Interpolate these, which were the mission's ``upto`` here, and what came since."""
+        """Interpolate these, which were the mission's ``upto`` here, and what came since, once that is asked for.
+
+        Most missions are opened to be looked at: until a vehicle sounds something the interpolation shows nothing.
+        """
         with self._lock:
-            self._take()
-            width_m = FIRST_WIDTH_CELLS * self._grid.cell_m
-            if len(soundings):
-                width_m = choose_width(Soundings.of_rows(soundings), self._grid)
-            self._interpolator = GaussianInterpolator(self._grid, width_m)
-            self._interpolator.add(Soundings.of_rows(soundings))
-            for until, rows in self._recent:
-                if until > upto:
-                    self._interpolator.add(Soundings.of_rows(rows))
+            self._base = soundings, upto
+            self._interpolator = self._fresh = None
             self._chosen_of = len(soundings)
-            self._fresh = None
 
     def outgrown(self, count: int) -> bool:
         """Tell whether so many soundings deserve a new choice of the width."""
@@ -102,6 +100,7 @@ class LiveGrid:
         with self._lock:
             self._take()
             self._recent.clear()
+            self._base = np.zeros((0, 4)), self._taken
             self._interpolator = self._fresh = None
             self._chosen_of = 0
 
@@ -109,19 +108,38 @@ class LiveGrid:
         """Return what the considered map does not hold yet; None where it holds everything."""
         with self._lock:
             self._take()
-            if not self._recent or self._interpolator is None:
+            if not self._recent:
                 return None
             if self._fresh is None:
                 rows = np.concatenate([rows for _, rows in self._recent])
                 cells = _about(self._grid, rows) & self._mask
-                self._fresh = LiveCells(self._taken, cells, *self._interpolator.values_at(cells))
+                self._fresh = LiveCells(self._taken, cells, *self._made().values_at(cells))
             return self._fresh
 
     def map(self) -> BathymetricMap | None:
         """Return the interpolation wherever it is in reach of a sounding; None before the first one."""
         with self._lock:
             self._take()
-            return None if self._interpolator is None else self._interpolator.to_map(self._mask)
+            if self._interpolator is None and not len(self._base[0]) and not self._recent:
+                return None
+            return self._made().to_map(self._mask)
+
+    def _made(self) -> GaussianInterpolator:
+        """Return the interpolation of everything so far."""
+        if self._interpolator is None:
+            base, upto = self._base
+            width_m = FIRST_WIDTH_CELLS * self._grid.cell_m
+            if len(base):
+                width_m = choose_width(Soundings.of_rows(base), self._grid)
+            made = GaussianInterpolator(self._grid, width_m)
+            made.add(Soundings.of_rows(base))
+            for until, rows in self._recent:
+                if until > upto:
+                    made.add(Soundings.of_rows(rows))
+            # The builder holds them as long as it needs them.
+            self._base = np.zeros((0, 4)), upto
+            self._interpolator = made
+        return self._interpolator
 
     def _take(self) -> None:
         """Take in what was noted."""
@@ -129,9 +147,8 @@ class LiveGrid:
             rows = self._noted.popleft()
             self._taken += len(rows)
             self._recent.append((self._taken, rows))
-            if self._interpolator is None:
-                self._interpolator = GaussianInterpolator(self._grid, FIRST_WIDTH_CELLS * self._grid.cell_m)
-            self._interpolator.add(Soundings.of_rows(rows))
+            if self._interpolator is not None:
+                self._interpolator.add(Soundings.of_rows(rows))
             self._fresh = None
 
 

@@ -1,10 +1,9 @@
 """The files that leave with a mission: what there is, and how each is made."""
 
-import csv
 import io
 import zipfile
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 import numpy as np
@@ -12,7 +11,6 @@ import orjson
 from shapely.geometry import Polygon, mapping
 
 from app import __version__
-from app.csv_cells import text_cell
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
@@ -31,17 +29,20 @@ from app.mapping.products.vr_bag import vr_bag
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
-from app.mapping.types import Soundings
+from app.mapping.types import SoundingRows, Soundings
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
+from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
 from app.missions.views.soundings import Verdict
 from app.storage.models import SoundingRow
 
-MAP, SOUNDINGS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
+MAP, SOUNDINGS, ACCEPTED, LINES, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
     "map",
     "soundings",
+    "accepted soundings",
+    "lines of soundings",
     "tracks",
     "search",
     "swaths",
@@ -108,6 +109,8 @@ class Material:
     provider: Provider | None = None
     map: MapSnapshot | None = None
     soundings: Sequence[SoundingRow] = ()
+    accepted: SoundingRows = field(default_factory=lambda: np.zeros((0, 4)))
+    lines: SoundingLines = field(default_factory=SoundingLines)
     tracks: Sequence[Track] = ()
     search: Search | None = None
     surveyed: Surveyed = Surveyed()
@@ -287,9 +290,8 @@ def _overlay(material: Material, options: ProductOptions) -> bytes:
 
 
 def _soundings_xyz(material: Material, _: ProductOptions) -> bytes:
-    rows = [row for row in material.soundings if row.verdict == Verdict.ACCEPTED]
-    table = np.array([(row.east_m, row.north_m, row.depth_m, row.sd_m) for row in rows]).reshape(-1, 4)
-    return soundings_xyz(Soundings.of_rows(table), material.facts.frame, vertical_datum=material.datum, geographic=True)
+    soundings = Soundings.of_rows(material.accepted)
+    return soundings_xyz(soundings, material.facts.frame, vertical_datum=material.datum, geographic=True)
 
 
 def _obstacles(material: Material, _: ProductOptions) -> bytes:
@@ -359,44 +361,8 @@ def _only_vehicle(soundings: Sequence[SoundingRow], vehicle: str | None) -> str:
     return vehicle
 
 
-COLUMNS = (
-    "id",
-    "vehicle",
-    "time_s",
-    "beam",
-    "source",
-    "lat_deg",
-    "lon_deg",
-    "east_m",
-    "north_m",
-    "vehicle_depth_m",
-    "range_m",
-    "raw_depth_m",
-    "depth_m",
-    "sd_m",
-    "position_sd_m",
-    "level_m",
-    "vehicle_lat_deg",
-    "vehicle_lon_deg",
-    "roll_deg",
-    "pitch_deg",
-    "heading_deg",
-    "beam_azimuth_deg",
-    "beam_off_nadir_deg",
-    "step",
-    "verdict",
-    "reason",
-)
-
-
 def _soundings_csv(material: Material, _: ProductOptions) -> bytes:
-    """Return every sounding, rejected ones with their reason; raw and corrected depth side by side."""
-    text = io.StringIO()
-    text.write(f"# depth_m: positive down, from {material.datum}\n")
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
-    writer.writerows([text_cell(getattr(row, column)) for column in COLUMNS] for row in material.soundings)
-    return text.getvalue().encode()
+    return material.lines.csv(material.datum)
 
 
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
@@ -438,19 +404,19 @@ PRODUCTS = {
             filename=lambda facts: file_name(facts.title, facts.mission_id),
         ),
         ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
-        ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {SOUNDINGS}),
+        ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {LINES}),
         ProductKind(MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}),
         ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}),
         ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
         ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
-        ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {SOUNDINGS}),
+        ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {LINES}),
         ProductKind(
             SOUNDINGS,
             "xyz",
             TEXT,
             "longitude, latitude and corrected depth of accepted soundings",
             _soundings_xyz,
-            {SOUNDINGS},
+            {ACCEPTED},
         ),
         ProductKind(
             SOUNDINGS,

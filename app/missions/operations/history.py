@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from app.missions.errors import TargetNotFoundError
 from app.missions.live.journal import event_view
 from app.missions.live.mission import LiveMission
+from app.missions.maps.sounding_lines import COLUMNS, SoundingLines
 from app.missions.views.mission import EventView, Level, StepView, WaypointView
 from app.missions.views.soundings import Verdict
 from app.missions.views.targets import TargetRangePage, TargetRangeView
@@ -14,6 +15,7 @@ from app.storage import missions as mission_queries
 from app.storage import soundings as sounding_queries
 from app.storage import target_ranges as range_queries
 from app.storage import telemetry as telemetry_queries
+from app.storage.bulk import read_in_pieces
 from app.storage.models import SoundingRow
 
 
@@ -68,6 +70,14 @@ async def soundings_of(live: LiveMission) -> Sequence[SoundingRow]:
     await live.journal.flush()
     async with live.database.reading() as session:
         return await sounding_queries.all_soundings(session, live.id)
+
+
+async def sounding_lines(live: LiveMission) -> SoundingLines:
+    """Return every sounding, rejected ones included, as it stands in a file."""
+    await live.journal.flush()
+    lines = SoundingLines()
+    await read_in_pieces(live.database, sounding_queries.columns_query(live.id, COLUMNS), lines.take)
+    return lines
 
 
 async def target_ranges_page(

@@ -3,15 +3,20 @@
 import asyncio
 from collections.abc import Sequence
 
+import numpy as np
+
 from app.compute.door import Compute
 from app.mapping.products.tracks import Track, TrackPoint
+from app.mapping.types import SoundingRows
 from app.missions.clock import now
 from app.missions.errors import MapNotReadyError
 from app.missions.live.mission import LiveMission
 from app.missions.live.sounding_store import accepted
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.products import (
+    ACCEPTED,
     CROSSOVERS,
+    LINES,
     MAP,
     SEARCH,
     SOUNDINGS,
@@ -25,8 +30,9 @@ from app.missions.maps.products import (
     product_kind,
 )
 from app.missions.maps.snapshot import MapSnapshot
+from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.operations.crossovers import check_of
-from app.missions.operations.history import soundings_of
+from app.missions.operations.history import sounding_lines, soundings_of
 from app.missions.operations.scans import search_of
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
@@ -34,6 +40,8 @@ from app.missions.views.soundings import Verdict
 from app.storage import missions as mission_queries
 from app.storage import pings as ping_queries
 from app.storage import soundings as sounding_queries
+
+NONE: SoundingRows = np.zeros((0, 4))
 
 
 async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True) -> MapSnapshot:
@@ -119,6 +127,8 @@ async def export(
         provider=provider.named(),
         map=None if snapshot is None else snapshot.without_live(),
         soundings=await soundings_of(live) if SOUNDINGS in needs else (),
+        accepted=await _accepted_of(live) if ACCEPTED in needs else NONE,
+        lines=await sounding_lines(live) if LINES in needs else SoundingLines(),
         tracks=await track_lines(live) if TRACKS in needs else (),
         search=search_of(live) if SEARCH in needs else None,
         surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
@@ -128,6 +138,12 @@ async def export(
     if snapshot is not None and snapshot.large:
         return await compute.make(make_product, name, material, chosen)
     return await live.in_thread(make_product, name, material, chosen)
+
+
+async def _accepted_of(live: LiveMission) -> SoundingRows:
+    """Return the accepted soundings, (n, 4)."""
+    await live.journal.flush()
+    return (await accepted(live.database, live.id, live.journal.counts.accepted)).table
 
 
 async def surveyed(live: LiveMission) -> Surveyed:

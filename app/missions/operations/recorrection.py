@@ -1,9 +1,13 @@
 """Changing a mission's corrections: every stored sounding is corrected anew from its raw values."""
 
+import math
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import update
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -23,6 +27,11 @@ from app.missions.views.soundings import Ruling, Verdict
 from app.storage import soundings as sounding_queries
 from app.storage import stored_maps
 from app.storage.models import MissionRow, SoundingRow, TideTableRow
+
+AT_ONCE = 10_000
+"""So many soundings are corrected and written at a time."""
+
+NUMBERS = ("level_m", "east_m", "north_m", "depth_m")
 
 CORRECTIONS = {"tide", "sound_speed", "systematic_errors"}
 """Fields of a mission's description that say how soundings are corrected."""
@@ -147,12 +156,10 @@ async def recorrect(
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
-        async with live.database.reading() as session:
-            rows = await sounding_queries.all_soundings(session, live.id)
-        changes = await live.in_thread(recorrected, rows, corrections, live.gate)
+        changes = await _recorrected_pieces(live, corrections)
         async with live.database.writing() as session:
-            if changes:
-                await session.execute(update(SoundingRow), changes)
+            for piece in changes:
+                await session.execute(update(SoundingRow), piece.rows())
             mission = await session.get_one(MissionRow, live.id)
             mission.spec = mission.spec | spec.model_dump(mode="json", include=CORRECTIONS)
             await store(session)
@@ -164,6 +171,55 @@ async def recorrect(
         live.recorrect(spec, corrections, counts)
     live.changed.set()
     live.publish_summary()
+
+
+@dataclass(frozen=True)
+class _Changed:
+    """What changes in some soundings, as columns: millions of them wait in memory until all can be written.
+
+    ``numbers`` is (n, 4): level, east, north, depth; no level is NaN. ``outcomes`` are verdict and reason, by ``which``
+    (n,).
+    """
+
+    ids: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+    which: NDArray[np.int32]
+    outcomes: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(cls, changes: Sequence[dict[str, Any]]) -> "_Changed":
+        known: dict[tuple[str, str], int] = {}
+        which = [known.setdefault((change["verdict"], change["reason"]), len(known)) for change in changes]
+        return cls(
+            np.array([change["id"] for change in changes], np.int64),
+            np.array([[change[name] for name in NUMBERS] for change in changes], float),
+            np.array(which, np.int32),
+            tuple(known),
+        )
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what changes in each row, by its id."""
+        found = []
+        for number, values, which in zip(self.ids.tolist(), self.numbers.tolist(), self.which.tolist(), strict=True):
+            verdict, reason = self.outcomes[which]
+            change = dict(zip(NUMBERS, values, strict=True)) | {"id": number, "verdict": verdict, "reason": reason}
+            if math.isnan(values[0]):
+                change["level_m"] = None
+            found.append(change)
+        return found
+
+
+async def _recorrected_pieces(live: LiveMission, corrections: Corrections) -> list[_Changed]:
+    """Correct all stored soundings, so many at a time that their rows take little memory."""
+    found: list[_Changed] = []
+    after = 0
+    while True:
+        async with live.database.reading() as session:
+            rows = await sounding_queries.soundings_after(session, live.id, after, AT_ONCE)
+        if not rows:
+            return found
+        after = rows[-1].id
+        found.append(await live.in_thread(lambda rows: _Changed.of(recorrected(rows, corrections, live.gate)), rows))
 
 
 def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gate) -> list[dict[str, Any]]:

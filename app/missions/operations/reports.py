@@ -32,9 +32,10 @@ from app.missions.maps.products import (
     snapshot_holidays,
 )
 from app.missions.maps.snapshot import MapSnapshot, quality_of
+from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.operations.adjustment import adjustment_view
 from app.missions.operations.crossovers import FoundCheck, check_of, crossovers_view
-from app.missions.operations.history import soundings_of
+from app.missions.operations.history import sounding_lines
 from app.missions.operations.imports import imports_of, reference_of
 from app.missions.operations.mission_maps import newest_map, surveyed, track_lines
 from app.missions.operations.pings import pings_of
@@ -142,7 +143,7 @@ class Reports:
             facts=live.facts,
             created=now(),
             map=snapshot.without_live(),
-            soundings=() if many else await soundings_of(live),
+            lines=SoundingLines() if many else await sounding_lines(live),
             tracks=tracks,
             crossovers=found.check,
         )

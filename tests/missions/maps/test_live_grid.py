@@ -8,7 +8,7 @@ import pytest
 
 from app.mapping.gaussian import GaussianInterpolator
 from app.mapping.layers import ACCURATE, SOUNDED
-from app.mapping.types import Soundings
+from app.mapping.types import BathymetricMap, Soundings
 from app.missions.maps.builder import MapBuilder, make_grid
 from app.missions.maps.live_grid import SHOWN_CELLS, LiveGrid
 from app.missions.maps.tiles import TileCache
@@ -100,8 +100,8 @@ def test_what_comes_while_a_map_is_made_stays_new(monkeypatch: pytest.MonkeyPatc
     late = np.array([[3.5, 3.5, 6.0, 0.05]])
     make = MapBuilder._build
 
-    def slow(self: MapBuilder, *, thorough: bool) -> object:
-        built = make(self, thorough=thorough)
+    def slow(self: MapBuilder, own: BathymetricMap | None, *, thorough: bool) -> object:
+        built = make(self, own, thorough=thorough)
         self.add(late)
         return built
 
