@@ -17,7 +17,8 @@ from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decision import Decision, Leg, turn_radius_m
 from app.missions.live.mission import RISES, LiveMission
-from app.missions.recovery.way_home import berth_m, homeward_ground
+from app.missions.recovery.berths import berth_m, berth_spacing_m
+from app.missions.recovery.way_home import homeward_ground
 from app.missions.spec.mission import Guidance, MissionSpec
 from app.missions.spec.recovery import Recovery
 from app.missions.team import CommittedLeg, Member
@@ -338,9 +339,12 @@ def home_of(member: Member, spec: MissionSpec) -> FloatArray | None:
     recovery = spec.recovery_of(member.spec)
     if recovery is None:
         return None
+    point_m = point_of(recovery, spec)
     # A point of its own is nobody else's.
-    slot = 0 if member.spec.recovery_point is not None else member.slot
-    return berth_m(point_of(recovery, spec), slot, recovery.radius_m, spec.limits.min_separation_m)
+    if member.spec.recovery_point is not None:
+        return point_m
+    sharing = sum(vehicle.recovery_point is None for vehicle in spec.vehicles)
+    return berth_m(point_m, member.slot, sharing, berth_spacing_m(spec))
 
 
 def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:

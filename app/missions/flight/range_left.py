@@ -11,6 +11,7 @@ from app.exploration.core.constraints import Constraints
 from app.missions import safety
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
+from app.missions.recovery.berths import DepthLayer, layer_of
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
@@ -79,13 +80,21 @@ class RangeLeft:
         return anyhow.way(here_m) if way_m is None else way_m
 
     def depths_m(self, member: Member, here_m: FloatArray, way_m: FloatArray) -> list[float]:
-        """Return how deep a vehicle travels to each corner of a way, (n, 2): less over a shallow bottom."""
-        limits, bottom = self._live.spec.limits, self._committing.bottom
-        wanted_m = min(member.cruise_depth_m(limits), limits.max_depth_m)
+        """Return how deep a vehicle travels to each corner of a way, (n, 2): less over a shallow bottom.
+
+        Each of the team has a depth of its own there, too, since ways home lead to the same place.
+        """
+        limits, bottom, layer = self._live.spec.limits, self._committing.bottom, self.layer(member)
         return [
-            safety.travel_depth_m(a, b, wanted_m, bottom, limits.min_altitude_m)
+            layer.depth_m(safety.travel_depth_m(a, b, layer.deepest_m, bottom, limits.min_altitude_m))
             for a, b in pairwise(np.vstack([here_m, way_m]))
         ]
+
+    def layer(self, member: Member) -> DepthLayer:
+        """Return at which depths a vehicle goes home, apart from the others of its team."""
+        limits = self._live.spec.limits
+        depths_m = {one.name: min(one.cruise_depth_m(limits), limits.max_depth_m) for one in self._live.team}
+        return layer_of(member.name, depths_m, limits.min_vertical_separation_m)
 
     @property
     def _least_m(self) -> float:

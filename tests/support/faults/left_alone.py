@@ -24,8 +24,10 @@ ZONE = box(110.0, 140.0, 170.0, 200.0)
 HOME_M = (150.0, 30.0)
 """The recovery point, outside the area."""
 NEAR_M = 25.0
-TOUCH_M = 2.5
-"""Vehicles of which the centres are closer than one is long touch each other."""
+TOUCH_M, TALL_M = 2.5, 0.8
+"""Vehicles touch each other of which the centres are closer than one is long, and than one is tall that is pitched."""
+SEPARATION_M = 5.0
+"""So far apart the mission keeps them at similar depths."""
 AFLOAT_M = 0.3
 """At most this deep a vehicle is at the surface."""
 START_M = ((100.0, 90.0, 0.0), (180.0, 90.0, 0.0))
@@ -86,12 +88,16 @@ async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
     await service.kill()
     begun_s, far = fleet.clock.now(), [round(_from_home_m(node), 1) for node in fleet.nodes]
     tracks: list[list[tuple[float, float]]] = [[] for _ in fleet.nodes]
-    closest_m, arrived_s = math.inf, [math.nan] * len(fleet.nodes)
+    closest_m, arrived_s, touched, too_close = math.inf, [math.nan] * len(fleet.nodes), False, False
     while fleet.clock.now() - begun_s < PATIENCE_S and any(map(math.isnan, arrived_s)):
         places = [node.vehicle.true_position for node in fleet.nodes]
         first, second = places
-        apart_m = math.hypot(first.horizontal_distance_m(second.east_m, second.north_m), first.depth_m - second.depth_m)
-        closest_m = min(closest_m, apart_m)
+        aside_m = first.horizontal_distance_m(second.east_m, second.north_m)
+        below_m = abs(first.depth_m - second.depth_m)
+        closest_m = min(closest_m, math.hypot(aside_m, below_m))
+        touched |= aside_m < TOUCH_M and below_m < TALL_M
+        # As the table of failsafes judges it.
+        too_close |= aside_m < SEPARATION_M and below_m < LIMITS["min_vertical_separation_m"] / 2
         for number, (node, place) in enumerate(zip(fleet.nodes, places, strict=True)):
             tracks[number].append((place.east_m, place.north_m))
             if math.isnan(arrived_s[number]) and _home(node):
@@ -107,7 +113,8 @@ async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
         "least_energy_pct": round(min(levels), 1) if levels else None,
         "zones_entered": sum(LineString(track).intersects(ZONE) for track in tracks if len(track) > 1),
         "closest_m": round(closest_m, 1),
-        "collided": int(closest_m < TOUCH_M),
+        "too_close": int(too_close),
+        "collided": int(touched),
     }
 
 
@@ -129,7 +136,7 @@ def _mission() -> dict[str, Any]:
         keep_out=[_geojson(ZONE)],
         recovery={"point": _lon_lat(*HOME_M), "radius_m": NEAR_M},
         steps=500,
-        limits=LIMITS | {"max_step_m": 20.0},
+        limits=LIMITS | {"max_step_m": 20.0, "min_separation_m": SEPARATION_M},
         step_deadline_s=120.0,
         planner={"name": "lawnmower"},
         cell_m=4.0,
