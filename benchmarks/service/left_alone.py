@@ -69,6 +69,7 @@ def summary(kills: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "vehicles": len(NAMES) * len(kills),
         "vehicles_home": sum(kill["home"] for kill in kills),
         "ways_on_board_when_killed": sum(kill["kept_on_board"] for kill in kills),
+        "home_before": sum(kill["home_before"] for kill in kills),
         "farthest_when_killed_m": max(m for kill in kills for m in kill["from_home_when_killed_m"]),
         "worst_from_point_m": max(m for kill in kills for m in kill["from_point_m"]),
         "latest_home_after_s": max(times, default=None),

@@ -57,6 +57,10 @@ class FleetHub:
         """The kinds of vehicles that can be reached."""
         return tuple(self._links)
 
+    def link(self, kind: VehicleKind) -> FleetLink | None:
+        """Return the link that reaches vehicles of a kind; None where there is none."""
+        return self._links.get(kind)
+
     def capabilities(self, kind: VehicleKind) -> LinkCapabilities:
         """Return what vehicles of a kind can do."""
         link = self._links.get(kind)

@@ -1,7 +1,7 @@
 """How far vehicles may go on, so that their energy lasts for the way home from there."""
 
+import asyncio
 import math
-import time
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
 
 LAND_PERIOD_S = 10.0
-"""How often is looked whether the map shows other shallows, seconds of the wall clock."""
+"""How often is looked whether the map shows other shallows, seconds of the event loop's time."""
 
 MOVED_M = 5.0
 """The way home is looked for anew when its vehicle is so far from where that was done last."""
@@ -102,7 +102,7 @@ class RangeLeft:
 
     def _look_for_land(self) -> None:
         """Find ways anew where the map shows other shallows than before, not too often."""
-        now_s = time.monotonic()
+        now_s = asyncio.get_running_loop().time()
         if now_s - self._looked_s < LAND_PERIOD_S:
             return
         self._looked_s = now_s

@@ -84,7 +84,9 @@ async def left_alone(
 
 async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
     """Kill the service, and watch until all are home or patience ends."""
-    kept = sum("lostcomms" in node.database.plans for node in fleet.nodes)
+    on_board = ["lostcomms" in node.database.plans for node in fleet.nodes]
+    # The service may have led one home before, for example one that a busy machine did not hear for long.
+    there = [not has and _is_up_at_home(node) for has, node in zip(on_board, fleet.nodes, strict=True)]
     await service.kill()
     begun_s, far = fleet.clock.now(), [round(_from_home_m(node), 1) for node in fleet.nodes]
     tracks: list[list[tuple[float, float]]] = [[] for _ in fleet.nodes]
@@ -100,12 +102,13 @@ async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
         too_close |= aside_m < SEPARATION_M and below_m < LIMITS["min_vertical_separation_m"] / 2
         for number, (node, place) in enumerate(zip(fleet.nodes, places, strict=True)):
             tracks[number].append((place.east_m, place.north_m))
-            if math.isnan(arrived_s[number]) and _home(node):
+            if math.isnan(arrived_s[number]) and (_came_home(node) or (there[number] and _is_up_at_home(node))):
                 arrived_s[number] = fleet.clock.now() - begun_s
         await asyncio.sleep(0.02)
     levels = [node.vehicle.battery.level_pct for node in fleet.nodes if node.vehicle.battery is not None]
     return {
-        "kept_on_board": kept,
+        "kept_on_board": sum(on_board),
+        "home_before": sum(there),
         "from_home_when_killed_m": far,
         "home": sum(map(math.isfinite, arrived_s)),
         "from_point_m": [round(_from_home_m(node), 1) for node in fleet.nodes],
@@ -122,11 +125,14 @@ def _from_home_m(node: FakeDune) -> float:
     return node.vehicle.true_position.horizontal_distance_m(*HOME_M)
 
 
-def _home(node: FakeDune) -> bool:
+def _came_home(node: FakeDune) -> bool:
     """Whether it came by its plan, is near its point, and at the surface."""
     plan = node.plan.plan_control_state()
-    at_the_end = plan.plan_id == "lostcomms" and str(plan.man_id).endswith(" end")
-    return at_the_end and _from_home_m(node) <= NEAR_M and node.vehicle.true_position.depth_m < AFLOAT_M
+    return plan.plan_id == "lostcomms" and str(plan.man_id).endswith(" end") and _is_up_at_home(node)
+
+
+def _is_up_at_home(node: FakeDune) -> bool:
+    return _from_home_m(node) <= NEAR_M and node.vehicle.true_position.depth_m < AFLOAT_M
 
 
 def _mission() -> dict[str, Any]:
