@@ -70,7 +70,9 @@ class Watch:
         self.too_close: set[tuple[str, str]] = set()
         """Vehicles that came closer than the mission keeps them apart, one of them on its way home."""
         self.touched: set[tuple[str, str]] = set()
-        """Those that touched each other at any time."""
+        """Those of them that touched each other."""
+        self.touched_before: set[tuple[str, str]] = set()
+        """Vehicles that touched each other while neither was on its way home, for example where they are launched."""
 
     async def keep(self) -> None:
         """Look on until cancelled."""
@@ -124,7 +126,7 @@ class Watch:
         if pair not in self._been_apart:
             return
         if aside_m < LONG_M and below_m < TALL_M:
-            self.touched.add(pair)
+            (self.touched if returning else self.touched_before).add(pair)
         if returning and below_m < limits.min_vertical_separation_m / 2:
             self.closest_m = min(self.closest_m, aside_m)
             if aside_m < limits.min_separation_m:

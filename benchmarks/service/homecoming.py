@@ -9,6 +9,7 @@ import os
 import time
 from collections.abc import Sequence
 
+from app.api import logs
 from app.commands.home import fly_all
 from benchmarks.common.report import FLIGHT, make_parser, write_section
 
@@ -18,10 +19,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = make_parser(__doc__, FLIGHT)
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
-    parser.add_argument("--time-scale", type=float, default=10.0)
+    parser.add_argument("--time-scale", type=float, default=20.0)
     parser.add_argument("--minutes", type=float, default=math.inf, help="of processor; no mission is begun after that")
     parser.add_argument("--still", action="store_true", help="no current")
     options = parser.parse_args(arguments)
+    logs.configure("error", "json")
     seeds, begun = range(options.first, options.first + options.missions), time.monotonic()
 
     def told(mission: dict[str, object]) -> None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from shapely import Polygon
@@ -12,6 +13,7 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.motion.turning import disc, turned_over
+from app.mapping.georeference import LocalFrame
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
@@ -349,9 +351,15 @@ def home_of(member: Member, spec: MissionSpec) -> FloatArray | None:
 
 def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
     """Return a recovery point in the mission's frame, (2,)."""
-    lon, lat = recovery.point
-    east, north = spec.frame().to_local(np.array(lat), np.array(lon))
-    return np.array([float(east), float(north)])
+    return np.array(_local(recovery.point, spec.frame()))
+
+
+@lru_cache(maxsize=256)
+def _local(point: tuple[float, float], frame: LocalFrame) -> tuple[float, float]:
+    """Return a point (longitude, latitude) in a frame: asked for again and again."""
+    lon, lat = point
+    east, north = frame.to_local(np.array(lat), np.array(lon))
+    return float(east), float(north)
 
 
 def way_m(ends_m: Sequence[FloatArray], spec: MissionSpec) -> float:

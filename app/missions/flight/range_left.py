@@ -137,11 +137,12 @@ class RangeLeft:
         home_m, left = home_of(member, self._live.spec), member.energy.left
         if home_m is None or left is None or member.report is None or member.withdrawal is not None:
             return None
+        around_s = self._around_s(member, home_m)
         return turn_back_place(
             member.place_m(self._live.frame),
             member.legs_ahead_m(),
             left.safe_s,
-            lambda place_m: self._needs_from_s(member, place_m, home_m),
+            lambda place_m: self._needs_from_s(member, place_m, home_m, around_s),
             self._live.spec.speed_of(member.spec),
             self.current_mps,
         )
@@ -172,13 +173,20 @@ class RangeLeft:
     def _until_end_s(self, member: Member) -> float:
         return member.way_ahead_m(self._live.frame) / self._live.spec.speed_of(member.spec)
 
-    def _needs_from_s(self, member: Member, place_m: FloatArray, home_m: FloatArray) -> float:
+    def _needs_from_s(
+        self, member: Member, place_m: FloatArray, home_m: FloatArray, around_s: float | None = None
+    ) -> float:
         """Return how long the way home takes from a place, straight, and longer by what it is longer from here."""
-        here_m, way_m = member.place_m(self._live.frame), self.way(member)
         speed_mps = self._live.spec.speed_of(member.spec)
-        around_m = 0.0
-        if way_m is not None:
-            corners = np.vstack([here_m, way_m])
-            around_m = float(np.hypot(*np.diff(corners, axis=0).T).sum() - np.hypot(*(home_m - here_m)))
+        around_s = self._around_s(member, home_m) if around_s is None else around_s
         up_s = member.cruise_depth_m(self._live.spec.limits) / ASCENT_MPS
-        return way_time_s(place_m, home_m[None], speed_mps, self.current_mps) + around_m / speed_mps + up_s
+        return way_time_s(place_m, home_m[None], speed_mps, self.current_mps) + around_s + up_s
+
+    def _around_s(self, member: Member, home_m: FloatArray) -> float:
+        """Return how much longer than straight a vehicle's way home takes from where it is."""
+        here_m, way_m = member.place_m(self._live.frame), self.way(member)
+        if way_m is None:
+            return 0.0
+        corners = np.vstack([here_m, way_m])
+        around_m = float(np.hypot(*np.diff(corners, axis=0).T).sum() - np.hypot(*(home_m - here_m)))
+        return around_m / self._live.spec.speed_of(member.spec)

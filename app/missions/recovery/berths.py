@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -54,6 +55,7 @@ def room_of_m(vehicle: VehicleSpec, spec: MissionSpec) -> float:
     return max(HOME_RADIUS_M, spec.arrival_radius_m, vehicle.turn_radius_m or 0.0)
 
 
+@lru_cache(maxsize=128)
 def _places(count: int) -> FloatArray:
     """Return the places of a triangular grid of spacing 1 about the middle of a triangle, (count, 2), nearest first."""
     reach = math.ceil(math.sqrt(count)) + 2
@@ -61,7 +63,9 @@ def _places(count: int) -> FloatArray:
     grid = np.column_stack([a + 0.5 * b - 0.5, math.sqrt(0.75) * b - math.sqrt(1.0 / 12.0)])
     # Rounded: places that are as far as others keep their order on every machine.
     away, course = np.round(np.hypot(*grid.T), 9), np.round(np.arctan2(*grid.T) % (2 * math.pi), 9)
-    return np.asarray(grid[np.lexsort([course, away])[:count]], dtype=np.float64)
+    places = np.asarray(grid[np.lexsort([course, away])[:count]], dtype=np.float64)
+    places.flags.writeable = False
+    return places
 
 
 def farthest_m(spec: MissionSpec, slots: Sequence[int]) -> float:
