@@ -100,7 +100,7 @@ def test_missions_follow_from_their_seed() -> None:
     assert [drawn(seed, still=False)[1].consumption_factor for seed in range(5)] == [1.0, 1.0, 1.0, 1.0, 1.3]
 
 
-def test_missions_go_the_same_way_whenever_they_are_flown_though_links_are_lost(
+def test_missions_go_the_same_way_whenever_they_are_flown_with_lost_links(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(home, "WITHIN_REACH_S", (15.0, 40.0))
