@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 from imc_bridge.control.control import Phase
 from imc_bridge.control.controls import Crew
+from imc_bridge.control.layers import ALONE, DepthLayer
 from imc_bridge.control.way_home import MOST_PLACES, guarded
 from imc_bridge.events import (
     BridgeEvent,
@@ -251,11 +252,12 @@ class Bridge:
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
         return node
 
-    async def keep_way_home(self, vehicle: str, way: Sequence[Waypoint]) -> None:
+    async def keep_way_home(self, vehicle: str, way: Sequence[Waypoint], layer: DepthLayer = ALONE) -> None:
         """Store a way home on board, in place of the former one; return when the vehicle confirms it.
 
         The vehicle's own supervisor starts it when no console was heard for minutes after a plan that failed. It is
-        armed while the vehicle is ours or lost: a stop disarms it, engaging the vehicle arms it again.
+        armed while the vehicle is ours or lost: a stop disarms it, engaging the vehicle arms it again. Where the bottom
+        leaves less room than the way asks for its depth follows from ``layer``.
 
         Raises
         ------
@@ -265,7 +267,7 @@ class Bridge:
         node = self._commanded(vehicle)
         if not 0 < len(way) <= MOST_PLACES:
             raise RefusedError(vehicle, f"its way home has {len(way)} places", f"Give it 1 to {MOST_PLACES}")
-        self._crew.way_home_of(node).keep(guarded(way, self._crew.of(node).guard, node, self._now()))
+        self._crew.way_home_of(node).keep(guarded(way, self._crew.of(node).guard, node, self._now(), layer))
         await self._confirmed(node)
 
     async def drop_way_home(self, vehicle: str) -> None:

@@ -2,7 +2,9 @@
 
 Areas of 100 to 300 m, two or three vehicles with 20 to 60 minutes of endurance each, a recovery point inside or outside
 the area, at times a keep-out zone, currents to 0.5 m/s, in every fifth mission batteries that empty 30 % faster than
-told, in every third one that joins later. The missions' length is no limit: energy is.
+told, in every third one that joins later, in every other one vehicles that are out of reach at times. The missions'
+length is no limit: energy is. Time is simulated, of the service, too: it goes on only when nobody has anything left to
+do, so that a slow or busy machine changes nothing but how long it takes.
 """
 
 import asyncio
@@ -11,6 +13,7 @@ import logging
 import math
 import statistics
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,6 +21,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from app.missions.fleet.links.sim import SimFleetLink
+    from app.missions.live.mission import LiveMission
+    from app.missions.service import MissionService
     from app.missions.settings import SimulationSettings
     from app.missions.spec.mission import MissionSpec, VehicleSpec
 
@@ -29,6 +37,18 @@ ORIGIN = (41.1850, -8.7050)
 SPEED_MPS = 1.3
 WORSE = 1.3
 JOINER = "late"
+
+WITHIN_REACH_S, OUT_OF_REACH_S = (240.0, 1200.0), (10.0, 180.0)
+"""How long a vehicle can be heard, and then cannot, by its clock: drawn evenly."""
+
+LONGEST_S = 4 * 3600.0
+"""A mission that is not over after so long of its vehicles' time has failed."""
+
+START_S = 1.7e9
+"""Unix time at which missions begin."""
+
+LEAST_SURVEY_PCT = 90.0
+"""In still water so much of the energy that ways there and home do not take is to be used for the survey (median)."""
 
 
 def drawn(seed: int, *, still: bool) -> "tuple[MissionSpec, SimulationSettings, VehicleSpec | None]":
@@ -79,21 +99,42 @@ def drawn(seed: int, *, still: bool) -> "tuple[MissionSpec, SimulationSettings, 
     return spec, sea, VehicleSpec.model_validate(late) if seed % 3 == 2 else None
 
 
-async def fly(seed: int, time_scale: float, migrating: asyncio.Lock, *, still: bool) -> dict[str, Any]:
-    """Fly one mission to its end; what became of its vehicles. One database is made at a time."""
-    from app.missions.operations.history import events_after
-    from app.missions.running.mission_views import mission_view
+def fly(seed: int, time_scale: float, *, still: bool) -> dict[str, Any]:
+    """Fly the mission of a seed to its end, in a simulated time of its own; what became of its vehicles."""
+    return fly_mission(*drawn(seed, still=still), seed, time_scale)
+
+
+def fly_mission(
+    spec: "MissionSpec", sea: "SimulationSettings", late: "VehicleSpec | None", seed: int, time_scale: float
+) -> dict[str, Any]:
+    """Fly a mission to its end, in a simulated time of its own; of an odd seed links are lost."""
+    from app.missions import clock
+    from simulator.event_loop import BEGIN_S, SimulatedTimeLoop
+
+    with asyncio.Runner(loop_factory=SimulatedTimeLoop) as runner:
+        loop = runner.get_loop()
+        with clock.told_by(lambda: START_S + loop.time() - BEGIN_S):
+            found = runner.run(_served(spec, sea, late, seed, time_scale))
+    told = {
+        "seed": seed,
+        "current_mps": round(math.hypot(*sea.current_mps), 2),
+        "consumption_factor": sea.consumption_factor,
+    } | found
+    return told | {"wrong": wrong_with(told)}
+
+
+async def _served(
+    spec: "MissionSpec", sea: "SimulationSettings", late: "VehicleSpec | None", seed: int, time_scale: float
+) -> dict[str, Any]:
+    """Fly a mission with a service of its own."""
     from app.missions.service import MissionService
     from app.missions.settings import ImcSettings, ServiceSettings
-    from app.missions.states import ENDED, Action
     from app.storage.database import Database
     from app.storage.prepare import prepare_database
 
-    spec, sea, late = drawn(seed, still=still)
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite+aiosqlite:///{Path(folder) / 'mission.db'}"
-        async with migrating:
-            await prepare_database(url, may_upgrade=True)
+        await prepare_database(url, may_upgrade=True)
         database = Database(url)
         settings = ServiceSettings(
             database_url=url, imc=ImcSettings(enabled=False), time_scale=time_scale, simulation=sea
@@ -101,98 +142,171 @@ async def fly(seed: int, time_scale: float, migrating: asyncio.Lock, *, still: b
         service = MissionService(settings, database)
         await service.startup()
         try:
-            identity = (await service.create(spec)).id
-            live = await service.get(identity)
-            await service.act(live, Action.START, actor="evaluation")
-            while live.header.state not in ENDED:
-                if late is not None and live.header.step >= 5:
-                    await service.team_changes.join(live, late, "evaluation")
-                    late = None
-                await asyncio.sleep(0.2)
-            view = mission_view(live)
-            lines = await events_after(live, 0, 100_000)
+            return await _flown(service, spec, late, seed, time_scale)
         finally:
             await service.shutdown()
             await database.close()
-    found = {}
-    for vehicle in view.vehicles:
-        own = [line for line in lines if line.data.get("vehicle") == vehicle.name]
-        turned = max((line for line in own if "goes home" in line.message), key=lambda line: line.time, default=None)
-        arrival = max((line for line in own if "is home" in line.message), key=lambda line: line.time, default=None)
-        share = None
-        if turned is not None and arrival is not None:
-            left_pct = turned.data["energy_left_pct"]
-            share = round(100 * (100.0 - left_pct) / (100.0 - (left_pct - arrival.data["energy_left_pct"])), 1)
-        found[vehicle.name] = {
-            "phase": str(vehicle.phase),
-            "from_point_m": None if arrival is None else arrival.data["from_point_m"],
-            "energy_left_pct": None if arrival is None else arrival.data["energy_left_pct"],
-            "surveyed_pct": share,
-            "why": vehicle.withdrawn,
-        }
+
+
+async def _flown(
+    service: "MissionService", spec: "MissionSpec", late: "VehicleSpec | None", seed: int, time_scale: float
+) -> dict[str, Any]:
+    """Fly a mission and watch it."""
+    import numpy as np
+
+    from app.commands.home_watch import Watch
+    from app.missions.fleet.links.sim import SimFleetLink
+    from app.missions.spec.mission import VehicleKind
+    from app.missions.states import ENDED, Action
+
+    link = service.hub.link(VehicleKind.SIM)
+    if not isinstance(link, SimFleetLink):
+        raise TypeError("the service simulates no vehicles")
+    live = await service.get((await service.create(spec)).id)
+    await service.act(live, Action.START, actor="evaluation")
+    watch, losses = Watch(live, link), [0]
+    beside = [asyncio.create_task(watch.keep())]
+    if seed % 2 == 1:
+        rng = np.random.default_rng([seed, 1])
+        beside.append(asyncio.create_task(_lose_links(live, link, rng, time_scale, losses)))
+    loop = asyncio.get_running_loop()
+    begun_s = loop.time()
+    while live.header.state not in ENDED and (loop.time() - begun_s) * time_scale < LONGEST_S:
+        if late is not None and live.header.step >= 5:
+            await service.team_changes.join(live, late, "evaluation")
+            late = None
+        await asyncio.sleep(0.2)
+    watch.look()
+    for task in beside:
+        task.cancel()
+    await asyncio.gather(*beside, return_exceptions=True)
     return {
-        "seed": seed,
-        "state": str(view.state),
-        "current_mps": round(math.hypot(*sea.current_mps), 2),
-        "consumption_factor": sea.consumption_factor,
-        "zones_entered": sum(line.kind == "boundary" and bool(line.data.get("zone")) for line in lines),
-        "too_close": sum(line.data.get("failsafe") == "separation_lost" for line in lines),
-        "vehicles": found,
+        "state": str(live.header.state),
+        "minutes": round((loop.time() - begun_s) * time_scale / 60.0, 1),
+        "links_lost": losses[0],
+        "zones_entered": len(watch.in_zones),
+        "too_close": len(watch.too_close),
+        "touched": len(watch.touched),
+        "touched_before": len(watch.touched_before),
+        "closest_m": round(watch.closest_m, 1) if math.isfinite(watch.closest_m) else None,
+        "vehicles": watch.found(),
     }
 
 
-async def fly_all(
-    seeds: Sequence[int], time_scale: float, at_once: int, told: Callable[[dict[str, Any]], None], *, still: bool
+async def _lose_links(
+    live: "LiveMission", link: "SimFleetLink", rng: "np.random.Generator", time_scale: float, losses: list[int]
+) -> None:
+    """Take vehicles out of reach at times, each by itself, until cancelled."""
+    due: dict[str, tuple[float, bool]] = {}
+    loop = asyncio.get_running_loop()
+    while True:
+        await asyncio.sleep(1.0 / time_scale)
+        now_s = loop.time() * time_scale
+        for member in live.team:
+            at_s, silent = due.setdefault(member.name, (now_s + rng.uniform(*WITHIN_REACH_S), False))
+            if now_s < at_s:
+                continue
+            if silent:
+                link.reach(member.name)
+            elif not member.is_home:
+                link.silence(member.name)
+                losses[0] += 1
+            spans = WITHIN_REACH_S if silent else OUT_OF_REACH_S
+            due[member.name] = now_s + rng.uniform(*spans), not silent
+
+
+def wrong_with(mission: dict[str, Any]) -> list[str]:
+    """Return in words what is not as it has to be after a mission."""
+    wrong = [] if mission["state"] == "finished" else [f"the mission is {mission['state']}"]
+    for name, vehicle in mission["vehicles"].items():
+        if vehicle["from_point_m"] is None:
+            wrong.append(f"{name} is not home")
+        elif vehicle["from_point_m"] > NEAR_M:
+            wrong.append(f"{name} is {vehicle['from_point_m']:g} m from its recovery point")
+        elif not vehicle["energy_left_pct"]:
+            wrong.append(f"{name} has no energy left")
+    for key, words in (
+        ("zones_entered", "in a keep-out zone"),
+        ("too_close", "too close to each other on the way home"),
+        ("touched", "touched each other on the way home"),
+    ):
+        if mission[key]:
+            wrong.append(f"{words}: {mission[key]}")
+    return wrong
+
+
+def fly_all(
+    seeds: Sequence[int],
+    time_scale: float,
+    told: Callable[[dict[str, Any]], None],
+    *,
+    still: bool,
+    most_s: float = math.inf,
 ) -> dict[str, Any]:
-    """Fly a mission for every seed, some at once; what became of all their vehicles.
+    """Fly a mission for every seed, each in its own simulated time; what became of all their vehicles.
 
-    ``told`` gets what became of each mission when it has ended.
+    ``told`` gets what became of each mission when it has ended. After ``most_s`` seconds of processor no other one is
+    begun.
     """
-    room, migrating = asyncio.Semaphore(at_once), asyncio.Lock()
     done: list[dict[str, Any]] = []
+    begun_s = time.process_time()
+    for seed in seeds:
+        if done and time.process_time() - begun_s >= most_s:
+            break
+        done.append(fly(seed, time_scale, still=still))
+        told(done[-1])
+    return summary(done, still=still)
 
-    async def one(seed: int) -> None:
-        async with room:
-            done.append(await fly(seed, time_scale, migrating, still=still))
-            told(done[-1])
 
-    await asyncio.gather(*(one(seed) for seed in seeds))
-    return summary(done)
-
-
-def summary(missions: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return what became of the vehicles of all missions together."""
+def summary(missions: Sequence[dict[str, Any]], *, still: bool) -> dict[str, Any]:
+    """Return what became of the vehicles of all missions together, and in words what is not as it has to be."""
     vehicles = [vehicle for mission in missions for vehicle in mission["vehicles"].values()]
     home = [v for v in vehicles if v["from_point_m"] is not None and v["from_point_m"] <= NEAR_M]
     shares = [vehicle["surveyed_pct"] for vehicle in vehicles if vehicle["surveyed_pct"] is not None]
+    away_m = [v["from_point_m"] for v in vehicles if v["from_point_m"] is not None]
+    left_pct = [v["energy_left_pct"] or 0.0 for v in vehicles]
+    wrong = [f"seed {mission['seed']}: {words}" for mission in missions for words in mission["wrong"]]
+    share_pct = round(statistics.median(shares), 1) if shares else None
+    if still and (share_pct is None or share_pct < LEAST_SURVEY_PCT):
+        wrong.append(f"survey_share_pct is {share_pct}, at least {LEAST_SURVEY_PCT:g} is asked for in still water")
+    closest_m = [mission["closest_m"] for mission in missions if mission["closest_m"] is not None]
     return {
         "missions": len(missions),
         "vehicles": len(vehicles),
-        "home_pct": round(100.0 * len(home) / len(vehicles), 2),
-        "worst_m": max((v["from_point_m"] for v in vehicles if v["from_point_m"] is not None), default=None),
-        "least_energy_pct": min((v["energy_left_pct"] or 0.0 for v in vehicles), default=None),
-        "survey_share_pct": round(statistics.median(shares), 1) if shares else None,
+        "home_pct": round(100.0 * len(home) / len(vehicles), 2) if vehicles else 0.0,
+        "median_m": round(statistics.median(away_m), 1) if away_m else None,
+        "worst_m": max(away_m, default=None),
+        "median_energy_pct": round(statistics.median(left_pct), 1) if left_pct else None,
+        "least_energy_pct": min(left_pct, default=None),
+        "survey_share_pct": share_pct,
         "least_survey_share_pct": min(shares, default=None),
+        "links_lost": sum(mission["links_lost"] for mission in missions),
         "zones_entered": sum(mission["zones_entered"] for mission in missions),
         "too_close": sum(mission["too_close"] for mission in missions),
+        "touched": sum(mission["touched"] for mission in missions),
+        "touched_before": sum(mission["touched_before"] for mission in missions),
+        "closest_m": min(closest_m, default=None),
+        "wrong": wrong,
     }
 
 
 def home(
     missions: Annotated[int, typer.Option(min=1, max=100_000, help="How many.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first; the others have the next ones.")] = 0,
-    at_once: Annotated[int, typer.Option(min=1, max=64, help="Missions that are flown at the same time.")] = 2,
     time_scale: Annotated[
-        float, typer.Option(min=0.1, max=200.0, help="How much faster than wall time the vehicles live.")
+        float,
+        typer.Option(min=0.1, max=200.0, help="Vehicle seconds per second of the service's own; both simulated."),
     ] = 20.0,
     still: Annotated[bool, typer.Option("--still", help="No current.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object, nothing else, to standard output.")
     ] = False,
 ) -> None:
-    """Fly missions of the service with simulated vehicles until all are home; exit code 1 when one is not.
+    """Fly missions of the service with simulated vehicles, in simulated time, until all are home.
 
-    survey_share_pct: of the energy that the way home did not need, which part was used before turning back (median).
+    Exit code 1 when a vehicle is not home with energy left, was in a zone, or came too close to another one on the way,
+    and in still water when too little was surveyed: `wrong` says which. survey_share_pct: of the energy that ways
+    there and home did not need, which part was used before turning back (median).
     """
     from app.api import logs
 
@@ -204,7 +318,7 @@ def home(
         if not as_json:
             typer.echo(json.dumps(mission))
 
-    result = asyncio.run(fly_all(seeds, time_scale, at_once, told, still=still))
+    result = fly_all(seeds, time_scale, told, still=still)
     typer.echo(json.dumps(result, indent=None if as_json else 2))
-    if result["home_pct"] < 100.0:
+    if result["wrong"]:
         raise typer.Exit(1)

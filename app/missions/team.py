@@ -128,6 +128,8 @@ class Member:
     """Where its order leads in the mission's frame, (2,): east, north."""
     status: WaypointStatus | None = None
     reason: str = ""
+    _placed: tuple[Position, LocalFrame, tuple[float, float]] | None = field(default=None, repr=False, compare=False)
+    """Its last reported position, and where that is in a frame: asked for again and again."""
     surfacing: bool = False
     """Whether its waypoint brings it up for a fix."""
     submerged_s: float = 0.0
@@ -256,8 +258,10 @@ class Member:
         if self.report is None:
             raise ValueError(f"{self.name} has not reported a position yet")
         position = self.report.position
-        east, north = frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))
-        return np.array([float(east), float(north)])
+        if self._placed is None or self._placed[0] is not position or self._placed[1] is not frame:
+            east, north = frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))
+            self._placed = position, frame, (float(east), float(north))
+        return np.array(self._placed[2])
 
 
 @dataclass

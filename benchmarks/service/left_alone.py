@@ -4,7 +4,7 @@ For each seed the real service, a process of its own, leads two fake DUNE nodes 
 run ``Supervisors/AUV/LostComms``; it is killed (SIGKILL) at a moment drawn by the seed and not started again. A
 vehicle is home when its stored plan has brought it within 25 m of its recovery point and to the surface. Printed is
 one JSON object for each kill and one for all; ``--write`` puts that into a page. Exit code 1 when a vehicle is not
-home, a keep-out zone was entered, or two touched.
+home, a keep-out zone was entered, or two were closer than the mission keeps them apart.
 """
 
 import argparse
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     title = f"The service is killed and does not return, {'in a current' if options.current else 'in still water'}"
     write_section(options.write, PAGE, title, result, seeds=options.seeds)
     everybody = result["vehicles_home"] == result["vehicles"]
-    return 0 if everybody and not result["zones_entered"] and not result["collided"] else 1
+    return 0 if everybody and not result["zones_entered"] and not result["too_close"] else 1
 
 
 async def play(options: argparse.Namespace) -> list[dict[str, Any]]:
@@ -69,12 +69,14 @@ def summary(kills: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "vehicles": len(NAMES) * len(kills),
         "vehicles_home": sum(kill["home"] for kill in kills),
         "ways_on_board_when_killed": sum(kill["kept_on_board"] for kill in kills),
+        "home_before": sum(kill["home_before"] for kill in kills),
         "farthest_when_killed_m": max(m for kill in kills for m in kill["from_home_when_killed_m"]),
         "worst_from_point_m": max(m for kill in kills for m in kill["from_point_m"]),
         "latest_home_after_s": max(times, default=None),
         "least_energy_pct": min(kill["least_energy_pct"] for kill in kills),
         "zones_entered": sum(kill["zones_entered"] for kill in kills),
         "closest_m": min(kill["closest_m"] for kill in kills),
+        "too_close": sum(kill["too_close"] for kill in kills),
         "collided": sum(kill["collided"] for kill in kills),
     }
 

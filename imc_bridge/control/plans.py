@@ -44,6 +44,8 @@ SHALLOW_M = 0.5
 """A leg this close to the surface needs neither a descent nor an ascent."""
 STATION_RADIUS_M = 15.0
 """Within this distance of its waypoint a vehicle floats up without its motor."""
+HOME_RADIUS_M = 10.0
+"""Within this distance of its place a vehicle waits at home: the least that a LAUV's StationKeeping takes."""
 SURFACE_WAIT_S = 4
 """How long a vehicle that knows itself at the surface waits there before its plan is over: radio needs a moment."""
 
@@ -141,12 +143,12 @@ def _elevator(waypoint: Waypoint, depth_m: float) -> Message:
     return elevator
 
 
-def station_maneuver(waypoint: Waypoint, depth_m: float) -> Message:
+def station_maneuver(waypoint: Waypoint, depth_m: float, radius_m: float = STATION_RADIUS_M) -> Message:
     """Float up at the waypoint from a depth; without one, stay there at the surface for good."""
     station = imcpy.StationKeeping()
     station.lat, station.lon = math.radians(waypoint.lat_deg), math.radians(waypoint.lon_deg)
     station.z, station.z_units = 0.0, imcpy.ZUnits(Z_DEPTH)
-    station.radius = STATION_RADIUS_M
+    station.radius = radius_m
     station.duration = math.ceil(depth_m / CLIMB_MPS)
     station.speed = waypoint.speed_mps
     station.speed_units = imcpy.SpeedUnits(SPEED_METERS_PS)

@@ -21,8 +21,9 @@ import imcpy
 
 from imc_bridge.control.control import Refusal
 from imc_bridge.control.guard import FARTHEST_M, AltitudeGuard
+from imc_bridge.control.layers import ALONE, DepthLayer
 from imc_bridge.control.places import Place, distance_m
-from imc_bridge.control.plans import goto_maneuver, goto_plan, station_maneuver
+from imc_bridge.control.plans import HOME_RADIUS_M, goto_maneuver, goto_plan, station_maneuver
 from imc_bridge.events import NodeState, Waypoint
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
@@ -226,23 +227,28 @@ def home_plan(plan_id: str, prefix: str, way: Sequence[Waypoint]) -> Message:
     Its maneuvers' names begin with ``prefix``, by which a vehicle that executes it shows whose plan it is.
     """
     steps = [(f"{prefix} {k}", goto_maneuver(place, place.depth_m)) for k, place in enumerate(way, 1)]
-    return goto_plan(plan_id, [*steps, (f"{prefix} end", station_maneuver(way[-1], 0.0))])
+    return goto_plan(plan_id, [*steps, (f"{prefix} end", station_maneuver(way[-1], 0.0, HOME_RADIUS_M))])
 
 
-def guarded(way: Sequence[Waypoint], guard: AltitudeGuard, node: Node, now: float) -> list[Waypoint]:
-    """The same way at depths that the bottom on it allows, as far as it is known, from where the vehicle is now."""
+def guarded(
+    way: Sequence[Waypoint], guard: AltitudeGuard, node: Node, now: float, layer: DepthLayer = ALONE
+) -> list[Waypoint]:
+    """The same way at depths that the bottom on it allows, as far as it is known, from where the vehicle is now.
+
+    Others go home at other depths: ``layer`` says which is this vehicle's where the bottom leaves less than asked for.
+    """
     time_s = node.clock.time_s or 0.0
     first = way[0]
     here = (first.lat_deg, first.lon_deg) if node.report is None else (node.report.lat_deg, node.report.lon_deg)
     safe = []
     for place in way:
-        depth = place.depth_m
+        allowed = max(place.depth_m, layer.deepest_m if math.isfinite(layer.deepest_m) else 0.0)
         for start, end in _pieces(here, (place.lat_deg, place.lon_deg)):
             limit = guard.limit(
-                depth, place.min_altitude_m, time_s, *start, now=now, towards=(end,), mapped=place.bottom
+                allowed, place.min_altitude_m, time_s, *start, now=now, towards=(end,), mapped=place.bottom
             )
-            depth = limit.depth_m
-        safe.append(replace(place, depth_m=depth))
+            allowed = limit.depth_m
+        safe.append(replace(place, depth_m=min(place.depth_m, layer.depth_m(allowed))))
         here = (place.lat_deg, place.lon_deg)
     return safe
 

@@ -1,31 +1,95 @@
-"""What ``bathyfleet evaluate home`` says of missions that were flown."""
+"""What ``bathyfleet evaluate home`` flies, and what it says of missions that were flown."""
 
 from typing import Any
 
-from app.commands.home import drawn, summary
+import pytest
+
+from app.commands import home
+from app.commands.home import drawn, fly_mission, summary, wrong_with
+from app.commands.home_watch import Seen
+from app.missions.settings import SimulationSettings
+from tests.support.missions.harbour import sim_spec
+from tests.support.missions.specs import lon_lat
 
 
 def vehicle(from_point_m: float | None, energy_left_pct: float | None, surveyed_pct: float | None) -> dict[str, Any]:
     return {"from_point_m": from_point_m, "energy_left_pct": energy_left_pct, "surveyed_pct": surveyed_pct}
 
 
-def mission(*vehicles: dict[str, Any]) -> dict[str, Any]:
-    return {"vehicles": {str(k): vehicle for k, vehicle in enumerate(vehicles)}, "zones_entered": 1, "too_close": 2}
+def mission(*vehicles: dict[str, Any], **other: Any) -> dict[str, Any]:
+    flown = {
+        "seed": 3,
+        "state": "finished",
+        "vehicles": {f"v{k}": vehicle for k, vehicle in enumerate(vehicles)},
+        "links_lost": 1,
+        "zones_entered": 0,
+        "too_close": 0,
+        "touched": 0,
+        "touched_before": 1,
+        "closest_m": 7.0,
+    } | other
+    return flown | {"wrong": wrong_with(flown)}
+
+
+GOOD = vehicle(4.0, 12.0, 95.0)
 
 
 def test_who_is_far_off_or_never_arrived_is_not_home() -> None:
-    flown = [mission(vehicle(4.0, 12.0, 90.0), vehicle(25.1, 3.0, 96.0)), mission(vehicle(None, None, None))]
-    assert summary(flown) == {
+    flown = [
+        mission(GOOD, vehicle(25.1, 3.0, 96.0), closest_m=6.0),
+        mission(vehicle(None, None, None), state="running", closest_m=None),
+    ]
+    assert summary(flown, still=False) == {
         "missions": 2,
         "vehicles": 3,
         "home_pct": 33.33,
+        "median_m": 14.6,
         "worst_m": 25.1,
+        "median_energy_pct": 3.0,
         "least_energy_pct": 0.0,
-        "survey_share_pct": 93.0,
-        "least_survey_share_pct": 90.0,
-        "zones_entered": 2,
-        "too_close": 4,
+        "survey_share_pct": 95.5,
+        "least_survey_share_pct": 95.0,
+        "links_lost": 2,
+        "zones_entered": 0,
+        "too_close": 0,
+        "touched": 0,
+        "touched_before": 2,
+        "closest_m": 6.0,
+        "wrong": [
+            "seed 3: v1 is 25.1 m from its recovery point",
+            "seed 3: the mission is running",
+            "seed 3: v0 is not home",
+        ],
     }
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, None),
+        ({"zones_entered": 1}, "in a keep-out zone: 1"),
+        ({"too_close": 2}, "too close to each other on the way home: 2"),
+        ({"touched": 1}, "touched each other on the way home: 1"),
+        ({"vehicles": {"a": vehicle(1.0, 0.0, 90.0)}}, "a has no energy left"),
+    ],
+)
+def test_everything_that_coming_home_asks_for_is_checked(changes: dict[str, Any], words: str | None) -> None:
+    flown = mission(GOOD) | changes
+    assert wrong_with(flown) == ([] if words is None else [words])
+
+
+def test_in_still_water_most_of_the_energy_has_to_be_used_for_the_survey() -> None:
+    flown = [mission(vehicle(4.0, 12.0, 80.0))]
+    assert summary(flown, still=False)["wrong"] == []
+    assert summary(flown, still=True)["wrong"] == ["survey_share_pct is 80.0, at least 90 is asked for in still water"]
+    assert summary([mission(GOOD)], still=True)["wrong"] == []
+
+
+def test_ways_there_and_home_do_not_count_as_survey_nor_against_it() -> None:
+    seen = Seen(surveys_at_pct=95.0, turned_at_pct=25.0, home_at_pct=10.0, why="its energy lasts no longer")
+    assert seen.surveyed_pct == pytest.approx(100.0 * 70.0 / 80.0)
+    seen.why = "called home"
+    assert seen.surveyed_pct is None
 
 
 def test_missions_follow_from_their_seed() -> None:
@@ -34,3 +98,21 @@ def test_missions_follow_from_their_seed() -> None:
     _, sea, _ = drawn(7, still=True)
     assert sea.current_mps == (0.0, 0.0)
     assert [drawn(seed, still=False)[1].consumption_factor for seed in range(5)] == [1.0, 1.0, 1.0, 1.0, 1.3]
+
+
+def test_missions_go_the_same_way_whenever_they_are_flown_with_lost_links(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(home, "WITHIN_REACH_S", (15.0, 40.0))
+    monkeypatch.setattr(home, "OUT_OF_REACH_S", (5.0, 30.0))
+    spec = sim_spec("a", "b", side_m=60.0, steps=8, recovery={"point": lon_lat(30.0, -40.0)})
+    flown = [fly_mission(spec, SimulationSettings(current_mps=(0.1, 0.0)), None, 1, 20.0) for _ in range(2)]
+    assert flown[0]["wrong"] == [], flown[0]
+    assert flown[0]["links_lost"] > 0
+    assert flown[0]["minutes"] > 2.0
+    # What two threads finish at the same moment comes in either order: metres and figures after the point may differ.
+    once, again = flown
+    assert (once["minutes"], once["links_lost"]) == (again["minutes"], again["links_lost"])
+    for name, vehicle in once["vehicles"].items():
+        assert vehicle["from_point_m"] == pytest.approx(again["vehicles"][name]["from_point_m"], abs=5.0)
+        assert vehicle["energy_left_pct"] == pytest.approx(again["vehicles"][name]["energy_left_pct"], abs=0.2)

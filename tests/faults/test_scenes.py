@@ -66,7 +66,7 @@ async def test_neither_of_two_services_takes_the_others_vehicle(tmp_path: Path) 
 async def test_vehicles_that_are_left_alone_come_home(tmp_path: Path) -> None:
     found = await left_alone(tmp_path, seed=1, speed=SPEED, timeout_s=60.0)
     assert found["home"] == 2, found
-    assert (found["zones_entered"], found["collided"]) == (0, 0), found
+    assert (found["zones_entered"], found["too_close"]) == (0, 0), found
 
 
 @pytest.mark.skipif(not can_be_made(), reason="network namespaces need root and the program ip")

@@ -19,6 +19,7 @@ from app.missions.fleet.interface import (
     WaypointOrder,
 )
 from app.missions.spec.mission import VehicleKind
+from imc_bridge.control.layers import ALONE, DepthLayer
 
 VehicleKey = tuple[VehicleKind, str]
 
@@ -55,6 +56,10 @@ class FleetHub:
     def kinds(self) -> tuple[VehicleKind, ...]:
         """The kinds of vehicles that can be reached."""
         return tuple(self._links)
+
+    def link(self, kind: VehicleKind) -> FleetLink | None:
+        """Return the link that reaches vehicles of a kind; None where there is none."""
+        return self._links.get(kind)
 
     def capabilities(self, kind: VehicleKind) -> LinkCapabilities:
         """Return what vehicles of a kind can do."""
@@ -128,9 +133,11 @@ class FleetHub:
         """Send a waypoint. Raises VehicleRefusedError."""
         await self._link(key).order(order)
 
-    async def keep_way_home(self, key: VehicleKey, way: Sequence[Position], speed_mps: float) -> None:
+    async def keep_way_home(
+        self, key: VehicleKey, way: Sequence[Position], speed_mps: float, layer: DepthLayer = ALONE
+    ) -> None:
         """Store a way home on board a vehicle. Raises VehicleRefusedError."""
-        await self._link(key).keep_way_home(key[1], way, speed_mps)
+        await self._link(key).keep_way_home(key[1], way, speed_mps, layer)
 
     async def drop_way_home(self, key: VehicleKey) -> None:
         """Leave no way home on board a vehicle. Raises VehicleRefusedError."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.missions.spec.mission import MissionSpec, VehicleSpec
+from imc_bridge.control.layers import ALONE, DepthLayer
 from simulator.obstacles import ObstacleWorld
 
 
@@ -414,8 +415,13 @@ class FleetLink(ABC):
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Stop the vehicle; see the class's contract."""
 
-    async def keep_way_home(self, vehicle: str, way: Sequence[Position], speed_mps: float) -> None:
+    async def keep_way_home(
+        self, vehicle: str, way: Sequence[Position], speed_mps: float, layer: DepthLayer = ALONE
+    ) -> None:
         """Store a way home on board in place of the former one; return when the vehicle confirms it.
+
+        Where the link knows of a bottom that leaves less room, or knows none, the way's depth follows from ``layer``:
+        others go home above and below.
 
         It is armed while the vehicle is ours or lost: a stop disarms it, and the next ``engage`` arms it again. Raises
         VehicleRefusedError when it is not confirmed, or when the link's vehicles cannot keep one (``capabilities``).

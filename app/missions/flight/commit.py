@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from shapely import Polygon
@@ -12,12 +13,14 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.motion.turning import disc, turned_over
+from app.mapping.georeference import LocalFrame
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decision import Decision, Leg, turn_radius_m
 from app.missions.live.mission import RISES, LiveMission
-from app.missions.recovery.way_home import berth_m, homeward_ground
+from app.missions.recovery.berths import berth_m, berth_spacing_m
+from app.missions.recovery.way_home import homeward_ground
 from app.missions.spec.mission import Guidance, MissionSpec
 from app.missions.spec.recovery import Recovery
 from app.missions.team import CommittedLeg, Member
@@ -338,16 +341,25 @@ def home_of(member: Member, spec: MissionSpec) -> FloatArray | None:
     recovery = spec.recovery_of(member.spec)
     if recovery is None:
         return None
+    point_m = point_of(recovery, spec)
     # A point of its own is nobody else's.
-    slot = 0 if member.spec.recovery_point is not None else member.slot
-    return berth_m(point_of(recovery, spec), slot, recovery.radius_m, spec.limits.min_separation_m)
+    if member.spec.recovery_point is not None:
+        return point_m
+    sharing = sum(vehicle.recovery_point is None for vehicle in spec.vehicles)
+    return berth_m(point_m, member.slot, sharing, berth_spacing_m(spec))
 
 
 def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
     """Return a recovery point in the mission's frame, (2,)."""
-    lon, lat = recovery.point
-    east, north = spec.frame().to_local(np.array(lat), np.array(lon))
-    return np.array([float(east), float(north)])
+    return np.array(_local(recovery.point, spec.frame()))
+
+
+@lru_cache(maxsize=256)
+def _local(point: tuple[float, float], frame: LocalFrame) -> tuple[float, float]:
+    """Return a point (longitude, latitude) in a frame: asked for again and again."""
+    lon, lat = point
+    east, north = frame.to_local(np.array(lat), np.array(lon))
+    return float(east), float(north)
 
 
 def way_m(ends_m: Sequence[FloatArray], spec: MissionSpec) -> float:

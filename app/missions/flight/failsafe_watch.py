@@ -56,6 +56,8 @@ class FailsafeWatch:
         self._told: dict[str, list[Active]] = {}
         self._ships: dict[str, set[int]] = {}
         """By vehicle: the ships (MMSI) that came too close a moment ago."""
+        self._words_of_ships: list[tuple[str, str]] = []
+        """Vehicles and alarms about ships that are still to be written."""
         self._below_since_s: dict[str, float] = {}
         """Since when vehicles have waited below for ships."""
         self._been_apart: set[frozenset[str]] = set()
@@ -83,14 +85,17 @@ class FailsafeWatch:
             over = member.withdrawal is not None and member.withdrawal.over
             detected = {} if over else self._detected(member) | too_close.get(member.name, {})
             # Who waits at the surface to be taken out of the water is in ships' way, too.
-            detected |= await self._ships_of(member)
-            found = await self._waiting_below(member, now_s, self._judge(member, now_s, detected))
+            detected |= self._ships_of(member)
+            found = self._waiting_below(member, now_s, self._judge(member, now_s, detected))
             member.failsafes = found
             self._act(member, found)
             news.append((member.name, found))
         lost = self._all_lost()
         news.append((TEAM, self._judges.setdefault(TEAM, FailsafeJudge()).judge(lost, now_s)))
         # What is done waits for no line of the log: the database may be slow, or full.
+        words_of_ships, self._words_of_ships = self._words_of_ships, []
+        for name, words in words_of_ships:
+            await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=name)
         for name, found in news:
             await self._tell(name, found)
 
@@ -116,7 +121,7 @@ class FailsafeWatch:
             member.withdrawal = None
             self._live.changed.set()
 
-    async def _ships_of(self, member: Member) -> dict[Failsafe, str]:
+    def _ships_of(self, member: Member) -> dict[Failsafe, str]:
         """Return which ship comes too close to a vehicle; of those that join it is told one by one."""
         begun = self._ships.get(member.name, set())
         found = self._live.ships.encounters(member, begun)
@@ -124,13 +129,10 @@ class FailsafeWatch:
         if begun:
             for one in found:
                 if one.ship.position.mmsi in now - begun:
-                    words = f"{member.name}: {one.words}, too"
-                    await self._live.journal.alarm(
-                        AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=member.name
-                    )
+                    self._words_of_ships.append((member.name, f"{member.name}: {one.words}, too"))
         return {Failsafe.TRAFFIC: found[0].words} if found else {}
 
-    async def _waiting_below(self, member: Member, now_s: float, found: list[Active]) -> list[Active]:
+    def _waiting_below(self, member: Member, now_s: float, found: list[Active]) -> list[Active]:
         """Return what is in force; who is up already, or has waited long for ships, is not kept from going on."""
         held = any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in found)
         if not held:
@@ -144,7 +146,7 @@ class FailsafeWatch:
             if since_s > -math.inf and now_s - since_s > most_s:
                 self._below_since_s[member.name] = -math.inf
                 words = f"{member.name} waited {most_s:.0f} s for ships to pass, and comes up"
-                await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, vehicle=member.name)
+                self._words_of_ships.append((member.name, words))
         waited = self._below_since_s.get(member.name) == -math.inf
         if not waited and not self._live.ships.is_up(member):
             return found

@@ -59,7 +59,8 @@ class OnboardWays:
         spec = self._live.spec
         places = positions(spec, way_m, self._range.depths_m(member, member.place_m(self._live.frame), way_m))
         try:
-            await self._hub.keep_way_home(member.key, places, spec.speed_of(member.spec))
+            layer = self._range.layer(member)
+            await self._hub.keep_way_home(member.key, places, spec.speed_of(member.spec), layer)
         except VehicleRefusedError as error:
             if member.name not in self._told:
                 self._told.add(member.name)
@@ -77,7 +78,10 @@ class OnboardWays:
 
 
 def positions(spec: MissionSpec, way_m: FloatArray, depths_m: list[float]) -> list[Position]:
-    """Return a way's corners, (n, 2), as places: at these depths, the last one at the surface."""
-    lats, lons = spec.frame().to_geographic(way_m[:, 0], way_m[:, 1])
-    depths = [*depths_m[:-1], 0.0]
+    """Return a way's corners, (n, 2), as places: at these depths as far as home, and there at the surface.
+
+    No part of the way leads along the surface, where those wait that are home.
+    """
+    lats, lons = spec.frame().to_geographic(*np.vstack([way_m, way_m[-1:]]).T)
+    depths = [*depths_m, 0.0]
     return [Position(float(lat), float(lon), d) for lat, lon, d in zip(lats, lons, depths, strict=True)]

@@ -1,7 +1,7 @@
 """How far vehicles may go on, so that their energy lasts for the way home from there."""
 
+import asyncio
 import math
-import time
 from itertools import pairwise
 
 import numpy as np
@@ -11,13 +11,14 @@ from app.exploration.core.constraints import Constraints
 from app.missions import safety
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
+from app.missions.recovery.berths import DepthLayer, layer_of
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
 
 LAND_PERIOD_S = 10.0
-"""How often is looked whether the map shows other shallows, seconds of the wall clock."""
+"""How often is looked whether the map shows other shallows, seconds of the event loop's time."""
 
 MOVED_M = 5.0
 """The way home is looked for anew when its vehicle is so far from where that was done last."""
@@ -79,13 +80,21 @@ class RangeLeft:
         return anyhow.way(here_m) if way_m is None else way_m
 
     def depths_m(self, member: Member, here_m: FloatArray, way_m: FloatArray) -> list[float]:
-        """Return how deep a vehicle travels to each corner of a way, (n, 2): less over a shallow bottom."""
-        limits, bottom = self._live.spec.limits, self._committing.bottom
-        wanted_m = min(member.cruise_depth_m(limits), limits.max_depth_m)
+        """Return how deep a vehicle travels to each corner of a way, (n, 2): less over a shallow bottom.
+
+        Each of the team has a depth of its own there, too, since ways home lead to the same place.
+        """
+        limits, bottom, layer = self._live.spec.limits, self._committing.bottom, self.layer(member)
         return [
-            safety.travel_depth_m(a, b, wanted_m, bottom, limits.min_altitude_m)
+            layer.depth_m(safety.travel_depth_m(a, b, layer.deepest_m, bottom, limits.min_altitude_m))
             for a, b in pairwise(np.vstack([here_m, way_m]))
         ]
+
+    def layer(self, member: Member) -> DepthLayer:
+        """Return at which depths a vehicle goes home, apart from the others of its team."""
+        limits = self._live.spec.limits
+        depths_m = {one.name: min(one.cruise_depth_m(limits), limits.max_depth_m) for one in self._live.team}
+        return layer_of(member.name, depths_m, limits.min_vertical_separation_m)
 
     @property
     def _least_m(self) -> float:
@@ -93,7 +102,7 @@ class RangeLeft:
 
     def _look_for_land(self) -> None:
         """Find ways anew where the map shows other shallows than before, not too often."""
-        now_s = time.monotonic()
+        now_s = asyncio.get_running_loop().time()
         if now_s - self._looked_s < LAND_PERIOD_S:
             return
         self._looked_s = now_s
@@ -128,11 +137,12 @@ class RangeLeft:
         home_m, left = home_of(member, self._live.spec), member.energy.left
         if home_m is None or left is None or member.report is None or member.withdrawal is not None:
             return None
+        around_s = self._around_s(member, home_m)
         return turn_back_place(
             member.place_m(self._live.frame),
             member.legs_ahead_m(),
             left.safe_s,
-            lambda place_m: self._needs_from_s(member, place_m, home_m),
+            lambda place_m: self._needs_from_s(member, place_m, home_m, around_s),
             self._live.spec.speed_of(member.spec),
             self.current_mps,
         )
@@ -163,13 +173,20 @@ class RangeLeft:
     def _until_end_s(self, member: Member) -> float:
         return member.way_ahead_m(self._live.frame) / self._live.spec.speed_of(member.spec)
 
-    def _needs_from_s(self, member: Member, place_m: FloatArray, home_m: FloatArray) -> float:
+    def _needs_from_s(
+        self, member: Member, place_m: FloatArray, home_m: FloatArray, around_s: float | None = None
+    ) -> float:
         """Return how long the way home takes from a place, straight, and longer by what it is longer from here."""
-        here_m, way_m = member.place_m(self._live.frame), self.way(member)
         speed_mps = self._live.spec.speed_of(member.spec)
-        around_m = 0.0
-        if way_m is not None:
-            corners = np.vstack([here_m, way_m])
-            around_m = float(np.hypot(*np.diff(corners, axis=0).T).sum() - np.hypot(*(home_m - here_m)))
+        around_s = self._around_s(member, home_m) if around_s is None else around_s
         up_s = member.cruise_depth_m(self._live.spec.limits) / ASCENT_MPS
-        return way_time_s(place_m, home_m[None], speed_mps, self.current_mps) + around_m / speed_mps + up_s
+        return way_time_s(place_m, home_m[None], speed_mps, self.current_mps) + around_s + up_s
+
+    def _around_s(self, member: Member, home_m: FloatArray) -> float:
+        """Return how much longer than straight a vehicle's way home takes from where it is."""
+        here_m, way_m = member.place_m(self._live.frame), self.way(member)
+        if way_m is None:
+            return 0.0
+        corners = np.vstack([here_m, way_m])
+        around_m = float(np.hypot(*np.diff(corners, axis=0).T).sum() - np.hypot(*(home_m - here_m)))
+        return around_m / self._live.spec.speed_of(member.spec)

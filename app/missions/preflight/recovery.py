@@ -8,6 +8,7 @@ import numpy as np
 from app.missions.flight.commit import home_of
 from app.missions.flight.decision import make_constraints
 from app.missions.live.mission import LiveMission
+from app.missions.recovery.berths import berth_spacing_m, farthest_m
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
@@ -28,8 +29,28 @@ def recovery_checks(live: LiveMission) -> Iterator[CheckView]:
             message=f"no recovery point for {', '.join(homeless)}: they stop where they are",
             remedy="Give recovery.point to have them come home",
         )
+    yield from _room(live)
     for member in live.team:
         yield from _way(live, member)
+
+
+def _room(live: LiveMission) -> Iterator[CheckView]:
+    """Say how far about their recovery point vehicles wait where that is farther than the mission says."""
+    recovery = live.spec.recovery
+    slots = [member.slot for member in live.team if member.spec.recovery_point is None]
+    if recovery is None or not slots:
+        return
+    reach_m = farthest_m(live.spec, slots)
+    if len(slots) > 1 and reach_m > recovery.radius_m:
+        apart_m = berth_spacing_m(live.spec)
+        yield CheckView(
+            id="recovery.room",
+            title="Room at the recovery point",
+            status=NOTE,
+            message=f"{len(slots)} vehicles wait up to {reach_m:.0f} m from it, with {apart_m:.0f} m between their "
+            f"places: recovery.radius_m is {recovery.radius_m:g} m",
+            remedy="Look for them there, or give some of them a recovery_point of their own",
+        )
 
 
 def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:

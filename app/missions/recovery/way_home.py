@@ -29,13 +29,8 @@ LAND_MARGIN_M = 5.0
 DETAIL_M = 0.25
 """Corners of the ground are told apart from this distance on."""
 
-BERTH_M = 8.0
-"""Least distance between the places at which vehicles wait to be taken out of the water."""
-
 LEAST_SHARE = 0.05
 """A vehicle that makes good less of its speed against the current does not get home."""
-
-GOLDEN_RAD = math.pi * (3.0 - math.sqrt(5.0))
 
 
 def homeward_ground(constraints: Constraints, home_m: FloatArray) -> Constraints:
@@ -120,20 +115,6 @@ class WaysHome:
     def _sees(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
         lines = shapely.linestrings(np.stack([from_m, to_m], axis=1))
         return np.asarray(shapely.covers(self._roomy, lines), dtype=np.bool_)
-
-
-def berth_m(home_m: FloatArray, slot: int, radius_m: float, separation_m: float) -> FloatArray:
-    """Return where a vehicle waits to be taken out of the water, (2,): each has a place of its own about the point.
-
-    Parameters
-    ----------
-    slot
-        The vehicle's number in its team; the first waits at the point itself, the others on a spiral about it, so close
-        together that they stay within the radius, if need be.
-    """
-    spacing_m = max(BERTH_M, 1.5 * separation_m)
-    distance_m = min(spacing_m * math.sqrt(slot), 0.8 * radius_m)
-    return home_m + distance_m * np.array([math.sin(slot * GOLDEN_RAD), math.cos(slot * GOLDEN_RAD)])
 
 
 def way_time_s(start_m: FloatArray, way_m: FloatArray, speed_mps: float, current_mps: tuple[float, float]) -> float:

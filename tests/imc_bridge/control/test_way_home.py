@@ -6,10 +6,13 @@ from itertools import pairwise
 from typing import Any
 
 import imcpy
+import numpy as np
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, LinkChange, NodeState, RefusedError, Waypoint, WaypointStatus
 from imc_bridge.control.guard import AltitudeGuard
+from imc_bridge.control.layers import DepthLayer
+from imc_bridge.control.plans import HOME_RADIUS_M
 from imc_bridge.control.way_home import guarded, home_plan
 from imc_bridge.nodes.node import Node
 from simulator.dune.node import FakeDune
@@ -57,6 +60,7 @@ def test_the_plan_goes_from_place_to_place_and_stays_at_the_last() -> None:
     assert [math.degrees(goto.lat) for goto in gotos] == pytest.approx([41.185, 41.186, 41.187])
     assert [(goto.z, goto.speed) for goto in gotos] == [(1.5, pytest.approx(1.1))] * 3
     assert (end.z, end.duration, end.lat) == (0.0, 0, gotos[-1].lat)
+    assert end.radius == HOME_RADIUS_M, "others wait beside it"
 
 
 def test_its_depths_are_those_that_the_bottom_allows() -> None:
@@ -73,6 +77,20 @@ def test_its_depths_are_those_that_the_bottom_allows() -> None:
     # And on to where nothing is known.
     places[1] = Waypoint("home", 1, 41.225, -8.705, 9.0, min_altitude_m=3.0)
     assert [place.depth_m for place in guarded(places, guard, node, 0.0)] == [9.0, 2.0]
+
+
+def test_vehicles_of_a_team_go_home_at_depths_apart_where_the_bottom_is_not_known() -> None:
+    guard = AltitudeGuard(20.0, 30.0, unknown_bottom_depth_m=2.0)
+    node = Node(0x101, "a", BridgeSettings(), 0.0)
+    found = []
+    for rank, cruise_m in enumerate(team := (4.0, 6.0, 8.0)):
+        layer = DepthLayer(team, rank, 1.0)
+        places = [Waypoint("home", k, 41.185 + k * 1e-3, -8.705, depth_m) for k, depth_m in enumerate((cruise_m, 0.0))]
+        found.append([place.depth_m for place in guarded(places, guard, node, 0.0, layer)])
+    assert np.diff([first for first, _ in found]) == pytest.approx([2 / 3, 2 / 3])
+    assert [last for _, last in found] == [0.0] * 3
+    assert found[-1][0] == 2.0
+    assert found[0][0] > 0.5, "not at the surface, where others wait"
 
 
 async def test_it_is_stored_replaced_and_removed() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from app.exploration.core.bottom import Bottom
 from app.missions.flight.decision import make_constraints
+from app.missions.flight.onboard_way import positions
 from app.missions.flight.range_left import RangeLeft
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec
@@ -24,3 +25,20 @@ async def test_each_piece_of_a_way_keeps_its_height_above_the_bottom(service: Mi
     way = np.array([[5.0, 95.0], [95.0, 95.0], [95.0, 5.0]])
     member = live.team.members["a"]
     assert range_left.depths_m(member, np.array([5.0, 5.0]), way) == [6.0, 3.0, 6.0]
+
+
+async def test_vehicles_go_home_at_depths_apart_where_the_water_is_too_shallow_for_their_own(
+    service: MissionService,
+) -> None:
+    limits = {"min_depth_m": 6.0, "max_depth_m": 20.0, "min_altitude_m": 1.0, "max_step_m": 20.0}
+    view = await service.create(sim_spec("a", "b", side_m=100.0, limits=limits))
+    live = await service.get(view.id)
+    bottom = Bottom(0.0, 0.0, 10.0, np.full((10, 10), 4.0))
+    range_left = RangeLeft(live, make_constraints(live.spec), cast("Any", SimpleNamespace(bottom=bottom)))
+    here, way = np.array([5.0, 5.0]), np.array([[95.0, 5.0]])
+    depths = {name: range_left.depths_m(live.team.members[name], here, way) for name in ("a", "b")}
+    assert depths == {"a": [2.0], "b": [3.0]}
+    # And on board, too: along the way below, up only at its place.
+    places = positions(live.spec, way, depths["b"])
+    assert [place.depth_m for place in places] == [3.0, 0.0]
+    assert (places[0].lat_deg, places[0].lon_deg) == (places[1].lat_deg, places[1].lon_deg)

@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Point, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.missions.recovery.way_home import CORRIDOR_M, WaysHome, berth_m, homeward_ground, way_time_s
+from app.missions.recovery.way_home import CORRIDOR_M, WaysHome, homeward_ground, way_time_s
 
 SQUARE = np.array([[0.0, 0.0], [200.0, 0.0], [200.0, 200.0], [0.0, 200.0]])
 
@@ -76,15 +76,6 @@ def test_known_shallows_are_gone_around() -> None:
     way = WaysHome(Constraints(SQUARE), home, Bottom(0.0, 0.0, 10.0, depth), least_m=1.5).way(start)
     assert way is not None
     assert not LineString(np.vstack([start, way])).intersects(Polygon(box(0, 80, 150, 120)))
-
-
-def test_berths_lie_apart_and_within_the_radius() -> None:
-    home = np.array([3.0, 4.0])
-    berths = [berth_m(home, slot, 25.0, 5.0) for slot in range(5)]
-    apart = [float(np.hypot(*(a - b))) for i, a in enumerate(berths) for b in berths[:i]]
-    assert min(apart) >= 5.0
-    assert max(float(np.hypot(*(berth - home))) for berth in berths) <= 25.0
-    np.testing.assert_allclose(berths[0], home)
 
 
 @given(course=st.floats(0, 2 * math.pi), current=st.floats(0, 0.9))

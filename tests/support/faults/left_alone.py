@@ -24,8 +24,10 @@ ZONE = box(110.0, 140.0, 170.0, 200.0)
 HOME_M = (150.0, 30.0)
 """The recovery point, outside the area."""
 NEAR_M = 25.0
-TOUCH_M = 2.5
-"""Vehicles of which the centres are closer than one is long touch each other."""
+TOUCH_M, TALL_M = 2.5, 0.8
+"""Vehicles touch each other of which the centres are closer than one is long, and than one is tall that is pitched."""
+SEPARATION_M = 5.0
+"""So far apart the mission keeps them at similar depths."""
 AFLOAT_M = 0.3
 """At most this deep a vehicle is at the surface."""
 START_M = ((100.0, 90.0, 0.0), (180.0, 90.0, 0.0))
@@ -82,24 +84,31 @@ async def left_alone(
 
 async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
     """Kill the service, and watch until all are home or patience ends."""
-    kept = sum("lostcomms" in node.database.plans for node in fleet.nodes)
+    on_board = ["lostcomms" in node.database.plans for node in fleet.nodes]
+    # The service may have led one home before, for example one that a busy machine did not hear for long.
+    there = [not has and _is_up_at_home(node) for has, node in zip(on_board, fleet.nodes, strict=True)]
     await service.kill()
     begun_s, far = fleet.clock.now(), [round(_from_home_m(node), 1) for node in fleet.nodes]
     tracks: list[list[tuple[float, float]]] = [[] for _ in fleet.nodes]
-    closest_m, arrived_s = math.inf, [math.nan] * len(fleet.nodes)
+    closest_m, arrived_s, touched, too_close = math.inf, [math.nan] * len(fleet.nodes), False, False
     while fleet.clock.now() - begun_s < PATIENCE_S and any(map(math.isnan, arrived_s)):
         places = [node.vehicle.true_position for node in fleet.nodes]
         first, second = places
-        apart_m = math.hypot(first.horizontal_distance_m(second.east_m, second.north_m), first.depth_m - second.depth_m)
-        closest_m = min(closest_m, apart_m)
+        aside_m = first.horizontal_distance_m(second.east_m, second.north_m)
+        below_m = abs(first.depth_m - second.depth_m)
+        closest_m = min(closest_m, math.hypot(aside_m, below_m))
+        touched |= aside_m < TOUCH_M and below_m < TALL_M
+        # As the table of failsafes judges it.
+        too_close |= aside_m < SEPARATION_M and below_m < LIMITS["min_vertical_separation_m"] / 2
         for number, (node, place) in enumerate(zip(fleet.nodes, places, strict=True)):
             tracks[number].append((place.east_m, place.north_m))
-            if math.isnan(arrived_s[number]) and _home(node):
+            if math.isnan(arrived_s[number]) and (_came_home(node) or (there[number] and _is_up_at_home(node))):
                 arrived_s[number] = fleet.clock.now() - begun_s
         await asyncio.sleep(0.02)
     levels = [node.vehicle.battery.level_pct for node in fleet.nodes if node.vehicle.battery is not None]
     return {
-        "kept_on_board": kept,
+        "kept_on_board": sum(on_board),
+        "home_before": sum(there),
         "from_home_when_killed_m": far,
         "home": sum(map(math.isfinite, arrived_s)),
         "from_point_m": [round(_from_home_m(node), 1) for node in fleet.nodes],
@@ -107,7 +116,8 @@ async def _killed(service: Service, fleet: DuneFleet) -> dict[str, Any]:
         "least_energy_pct": round(min(levels), 1) if levels else None,
         "zones_entered": sum(LineString(track).intersects(ZONE) for track in tracks if len(track) > 1),
         "closest_m": round(closest_m, 1),
-        "collided": int(closest_m < TOUCH_M),
+        "too_close": int(too_close),
+        "collided": int(touched),
     }
 
 
@@ -115,11 +125,14 @@ def _from_home_m(node: FakeDune) -> float:
     return node.vehicle.true_position.horizontal_distance_m(*HOME_M)
 
 
-def _home(node: FakeDune) -> bool:
+def _came_home(node: FakeDune) -> bool:
     """Whether it came by its plan, is near its point, and at the surface."""
     plan = node.plan.plan_control_state()
-    at_the_end = plan.plan_id == "lostcomms" and str(plan.man_id).endswith(" end")
-    return at_the_end and _from_home_m(node) <= NEAR_M and node.vehicle.true_position.depth_m < AFLOAT_M
+    return plan.plan_id == "lostcomms" and str(plan.man_id).endswith(" end") and _is_up_at_home(node)
+
+
+def _is_up_at_home(node: FakeDune) -> bool:
+    return _from_home_m(node) <= NEAR_M and node.vehicle.true_position.depth_m < AFLOAT_M
 
 
 def _mission() -> dict[str, Any]:
@@ -129,7 +142,7 @@ def _mission() -> dict[str, Any]:
         keep_out=[_geojson(ZONE)],
         recovery={"point": _lon_lat(*HOME_M), "radius_m": NEAR_M},
         steps=500,
-        limits=LIMITS | {"max_step_m": 20.0},
+        limits=LIMITS | {"max_step_m": 20.0, "min_separation_m": SEPARATION_M},
         step_deadline_s=120.0,
         planner={"name": "lawnmower"},
         cell_m=4.0,

@@ -51,6 +51,7 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
+from imc_bridge.control.layers import ALONE, DepthLayer
 from imc_bridge.doctor.diagnosis import drop_words, radio_gap_words
 from imc_bridge.doctor.doctor import Diagnosis, judge
 from imc_bridge.network.consoles import Mark
@@ -186,13 +187,15 @@ class ImcFleetLink(FleetLink):
         result = await self._bridge.stop(vehicle, timeout_s=timeout_s)
         return StopReceipt(result.vehicle, result.acknowledged, result.detail)
 
-    async def keep_way_home(self, vehicle: str, way: Sequence[Position], speed_mps: float) -> None:
+    async def keep_way_home(
+        self, vehicle: str, way: Sequence[Position], speed_mps: float, layer: DepthLayer = ALONE
+    ) -> None:
         """Store a way home in DUNE's plan database, for its LostComms supervisor; raises VehicleRefusedError."""
         places = [
             Waypoint("home", k, place.lat_deg, place.lon_deg, place.depth_m, speed_mps) for k, place in enumerate(way)
         ]
         try:
-            await self._bridge.keep_way_home(vehicle, places)
+            await self._bridge.keep_way_home(vehicle, places, layer)
         except RefusedError as error:
             raise VehicleRefusedError(vehicle, error.reason, error.remedy) from error
 

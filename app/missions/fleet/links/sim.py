@@ -72,6 +72,9 @@ REPORT_PERIOD_S = 0.5
 LAUNCH_MARGIN_M = 2.0
 LAUNCH_SPACING_M = 6.0
 KEPT_TERRAINS = 32
+FORSAKEN_S = 60.0
+"""A vehicle that is out of reach for so long gives its waypoint up, as DUNE does: its motor is off and it comes up."""
+SILENT = "out of reach"
 AGROUND = "ran into an obstacle and lies there"
 SENSORS = {
     Sensor.SINGLE_BEAM: SensorKind.SINGLE,
@@ -148,6 +151,8 @@ class _Swimmer:
         self.ranging = ranging
         self.scanning = scanning
         self.aground = False
+        self.silent_since_s: float | None = None
+        """Since when it is out of reach, by its clock."""
         self.terrain = terrain
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
@@ -346,6 +351,32 @@ class SimFleetLink(FleetLink):
         if fault is not None:
             self._sink(replace(fault, time_s=swimmer.body.time_s, over=True))
 
+    def silence(self, vehicle: str) -> None:
+        """Take a vehicle out of reach: what it tells meanwhile is lost, and it takes no orders."""
+        swimmer = self._swimmers[vehicle]
+        if swimmer.silent_since_s is None and not swimmer.aground:
+            swimmer.silent_since_s = swimmer.body.time_s
+            swimmer.state = LinkState.LOST
+            self._sink(LinkReport(vehicle, LinkState.LOST, SILENT))
+
+    def reach(self, vehicle: str) -> None:
+        """Bring a vehicle back within reach; nothing happens when it is."""
+        swimmer = self._swimmers[vehicle]
+        if swimmer.silent_since_s is not None and not swimmer.aground:
+            swimmer.silent_since_s = None
+            swimmer.state = LinkState.READY
+            self._sink(swimmer.make_report())
+            self._sink(LinkReport(vehicle, LinkState.READY))
+
+    def true_position(self, vehicle: str) -> Position:
+        """Return where a vehicle is, whatever it takes itself to be."""
+        swimmer = self._swimmers[vehicle]
+        return swimmer.position(swimmer.body.true_position)
+
+    def battery_pct(self, vehicle: str) -> float:
+        """Return what a vehicle's battery really holds."""
+        return self._swimmers[vehicle].battery.level_pct
+
     def put_away(self, vehicle: str) -> None:
         """Take a vehicle out of the world; nothing happens when it is not there."""
         self._swimmers.pop(vehicle, None)
@@ -373,8 +404,8 @@ class SimFleetLink(FleetLink):
                 name,
                 self.kind,
                 s.state,
-                AGROUND if s.aground else "",
-                age_s=0.0,
+                AGROUND if s.aground else "" if s.silent_since_s is None else SILENT,
+                age_s=0.0 if s.silent_since_s is None else (s.body.time_s - s.silent_since_s) / self._time_scale,
                 report=s.report,
                 faults=tuple(s.faults.values()),
             )
@@ -388,6 +419,8 @@ class SimFleetLink(FleetLink):
             raise VehicleRefusedError(vehicle, "is not in the water", "add it to a mission as a vehicle of kind sim")
         if swimmer.aground:
             raise VehicleRefusedError(vehicle, AGROUND, "take it out of the mission")
+        if swimmer.silent_since_s is not None:
+            raise VehicleRefusedError(vehicle, f"is {SILENT}", "wait until it is heard again")
         if swimmer.state is not LinkState.ENGAGED:
             swimmer.state = LinkState.ENGAGED
             self._sink(LinkReport(vehicle, LinkState.ENGAGED))
@@ -404,6 +437,8 @@ class SimFleetLink(FleetLink):
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Switch a vehicle's motor off."""
         swimmer = self._swimmers.get(vehicle)
+        if swimmer is not None and swimmer.silent_since_s is not None:
+            return StopReceipt(vehicle, acknowledged=False, detail=f"it is {SILENT}")
         if swimmer is None or swimmer.state is not LinkState.ENGAGED:
             return StopReceipt(vehicle, acknowledged=True, detail="was not following")
         swimmer.body.stop()
@@ -450,6 +485,9 @@ class SimFleetLink(FleetLink):
             swimmer.order = None
             swimmer.state = LinkState.HEARD
             events.append(LinkReport(swimmer.body.name, LinkState.HEARD, AGROUND))
+        if swimmer.silent_since_s is not None:
+            self._live_unheard(swimmer, swimmer.silent_since_s)
+            return []
         order = swimmer.order
         if order is not None:
             events += soundings
@@ -466,6 +504,15 @@ class SimFleetLink(FleetLink):
             events.append(swimmer.make_report())
             events.append(WaypointReport(order.vehicle, order.mission_id, order.step, WaypointStatus.REACHED))
         return events
+
+    def _live_unheard(self, swimmer: _Swimmer, since_s: float) -> None:
+        """Let a vehicle that is out of reach go on with its waypoint for a while."""
+        _ranges(swimmer)
+        if swimmer.order is not None:
+            self._keep_clear_of_bottom(swimmer, swimmer.order)
+            if swimmer.body.time_s - since_s >= FORSAKEN_S:
+                swimmer.body.stop()
+                swimmer.order = None
 
     def _keep_clear_of_bottom(self, swimmer: _Swimmer, order: WaypointOrder) -> None:
         state = swimmer.body.state

@@ -11,15 +11,17 @@ from app.missions.fleet.interface import (
     FaultKind,
     FaultReport,
     FleetEvent,
+    LinkState,
     PingReport,
     Position,
     SoundingReport,
+    VehicleRefusedError,
     VehicleReport,
     WaypointOrder,
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.fleet.links.sim import FORSAKEN_S, Launch, SimFleetLink
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor, VehicleSpec
 from app.missions.spec.sonar import SwathSonarSpec
@@ -145,3 +147,36 @@ def test_the_sonar_that_a_mission_describes_is_the_one_that_is_simulated() -> No
         VehicleSpec(name=NAME, sensor=Sensor.DVL, sonar=SwathSonarSpec())
     with pytest.raises(ValidationError, match="aperture_deg"):
         SwathSonarSpec(aperture_deg=180.0)
+
+
+async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_a_while() -> None:
+    events: list[FleetEvent] = []
+    link = SimFleetLink(SimulationSettings(), 20.0)
+    await link.start(events.append)
+    try:
+        link.launch(launch(BatterySpec()))
+        await link.engage(NAME)
+        await link.order(order(1, 50.0, 95.0))
+        await until(lambda: link.true_position(NAME).depth_m > 0.5, "it is under way")
+        link.silence(NAME)
+        assert [info.state for info in link.vehicles()] == [LinkState.LOST]
+        for refused in (link.engage(NAME), link.order(order(2, 10.0, 10.0))):
+            with pytest.raises(VehicleRefusedError):
+                await refused
+        assert not (await link.stop(NAME)).acknowledged
+        heard, before = len(events), link.battery_pct(NAME)
+        await until(lambda: link.vehicles()[0].age_s * 20.0 > FORSAKEN_S + 20.0, "it is silent for long")
+        assert len(events) == heard
+        assert link.battery_pct(NAME) < before, "it lives on"
+        await until(lambda: link.true_position(NAME).depth_m < 0.2, "it has come up")
+        link.reach(NAME)
+        assert [info.state for info in link.vehicles()] == [LinkState.READY]
+        await link.engage(NAME)
+        await link.order(order(3, 50.0, 40.0))
+        reached = [WaypointStatus.REACHED]
+        await until(
+            lambda: [e.status for e in events if isinstance(e, WaypointReport) and e.step == 3][2:] == reached,
+            "it goes on",
+        )
+    finally:
+        await link.close()

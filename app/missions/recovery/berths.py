@@ -1,0 +1,75 @@
+"""Where vehicles wait to be taken out of the water, and at which depths they go there, so that none meets another."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
+from imc_bridge.control.layers import DepthLayer
+from imc_bridge.control.plans import HOME_RADIUS_M
+
+STOPS_WITHIN_M = 2.0
+"""A simulated vehicle that is stopped comes to rest this close to where it arrived."""
+
+
+def layer_of(name: str, cruise_m: dict[str, float], spacing_m: float) -> DepthLayer:
+    """Return a vehicle's layer among those that travel at these depths, by name; of equals the first is above."""
+    order = sorted(cruise_m, key=lambda one: cruise_m[one])
+    return DepthLayer(tuple(cruise_m[one] for one in order), order.index(name), spacing_m)
+
+
+def berth_m(home_m: FloatArray, slot: int, sharing: int, spacing_m: float) -> FloatArray:
+    """Return where a vehicle waits to be taken out of the water, (2,): each has a place of its own about the point.
+
+    Who shares the point with nobody waits at the point itself. Others wait in the places of a triangular grid with the
+    point in the middle of one of its triangles, the nearest first.
+
+    Parameters
+    ----------
+    slot
+        The vehicle's number in its team.
+    sharing
+        How many vehicles the mission brings to this point.
+    spacing_m
+        Least distance between two places, see :func:`berth_spacing_m`.
+    """
+    if sharing < 2 and slot == 0:
+        return home_m
+    return home_m + spacing_m * _places(slot + 1)[slot]
+
+
+def berth_spacing_m(spec: MissionSpec) -> float:
+    """Return how far apart vehicles wait: what two of them need to stay in their places, and the separation."""
+    sharing = [vehicle for vehicle in spec.vehicles if vehicle.recovery_point is None]
+    room_m = max((room_of_m(vehicle, spec) for vehicle in sharing or spec.vehicles), default=HOME_RADIUS_M)
+    return 2.0 * room_m + spec.limits.min_separation_m
+
+
+def room_of_m(vehicle: VehicleSpec, spec: MissionSpec) -> float:
+    """Return how far from its place a vehicle may be while it waits there."""
+    if vehicle.kind is VehicleKind.SIM:
+        return spec.arrival_radius_m + STOPS_WITHIN_M
+    return max(HOME_RADIUS_M, spec.arrival_radius_m, vehicle.turn_radius_m or 0.0)
+
+
+@lru_cache(maxsize=128)
+def _places(count: int) -> FloatArray:
+    """Return the places of a triangular grid of spacing 1 about the middle of a triangle, (count, 2), nearest first."""
+    reach = math.ceil(math.sqrt(count)) + 2
+    a, b = (index.ravel() for index in np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)))
+    grid = np.column_stack([a + 0.5 * b - 0.5, math.sqrt(0.75) * b - math.sqrt(1.0 / 12.0)])
+    # Rounded: places that are as far as others keep their order on every machine.
+    away, course = np.round(np.hypot(*grid.T), 9), np.round(np.arctan2(*grid.T) % (2 * math.pi), 9)
+    places = np.asarray(grid[np.lexsort([course, away])[:count]], dtype=np.float64)
+    places.flags.writeable = False
+    return places
+
+
+def farthest_m(spec: MissionSpec, slots: Sequence[int]) -> float:
+    """Return how far from a shared recovery point the farthest of these vehicles may be while it waits."""
+    spacing_m, room_m = berth_spacing_m(spec), 0.5 * (berth_spacing_m(spec) - spec.limits.min_separation_m)
+    places = [berth_m(np.zeros(2), slot, len(slots), spacing_m) for slot in slots]
+    return max((float(np.hypot(*place)) for place in places), default=0.0) + room_m
