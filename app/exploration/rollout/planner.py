@@ -23,6 +23,7 @@ from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import (
+    SINKING,
     Checkpoints,
     FlownPlan,
     Plan,
@@ -40,10 +41,14 @@ from app.exploration.rollout.free_space import Free, clear_ways, free_space, set
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
+from app.exploration.rollout.unseen import SLACK, deeper_than_presumed, look_in_vain
 
 ROOM = 40
 HEIGHT = 0.45
 """Flying height of first plans, in visibilities."""
+
+FIRST_SINKING = 0.3
+"""Part of a step by which vehicles may sink in first plans."""
 
 HEDGE = 1.5
 """How much more information a landmark is presumed to need that was never seen, because its depth is a guess."""
@@ -110,9 +115,11 @@ class RolloutPlanner(PlannerBase):
             raise ValueError(f"sensor: whole-mission rollouts need a RangeSensor, not {type(sensor).__name__}")
         super().__init__(options, sensor)
         self._range = sensor
+        self._least_m: FloatArray = np.zeros(0)
         self._names: tuple[str, ...] = ()
         self._kept: Backbone | None = None
         self._heights: FloatArray = np.zeros(0)
+        self._sinking: FloatArray = np.zeros(0)
         self._planned = 0
         self._free: tuple[Constraints, Free] | None = None
         self._felt = FeltBottom()
@@ -127,6 +134,8 @@ class RolloutPlanner(PlannerBase):
             "at_m": None if kept is None else kept.at_m,
             "chain": None if kept is None else kept.chain,
             "heights": self._heights,
+            "sinking": self._sinking,
+            "least": self._least_m,
             "felt": self._felt.remember(),
             "routes": self._routes,
             "away": self._away,
@@ -135,6 +144,8 @@ class RolloutPlanner(PlannerBase):
     def _recall(self, state: dict[str, Any]) -> None:
         self._names, self._planned = tuple(state["names"]), int(state["planned"])
         self._heights = np.array(state["heights"], dtype=np.float64)
+        self._sinking = np.array(state["sinking"], dtype=np.float64)
+        self._least_m = np.array(state["least"], dtype=np.float64)
         self._felt.recall(state["felt"])
         self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 2) for name, at in state["routes"].items()}
         self._away = {str(name): float(part) for name, part in state["away"].items()}
@@ -157,12 +168,25 @@ class RolloutPlanner(PlannerBase):
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
         self._felt.feel(team)
+        deeper_m = np.zeros((0, 3))
+        if team.belief.covariance_m2 is None and team.belief.on_floor:
+            if len(self._least_m) != len(team.belief.depth_m):
+                self._least_m = np.full(len(team.belief.depth_m), -np.inf)
+            self._least_m = look_in_vain(
+                self._least_m, team.belief, team.positions, self._range.visibility_m, team.constraints.max_depth_m
+            )
+            deeper_m = deeper_than_presumed(team.belief, self._least_m)
+            if len(deeper_m):
+                bottom = Bottom.from_landmarks(
+                    np.vstack([team.belief.xy_m, deeper_m[:, :2]]), np.append(team.belief.depth_m, deeper_m[:, 2])
+                )
         mission = _Mission(
-            team, bottom, self._felt.points_m, self._free[1], self._range, self.options, np.random.default_rng(seed)
-        )
+            team, bottom, self._felt.points_m, deeper_m, self._least_m, self._free[1], self._range, self.options,
+            np.random.default_rng(seed),
+        )  # fmt: skip
         best = None
         if self._kept is not None and len(self._kept.at_m):
-            best = mission.plan(self._kept, self._heights)
+            best = mission.plan(self._kept, self._heights, self._sinking)
         # Sweeps over unseen ground look better than they are: the plan that stands is not given up for one
         # (measured: changing for a new sweep every 8 steps costs 8 steps, only for one better by 10 still costs them).
         if best is None or self._planned in (0, BACK_SOON):
@@ -180,6 +204,7 @@ class RolloutPlanner(PlannerBase):
             positions, passed = mission.way_out(team, bottom, wishes[0]), 0
         self._kept = Backbone(best.flown.plan.at_m[passed : best.count].copy(), best.flown.plan.chain.copy())
         self._heights = best.flown.plan.height_m[passed : best.count].copy()
+        self._sinking = best.flown.plan.sinking[passed : best.count].copy()
         self._planned = max(1, self._planned + 1)
         self._felt.ask(team.vehicles, positions)
         terms = {
@@ -275,6 +300,8 @@ class _Mission:
         team: Situation,
         bottom: Bottom,
         felt_m: FloatArray,
+        deeper_m: FloatArray,
+        least_m: FloatArray,
         free: Free,
         sensor: RangeSensor,
         options: PlannerOptions,
@@ -289,11 +316,12 @@ class _Mission:
         self._com_range = constraints.com_range_m
         self._link = constraints.com_range_m * LINK_OF_RANGE
         self._horizon = float(max(1, team.steps_total - team.step + 1))
+        self._sinking = SINKING if belief.covariance_m2 is not None else FIRST_SINKING
         clearance = constraints.min_altitude_m
         self._height = max(HEIGHT * visibility, clearance + margin_m(visibility, clearance), constraints.lowest_m)
         unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + self._height)
         self._floor: FloorEstimate = estimate_floor(
-            belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m
+            belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m, deeper_m
         )
         self._free = free
         self._rules = Rules(
@@ -306,15 +334,19 @@ class _Mission:
             self._free.everywhere,
             belief.covariance_m2 is not None,
         )
-        self._work: Work = self._left(belief, options)
+        self._work: Work = self._left(belief, least_m, options)
         self._task = Task(self._work, self._floor, self._rules, self._horizon)
 
-    def _left(self, belief: Belief, options: PlannerOptions) -> Work:
+    def _left(self, belief: Belief, least_m: FloatArray, options: PlannerOptions) -> Work:
         hedge = HEDGE if belief.covariance_m2 is None else 1.0
         left = lacking(belief, options.accuracy_sd_m, hedge)
         shown = _sample(left, belief)
         xyz = np.column_stack([belief.xy_m, belief.depth_m])[left.row[shown]]
+        unseen = np.isnan(xyz[:, 2])
         fill_depths(xyz, self._floor)
+        if len(least_m):
+            least = least_m[left.row[shown]] + SLACK * self._sight
+            xyz[unseen, 2] = np.maximum(xyz[unseen, 2], least[unseen])
         tasks = len(belief.xy_m) * len(left.row) / max(1, int((~belief.accurate).sum()))
         part = len(shown) / max(1, len(left.row))
         allowed = np.floor(MAY_BE_LEFT * tasks * part)
@@ -333,14 +365,17 @@ class _Mission:
         """Whether more is left than a plan may leave over."""
         return self._work.allowed > 0.0
 
-    def plan(self, backbone: Backbone, heights: FloatArray, checkpoints: Checkpoints | None = None) -> _Best | None:
+    def plan(
+        self, backbone: Backbone, heights: FloatArray, sinking: FloatArray, checkpoints: Checkpoints | None = None
+    ) -> _Best | None:
         """Complete team waypoints to a plan and fly it; None when there is no allowed way.
 
         A ``checkpoints`` given is overwritten instead of making a new one.
         """
         n, count = len(self._start), min(len(backbone.at_m), ROOM - 4)
-        plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), backbone.chain)
+        plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), np.zeros(ROOM), backbone.chain)
         plan.at_m[:count], plan.height_m[:count] = backbone.at_m[:count], heights[:count]
+        plan.sinking[:count] = sinking[:count]
         start = np.ascontiguousarray(self._start[:, :2])
         k = 0
         while k < count:
@@ -353,6 +388,7 @@ class _Mission:
                     plan.at_m[k + 1 : count].copy(),
                     plan.height_m[k + 1 : count].copy(),
                 )
+                plan.sinking[k : count - 1] = plan.sinking[k + 1 : count].copy()
                 count -= 1
                 continue
             k += 1 + changed - count
@@ -372,9 +408,10 @@ class _Mission:
         )
         heights = np.full(ROOM, self._height)
         scratch = new_checkpoints(ROOM, len(self._start), len(self._work.need))
-        flown = [(self.plan(sweep, heights, scratch), sweep) for sweep in sweeps]
+        sinking = np.full(ROOM, self._sinking)
+        flown = [(self.plan(sweep, heights, sinking, scratch), sweep) for sweep in sweeps]
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
-        chosen = [self.plan(flown[k][1], heights) for _, k in order[:most]]
+        chosen = [self.plan(flown[k][1], heights, sinking) for _, k in order[:most]]
         return [best for best in chosen if best is not None]
 
     def convoy(self, constraints: Constraints) -> _Best | None:
@@ -383,7 +420,9 @@ class _Mission:
         For when no sweep finds a way between the zones.
         """
         at = np.repeat(self._way_to_work(constraints)[:, None], len(self._start), axis=1)
-        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, self._height))
+        return self.plan(
+            Backbone(at, np.arange(len(self._start))), np.full(ROOM, self._height), np.full(ROOM, self._sinking)
+        )
 
     def towards_work(self, constraints: Constraints) -> FloatArray:
         """Return a step (n_vehicles, 3) of the whole team in the direction of that way."""
@@ -405,7 +444,7 @@ class _Mission:
         n = len(self._start)
         like = best.flown.plan
         trial = FlownPlan(
-            Plan(np.zeros_like(like.at_m), np.zeros(ROOM), like.chain),
+            Plan(np.zeros_like(like.at_m), np.zeros(ROOM), np.zeros(ROOM), like.chain),
             new_checkpoints(ROOM, n, len(self._work.need)),
             np.empty(len(self._work.need)),
         )
