@@ -23,6 +23,12 @@ UNFINISHED = 12.0
 PER_LEFT = 0.8
 """Steps charged to a plan that ends unfinished: once, and per landmark left over and per one's missing information."""
 
+PER_VISIT = 3.0
+"""Steps charged for every place that has to be visited for what is left."""
+
+WELL_SEEN = 0.75
+"""From so far above, in visibilities, a landmark is well seen."""
+
 CLIMB_PASSES = 4
 
 SINKING = 0.8
@@ -451,15 +457,21 @@ def fly_plan(
     score = t + cost + waypoints
     if left > work.allowed:
         score += UNFINISHED + (horizon if t >= horizon else 0.0)
-        score += leftover(at, work, rules, left_need)
+        score += leftover(at, work, floor, rules, left_need)
     return float(score)
 
 
 @njit(cache=True, nogil=True)
-def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> float:
-    """Return the charge for what a plan leaves: landmarks, missing information, and a tour over their buckets."""
+def leftover(at: FloatArray, work: Work, floor: FloorEstimate, rules: Rules, need: FloatArray) -> float:
+    """Return the charge for what a plan leaves: landmarks, missing information, and a tour over their buckets.
+
+    The tour counts what it costs to go down where landmarks cannot be seen from above, so that no plan is better for
+    leaving them.
+    """
     buckets = work.rows * work.cols
     count = np.zeros(buckets)
+    down = np.zeros(buckets)
+    well = WELL_SEEN * rules.visibility_m
     missing = 0.0
     left = 0.0
     for k in range(buckets):
@@ -468,6 +480,9 @@ def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> floa
                 count[k] += 1.0
                 left += 1.0
                 missing += min(1.0, need[m] / max(work.need[m], 1e-12))
+                x, y, z = work.xyz[0, m], work.xyz[1, m], work.xyz[2, m]
+                from_above = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+                down[k] = max(down[k], z - well - from_above)
     charge = PER_LEFT * (left - work.allowed + missing)
     x = 0.0
     y = 0.0
@@ -491,7 +506,7 @@ def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> floa
                     chosen = k
         if chosen < 0:
             break
-        length += max(0.0, best - 0.5 * reach)
+        length += max(0.0, best - 0.5 * reach) + PER_VISIT * rules.step_m + 2.0 * down[chosen]
         x = work.west_m + (chosen % work.cols + 0.5) * work.bucket_m
         y = work.south_m + (chosen // work.cols + 0.5) * work.bucket_m
         left -= count[chosen]

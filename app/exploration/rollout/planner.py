@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
@@ -23,6 +23,8 @@ from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import (
+    DIVE,
+    LOW,
     SINKING,
     Checkpoints,
     FlownPlan,
@@ -36,11 +38,12 @@ from app.exploration.rollout.flight import (
     make_work,
     new_checkpoints,
 )
-from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m
+from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m, sample
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
+from app.exploration.rollout.tour import tour_of
 from app.exploration.rollout.unseen import SLACK, deeper_than_presumed, look_in_vain
 
 ROOM = 40
@@ -49,6 +52,9 @@ HEIGHT = 0.45
 
 FIRST_SINKING = 0.3
 """Part of a step by which vehicles may sink in first plans."""
+
+TOUR_SINKING, TOUR_HEIGHT = 0.6, 0.35
+"""How quickly vehicles sink on tours, in steps, and how high they fly, in visibilities."""
 
 HEDGE = 1.5
 """How much more information a landmark is presumed to need that was never seen, because its depth is a guess."""
@@ -64,7 +70,13 @@ OUTLETS = 400
 
 UP_COUNTS = 0.3
 
-LINK_OF_RANGE = 29 / 30
+ESCAPE_OF_STEP = 0.9
+"""Of a step: by how much higher the bottom is presumed where it has just lifted a vehicle."""
+
+FEW_LEFT = 0.08
+"""Part of all landmarks of which tours from place to place are tried."""
+
+LINK_OF_RANGE = 0.95
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
 
@@ -167,7 +179,7 @@ class RolloutPlanner(PlannerBase):
             self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
-        self._felt.feel(team)
+        lifted = self._felt.feel(team)
         deeper_m = np.zeros((0, 3))
         if team.belief.covariance_m2 is None and team.belief.on_floor:
             if len(self._least_m) != len(team.belief.depth_m):
@@ -181,7 +193,7 @@ class RolloutPlanner(PlannerBase):
                     np.vstack([team.belief.xy_m, deeper_m[:, :2]]), np.append(team.belief.depth_m, deeper_m[:, 2])
                 )
         mission = _Mission(
-            team, bottom, self._felt.points_m, deeper_m, self._least_m, self._free[1], self._range, self.options,
+            team, bottom, self._rising(team, lifted), deeper_m, self._least_m, self._free[1], self._range, self.options,
             np.random.default_rng(seed),
         )  # fmt: skip
         best = None
@@ -192,6 +204,8 @@ class RolloutPlanner(PlannerBase):
         if best is None or self._planned in (0, BACK_SOON):
             rivals = [mission.refine(start, FRESH_SEARCH) for start in mission.fresh_starts(FRESH_STARTS)]
             best = min([*rivals, *([] if best is None else [best])], key=lambda start: start.score, default=None)
+        tour = mission.tour(FRESH_SEARCH)
+        best = tour if best is None or (tour is not None and tour.score < best.score - 1.0) else best
         best = mission.convoy(team.constraints) if best is None else best
         if best is None:
             return Proposal(mission.way_out(team, bottom, mission.towards_work(team.constraints)), 0.0)
@@ -261,6 +275,14 @@ class RolloutPlanner(PlannerBase):
         length = np.maximum(np.linalg.norm(leg, axis=1, keepdims=True), 1e-12)
         closer = here + leg * np.minimum(1.0, 0.99 * team.constraints.max_step_m / length)
         return settle(team, bottom, np.array([here, closer]))[0]
+
+    def _rising(self, team: Situation, lifted: BoolArray) -> FloatArray:
+        """Return where the bottom was felt, (k, 3), higher where vehicles were lifted just now: it may go on rising."""
+        felt = self._felt.points_m.copy()
+        count = int(lifted.sum())
+        if count:
+            felt[-count:, 2] -= ESCAPE_OF_STEP * team.constraints.max_step_m
+        return felt
 
     def _effort(self, mission: "_Mission") -> int:
         """Return how many changes to try now: many for the first plan, few for what little is left in the end."""
@@ -413,6 +435,21 @@ class _Mission:
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
         chosen = [self.plan(flown[k][1], heights, sinking) for _, k in order[:most]]
         return [best for best in chosen if best is not None]
+
+    def tour(self, changes: int) -> _Best | None:
+        """Return a tour over what is left, improved by some changes; None where that is too much for one."""
+        if len(self._work.need) > FEW_LEFT * self._work.total:
+            return None
+        floor = self._floor
+        above = np.array([
+            sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y) for x, y in self._work.xyz[:2].T
+        ])  # fmt: skip
+        tour = tour_of(self._work.xyz.T, above, self._start[:, :2], self._com_range, self._link, self._sight)
+        count = min(len(tour.dives), ROOM - 4)
+        sinking = np.where(tour.dives, DIVE, TOUR_SINKING)[:count]
+        backbone = Backbone(tour.at_m[:count], tour.chain)
+        best = self.plan(backbone, np.where(tour.dives, LOW, TOUR_HEIGHT)[:count] * self._sight, sinking)
+        return None if best is None else self.refine(best, changes)
 
     def convoy(self, constraints: Constraints) -> _Best | None:
         """Return a plan that brings the team, closed up, on the shortest way to the landmark nearest to its middle.
