@@ -99,8 +99,8 @@ def estimate_floor(
     held_m : float
         Height above the floor below which vehicles never are, whatever the command.
     deeper_m : (k, 3) or None
-        Landmarks that must lie deeper than their surroundings, for they were not seen from close by; with the depth that
-        is presumed for them.
+        Landmarks that must lie deeper than their surroundings, for they were not seen from close by, with the least
+        depth that they can have.
     """
     deeper = np.zeros((0, 3)) if deeper_m is None else deeper_m
     low, high = area.min(axis=0), area.max(axis=0)
@@ -172,7 +172,8 @@ def let_stay(floor: FloorEstimate, positions: FloatArray, height_m: float, reach
 
 
 @njit(cache=True, nogil=True)
-def _keep_above(limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float, slope: float
+def _keep_above(
+    limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float, slope: float
 ) -> None:
     """Lower ``limit`` (rows, cols) in place so that vehicles clear the felt points (k, 3) and can climb to them."""
     rows, cols = limit.shape

@@ -98,7 +98,7 @@ def _visit(plan: Plan, count: int, start: FloatArray, x: float, y: float, u: Flo
 
 @njit(cache=True, nogil=True)
 def _dive(plan: Plan, k: int, x: float, y: float, size: float) -> None:
-    """Let the team go down at (x, y), closed up in the row that it is in, so that vehicles hand on each other's links."""
+    """Let the team go down at (x, y), closed up to ``size`` in the row that it is in: each relays to the one below."""
     n = plan.at_m.shape[1]
     if n > 1:
         first, last = plan.chain[0], plan.chain[n - 1]

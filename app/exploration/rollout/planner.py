@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from app.arrays import BoolArray, FloatArray
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
@@ -70,13 +70,10 @@ OUTLETS = 400
 
 UP_COUNTS = 0.3
 
-ESCAPE_OF_STEP = 0.9
-"""Of a step: by how much higher the bottom is presumed where it has just lifted a vehicle."""
-
 FEW_LEFT = 0.08
 """Part of all landmarks of which tours from place to place are tried."""
 
-LINK_OF_RANGE = 0.95
+LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
 """Part of all landmarks that a plan may leave over, until the team has come so far."""
 
@@ -179,21 +176,10 @@ class RolloutPlanner(PlannerBase):
             self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
-        lifted = self._felt.feel(team)
-        deeper_m = np.zeros((0, 3))
-        if team.belief.covariance_m2 is None and team.belief.on_floor:
-            if len(self._least_m) != len(team.belief.depth_m):
-                self._least_m = np.full(len(team.belief.depth_m), -np.inf)
-            self._least_m = look_in_vain(
-                self._least_m, team.belief, team.positions, self._range.visibility_m, team.constraints.max_depth_m
-            )
-            deeper_m = deeper_than_presumed(team.belief, self._least_m)
-            if len(deeper_m):
-                bottom = Bottom.from_landmarks(
-                    np.vstack([team.belief.xy_m, deeper_m[:, :2]]), np.append(team.belief.depth_m, deeper_m[:, 2])
-                )
+        self._felt.feel(team)
+        deeper_m, bottom = self._look_for_unseen(team, bottom)
         mission = _Mission(
-            team, bottom, self._rising(team, lifted), deeper_m, self._least_m, self._free[1], self._range, self.options,
+            team, bottom, self._felt.points_m, deeper_m, self._least_m, self._free[1], self._range, self.options,
             np.random.default_rng(seed),
         )  # fmt: skip
         best = None
@@ -276,13 +262,20 @@ class RolloutPlanner(PlannerBase):
         closer = here + leg * np.minimum(1.0, 0.99 * team.constraints.max_step_m / length)
         return settle(team, bottom, np.array([here, closer]))[0]
 
-    def _rising(self, team: Situation, lifted: BoolArray) -> FloatArray:
-        """Return where the bottom was felt, (k, 3), higher where vehicles were lifted just now: it may go on rising."""
-        felt = self._felt.points_m.copy()
-        count = int(lifted.sum())
-        if count:
-            felt[-count:, 2] -= ESCAPE_OF_STEP * team.constraints.max_step_m
-        return felt
+    def _look_for_unseen(self, team: Situation, bottom: Bottom) -> tuple[FloatArray, Bottom]:
+        """Return landmarks (k, 3) that must lie deeper than their surroundings, and the sea floor with them."""
+        belief, none = team.belief, np.zeros((0, 3))
+        if belief.covariance_m2 is not None or not belief.on_floor or not belief.complete:
+            return none, bottom
+        if len(self._least_m) != len(belief.depth_m):
+            self._least_m = np.full(len(belief.depth_m), -np.inf)
+        sight, deepest = self._range.visibility_m, team.constraints.max_depth_m
+        self._least_m = look_in_vain(self._least_m, belief, team.positions, sight, deepest)
+        deeper = deeper_than_presumed(belief, self._least_m)
+        if not len(deeper):
+            return none, bottom
+        places, depths = np.vstack([belief.xy_m, deeper[:, :2]]), np.append(belief.depth_m, deeper[:, 2])
+        return deeper, Bottom.from_landmarks(places, depths)
 
     def _effort(self, mission: "_Mission") -> int:
         """Return how many changes to try now: many for the first plan, few for what little is left in the end."""

@@ -3,10 +3,14 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from app.arrays import FloatArray
+from app.arrays import FloatArray, IntArray
 from app.exploration.core.problem import Belief
 
 NEIGHBOURS = 4
+"""Known landmarks that tell where one that was never seen is presumed."""
+
+SLACK = 0.12
+"""How much deeper than they must lie at least landmarks are presumed, in visibilities."""
 
 
 def look_in_vain(
@@ -14,7 +18,7 @@ def look_in_vain(
 ) -> FloatArray:
     """Return the least depths (n_landmarks,) that landmarks never seen must have, after a look from ``positions``.
 
-    A landmark out of sight of a vehicle that is close by lies below what it can see, or above: beside a wall. It is taken
+    A landmark out of sight of a vehicle that is close by lies below what it can see, or above, on a wall. It is taken
     to lie above where its known neighbours do.
 
     Parameters
@@ -53,12 +57,7 @@ def deeper_than_presumed(belief: Belief, least_m: FloatArray) -> FloatArray:
     return np.column_stack([belief.xy_m[deeper], least_m[deeper]])
 
 
-SLACK = 0.12
-"""How much deeper than they must lie at least landmarks are presumed, in visibilities."""
-
-
-
-def _presumed(belief: Belief, known: FloatArray, rows: FloatArray) -> FloatArray:
+def _presumed(belief: Belief, known: IntArray, rows: IntArray) -> FloatArray:
     """Return the mean depth of the known neighbours of some landmarks, the closer ones counting more."""
     k = min(NEIGHBOURS, len(known))
     away, which = cKDTree(belief.xy_m[known]).query(belief.xy_m[rows], k=k)
