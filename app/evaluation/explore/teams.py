@@ -117,6 +117,7 @@ class LimitedTeam:
             depth_m=self._station.depth_m,
             sd_m=self._station.sd_m,
             accurate=self._station.accurate,
+            complete=False,
         )
         return vehicles, positions, known
 

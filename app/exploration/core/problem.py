@@ -40,6 +40,9 @@ class Belief:
         landmarks never seen, and ``sd_m`` the deviation along the worst direction. None: only depths are estimated.
     on_floor : bool
         Whether landmarks lie on the sea floor, so that vehicles have to keep above them.
+    complete : bool
+        Whether everything that vehicles have seen is in it, so that what it lacks was not seen; no where messages are
+        limited.
     """
 
     xy_m: FloatArray
@@ -50,6 +53,7 @@ class Belief:
     correlation_length_m: float
     covariance_m2: FloatArray | None = None
     on_floor: bool = True
+    complete: bool = True
 
 
 @dataclass(frozen=True)

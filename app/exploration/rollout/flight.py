@@ -23,10 +23,25 @@ UNFINISHED = 12.0
 PER_LEFT = 0.8
 """Steps charged to a plan that ends unfinished: once, and per landmark left over and per one's missing information."""
 
+PER_VISIT = 3.0
+"""Steps charged for every place that has to be visited for what is left."""
+
+WELL_SEEN = 0.75
+"""From so far above, in visibilities, a landmark is well seen."""
+
 CLIMB_PASSES = 4
 
 SINKING = 0.8
 """Part of a step by which vehicles sink at most where that may not wait."""
+
+DIVE = 2.0
+"""In place of the part of a step by which vehicles may sink: they go down at the waypoint."""
+
+LOW = 0.25
+"""Height above the floor, in visibilities, at which dives go down as far as they may."""
+
+STILL_SINKING = 0.1
+"""Part of a step: a vehicle at the waypoint of a dive that sinks by more is not down yet."""
 
 NEAREST = 1e-12
 """Square of the least distance of a landmark, in visibilities: a sensor right on it learns no more."""
@@ -105,12 +120,16 @@ class Plan(NamedTuple):
         Horizontal positions.
     height_m : (room,)
         Height above the smoothed floor on the way to the waypoint.
+    sinking : (room,)
+        Part of a step by which vehicles may sink on the way to the waypoint, at the cost of their way ahead;
+        ``DIVE``: they go down at the waypoint itself as far as the floor lets them, and wait for each other.
     chain : (n_vehicles,)
         Order of the vehicles in which neighbours keep within communication range.
     """
 
     at_m: FloatArray
     height_m: FloatArray
+    sinking: FloatArray
     chain: IntArray
 
 
@@ -275,16 +294,26 @@ def fly_step(
     reach = step
     there = np.empty((n, 2))
     after = k
+    this = min(k, count - 1)
+    height, sinking = plan.height_m[this], plan.sinking[this]
+    dives = sinking == DIVE
+    # A dive ends at its waypoint.
+    until = min(this + 1, count) if dives else count
     for _ in range(CLIMB_PASSES):
-        after = advance(here, plan, k, count, reach, rules.cut_corners, there)
-        height = plan.height_m[min(k, count - 1)]
+        after = advance(here, plan, k, until, reach, rules.cut_corners, there)
+        steep = dives and after > k
         for i in range(n):
             x, y = there[i, 0], there[i, 1]
-            wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - height
-            limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
             spare = np.sqrt(max(0.0, step * step - (x - at[i, 0]) ** 2 - (y - at[i, 1]) ** 2))
-            # Sinking may wait; not where most of what is in sight would be missed from a little higher up.
-            lowest = at[i, 2] + (SINKING * step if rules.directed else spare)
+            lowest = at[i, 2]
+            if steep:
+                limit = sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+                wish = limit - max(0.0, height - LOW * rules.visibility_m)
+                lowest += spare
+            else:
+                wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - height
+                limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+                lowest += spare if dives else max(spare, sinking * step)
             out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), lowest)
             out[i, 0] = x
             out[i, 1] = y
@@ -303,6 +332,8 @@ def fly_step(
         d2 = (out[i, 0] - at[i, 0]) ** 2 + (out[i, 1] - at[i, 1]) ** 2
         allowed = np.sqrt(max(0.0, step * step - d2))
         out[i, 2] = min(max(out[i, 2], at[i, 2] - allowed), at[i, 2] + allowed)
+        if dives and out[i, 2] - at[i, 2] > STILL_SINKING * step:
+            after = k
     return after
 
 
@@ -426,15 +457,21 @@ def fly_plan(
     score = t + cost + waypoints
     if left > work.allowed:
         score += UNFINISHED + (horizon if t >= horizon else 0.0)
-        score += leftover(at, work, rules, left_need)
+        score += leftover(at, work, floor, rules, left_need)
     return float(score)
 
 
 @njit(cache=True, nogil=True)
-def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> float:
-    """Return the charge for what a plan leaves: landmarks, missing information, and a tour over their buckets."""
+def leftover(at: FloatArray, work: Work, floor: FloorEstimate, rules: Rules, need: FloatArray) -> float:
+    """Return the charge for what a plan leaves: landmarks, missing information, and a tour over their buckets.
+
+    The tour counts what it costs to go down where landmarks cannot be seen from above, so that no plan is better for
+    leaving them.
+    """
     buckets = work.rows * work.cols
     count = np.zeros(buckets)
+    down = np.zeros(buckets)
+    well = WELL_SEEN * rules.visibility_m
     missing = 0.0
     left = 0.0
     for k in range(buckets):
@@ -443,6 +480,9 @@ def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> floa
                 count[k] += 1.0
                 left += 1.0
                 missing += min(1.0, need[m] / max(work.need[m], 1e-12))
+                x, y, z = work.xyz[0, m], work.xyz[1, m], work.xyz[2, m]
+                from_above = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+                down[k] = max(down[k], z - well - from_above)
     charge = PER_LEFT * (left - work.allowed + missing)
     x = 0.0
     y = 0.0
@@ -466,7 +506,7 @@ def leftover(at: FloatArray, work: Work, rules: Rules, need: FloatArray) -> floa
                     chosen = k
         if chosen < 0:
             break
-        length += max(0.0, best - 0.5 * reach)
+        length += max(0.0, best - 0.5 * reach) + PER_VISIT * rules.step_m + 2.0 * down[chosen]
         x = work.west_m + (chosen % work.cols + 0.5) * work.bucket_m
         y = work.south_m + (chosen // work.cols + 0.5) * work.bucket_m
         left -= count[chosen]

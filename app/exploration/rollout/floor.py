@@ -21,6 +21,9 @@ ENVELOPE_SLOPE = 1.2
 """Steepest climb that plans rely on: rise over run."""
 
 
+STEEPEST_DIVE = 6.0
+"""The same for vehicles that go straight down and up again beside bottom that was felt."""
+
 MARGIN = 0.1
 """Clearance that plans add to the required one, in visibilities, because the floor is an estimate."""
 
@@ -48,6 +51,8 @@ class FloorEstimate(NamedTuple):
         The same without detail: what a team keeps its height above.
     deepest_m : (rows, cols)
         Deepest that a vehicle may be, so that it clears the floor here and can climb every rise ahead.
+    clear_m : (rows, cols)
+        Deepest that a vehicle may be that goes straight down and up again: it clears the floor here.
     """
 
     west_m: float
@@ -56,6 +61,7 @@ class FloorEstimate(NamedTuple):
     depth_m: FloatArray
     smooth_m: FloatArray
     deepest_m: FloatArray
+    clear_m: FloatArray
 
 
 def margin_m(visibility_m: float, clearance_m: float) -> float:
@@ -72,6 +78,7 @@ def estimate_floor(
     clearance_m: float,
     unknown_m: float,
     held_m: float = 0.0,
+    deeper_m: FloatArray | None = None,
 ) -> FloorEstimate:
     """Estimate the floor from a belief.
 
@@ -91,7 +98,11 @@ def estimate_floor(
         Depth to presume while nothing was seen.
     held_m : float
         Height above the floor below which vehicles never are, whatever the command.
+    deeper_m : (k, 3) or None
+        Landmarks that must lie deeper than their surroundings, for they were not seen from close by, with the least
+        depth that they can have.
     """
+    deeper = np.zeros((0, 3)) if deeper_m is None else deeper_m
     low, high = area.min(axis=0), area.max(axis=0)
     cell = max(visibility_m / CELLS_PER_VISIBILITY, float((high - low).max()) / MAX_CELLS_PER_SIDE)
     cols, rows = (max(2, int(k)) for k in np.ceil((high - low) / cell) + 1)
@@ -103,9 +114,9 @@ def estimate_floor(
         trust = np.minimum(np.sqrt(belief.covariance_m2[:, 2, 2]), ROUGHLY * visibility_m)
     if known.any():
         depth = _from_neighbours(
-            np.vstack([belief.xy_m[known], felt_m[:, :2]]),
-            np.concatenate([belief.depth_m[known], felt_m[:, 2]]),
-            np.concatenate([trust[known], np.zeros(len(felt_m))]),
+            np.vstack([belief.xy_m[known], felt_m[:, :2], deeper[:, :2]]),
+            np.concatenate([belief.depth_m[known], felt_m[:, 2], deeper[:, 2]]),
+            np.concatenate([trust[known], np.zeros(len(felt_m)), np.full(len(deeper), ROUGHLY * visibility_m)]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
         ).reshape(rows, cols)
@@ -117,11 +128,15 @@ def estimate_floor(
     looks = int(np.ceil(2.0 * cell / bottom.cell_m)) + 1  # no cell of the constraints' sea floor is skipped
     shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
     around = bottom.at(np.stack([east, north], axis=-1) + shifts)
+    here = bottom.at(np.stack([east, north], axis=-1))
+    clear = np.where(np.isnan(here), limit, here - clearance_m)
     limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
-    _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m))
+    _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), ENVELOPE_SLOPE)
+    _keep_above(clear, east, north, felt_m, clearance_m, STEEPEST_DIVE)
     return FloorEstimate(
-        float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m)
-    )
+        float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m),
+        np.minimum(clear, depth - held_m),
+    )  # fmt: skip
 
 
 def _from_neighbours(
@@ -157,14 +172,16 @@ def let_stay(floor: FloorEstimate, positions: FloatArray, height_m: float, reach
 
 
 @njit(cache=True, nogil=True)
-def _keep_above(limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float) -> None:
+def _keep_above(
+    limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float, slope: float
+) -> None:
     """Lower ``limit`` (rows, cols) in place so that vehicles clear the felt points (k, 3) and can climb to them."""
     rows, cols = limit.shape
     for k in range(len(felt_m)):
         for r in range(rows):
             for c in range(cols):
                 away = np.hypot(east[r, c] - felt_m[k, 0], north[r, c] - felt_m[k, 1])
-                limit[r, c] = min(limit[r, c], felt_m[k, 2] - above_m + ENVELOPE_SLOPE * away)
+                limit[r, c] = min(limit[r, c], felt_m[k, 2] - above_m + slope * away)
 
 
 @njit(cache=True, nogil=True, inline="always")

@@ -180,6 +180,7 @@ def insert(plan: Plan, count: int, k: int) -> None:
     for i in range(count, k, -1):
         plan.at_m[i] = plan.at_m[i - 1]
         plan.height_m[i] = plan.height_m[i - 1]
+        plan.sinking[i] = plan.sinking[i - 1]
 
 
 @njit(cache=True, nogil=True)
@@ -206,6 +207,7 @@ def clear_ways(free: Free, plan: Plan, count: int, start: FloatArray, first: int
             return -1
         insert(plan, count, k)
         plan.at_m[k] = round_it
+        plan.sinking[k] = min(plan.sinking[k], 1.0) if plan.sinking[k] < 1.5 else 0.0
         count += 1
         last += 1
         inserted += 1

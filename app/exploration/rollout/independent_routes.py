@@ -52,7 +52,7 @@ def no_routes(vehicles: int, room: int, height_m: float) -> Routes:
 @njit(cache=True, nogil=True)
 def route_of(routes: Routes, i: int) -> Plan:
     """Return a view of one vehicle's route as the plan of a team of one."""
-    return Plan(routes.at_m[i], routes.height_m[i], np.zeros(1, dtype=np.int64))
+    return Plan(routes.at_m[i], routes.height_m[i], np.zeros(routes.height_m.shape[1]), np.zeros(1, dtype=np.int64))
 
 
 @njit(cache=True, nogil=True)

@@ -45,7 +45,7 @@ def backbones(
     n = len(here_m)
     gap_limit = min(link_m, visibility_m)
     direction = longer_axis_rad(area)
-    chains = _chains(here_m, com_range_m)
+    chains = row_orders(here_m, com_range_m)
     found: list[Backbone] = []
     for angle in (direction, direction + np.pi / 2):
         along = np.array([np.cos(angle), np.sin(angle)])
@@ -74,7 +74,7 @@ def backbones(
     return found
 
 
-def _chains(here_m: FloatArray, com_range_m: float) -> list[NDArray[np.int64]]:
+def row_orders(here_m: FloatArray, com_range_m: float) -> list[NDArray[np.int64]]:
     """Return orders of the vehicles in which neighbours are in range now; the closest thing to one when none is.
 
     The order of vehicles that are all in range of each other is free: any sorting along a direction is offered.

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
-from app.exploration.rollout.flight import FlownPlan, Plan, Rules, Task, Work, fly_plan
+from app.exploration.rollout.flight import DIVE, FlownPlan, Plan, Rules, Task, Work, fly_plan
 from app.exploration.rollout.free_space import Free, clear_ways, insert, settle_waypoint
 
 DRAWS = 8
@@ -14,6 +14,10 @@ KINDS = 12
 LEAST_HEIGHT = 0.25
 GREATEST_HEIGHT = 0.8
 """Bounds of the flying height, in visibilities."""
+
+MOST_SINKING = 0.85
+GATHERED = 0.8
+"""Longest row of a team that goes down in one place, in visibilities."""
 
 
 @njit(cache=True, nogil=True)
@@ -25,6 +29,7 @@ def _bell(u: float, v: float) -> float:
 def _copy(source: Plan, target: Plan, count: int) -> None:
     target.at_m[:count] = source.at_m[:count]
     target.height_m[:count] = source.height_m[:count]
+    target.sinking[:count] = source.sinking[:count]
 
 
 @njit(cache=True, nogil=True)
@@ -87,7 +92,27 @@ def _visit(plan: Plan, count: int, start: FloatArray, x: float, y: float, u: Flo
         plan.at_m[place, i, 0] = like[i, 0] + f * dx
         plan.at_m[place, i, 1] = like[i, 1] + f * dy
     plan.height_m[place] = plan.height_m[min(max(place - 1, 0), count)]
+    plan.sinking[place] = 0.0
     return place
+
+
+@njit(cache=True, nogil=True)
+def _dive(plan: Plan, k: int, x: float, y: float, size: float) -> None:
+    """Let the team go down at (x, y), closed up to ``size`` in the row that it is in: each relays to the one below."""
+    n = plan.at_m.shape[1]
+    if n > 1:
+        first, last = plan.chain[0], plan.chain[n - 1]
+        dx = plan.at_m[k, last, 0] - plan.at_m[k, first, 0]
+        dy = plan.at_m[k, last, 1] - plan.at_m[k, first, 1]
+        length = max(np.hypot(dx, dy), 1e-9)
+        for e in range(n):
+            away = size * (e / (n - 1) - 0.5) / length
+            plan.at_m[k, plan.chain[e], 0] = x + away * dx
+            plan.at_m[k, plan.chain[e], 1] = y + away * dy
+    else:
+        plan.at_m[k, 0, 0] = x
+        plan.at_m[k, 0, 1] = y
+    plan.sinking[k] = DIVE
 
 
 @njit(cache=True, nogil=True)
@@ -116,6 +141,7 @@ def _leave_out(plan: Plan, count: int, k: int) -> None:
     for w in range(k, count - 1):
         plan.at_m[w] = plan.at_m[w + 1]
         plan.height_m[w] = plan.height_m[w + 1]
+        plan.sinking[w] = plan.sinking[w + 1]
 
 
 @njit(cache=True, nogil=True)
@@ -145,6 +171,9 @@ def _reverse(plan: Plan, low: int, high: int) -> None:
         kept = plan.height_m[low]
         plan.height_m[low] = plan.height_m[high]
         plan.height_m[high] = kept
+        kept = plan.sinking[low]
+        plan.sinking[low] = plan.sinking[high]
+        plan.sinking[high] = kept
         low += 1
         high -= 1
 
@@ -154,12 +183,15 @@ def _relocate(plan: Plan, k: int, to: int) -> None:
     """Move one waypoint elsewhere in the order."""
     moved = plan.at_m[k].copy()
     height = plan.height_m[k]
+    sinking = plan.sinking[k]
     step = 1 if k < to else -1
     for w in range(k, to, step):
         plan.at_m[w] = plan.at_m[w + step]
         plan.height_m[w] = plan.height_m[w + step]
+        plan.sinking[w] = plan.sinking[w + step]
     plan.at_m[to] = moved
     plan.height_m[to] = height
+    plan.sinking[to] = sinking
 
 
 @njit(cache=True, nogil=True)
@@ -205,6 +237,9 @@ def change(
         plan.at_m[k, i, 0] += size * _bell(u[3], u[4])
         plan.at_m[k, i, 1] += size * _bell(u[5], u[6])
         return count, k, k
+    if kind == 5 and u[4] < 0.5 and not rules.directed:  # sink quicker or slower, or go down at the waypoint
+        plan.sinking[k] = u[5] if u[5] < MOST_SINKING else (DIVE if u[6] < 0.5 else 0.0)
+        return count, k, k
     if kind == 5:  # fly higher or lower
         height = plan.height_m[k] * np.exp(0.15 * _bell(u[2], u[3]))
         plan.height_m[k] = min(max(height, LEAST_HEIGHT * rules.visibility_m), GREATEST_HEIGHT * rules.visibility_m)
@@ -218,7 +253,11 @@ def change(
     if kind == 8 and has_room:
         m = _unfinished(left_need, u[2])
         if m >= 0:
-            place = _visit(plan, count, start, work.xyz[0, m], work.xyz[1, m], u)
+            x, y = work.xyz[0, m], work.xyz[1, m]
+            place = _visit(plan, count, start, x, y, u)
+            if u[3] < 0.5 and not rules.directed:
+                _dive(plan, place, x, y, GATHERED * rules.visibility_m * u[1])
+                plan.height_m[place] = LEAST_HEIGHT * rules.visibility_m
             return count + 1, place, place + 1
     other = int(u[2] * count)
     if kind == 9 and other != k:

@@ -23,6 +23,9 @@ from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import (
+    DIVE,
+    LOW,
+    SINKING,
     Checkpoints,
     FlownPlan,
     Plan,
@@ -35,15 +38,23 @@ from app.exploration.rollout.flight import (
     make_work,
     new_checkpoints,
 )
-from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m
+from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m, sample
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
+from app.exploration.rollout.tour import tour_of
+from app.exploration.rollout.unseen import SLACK, deeper_than_presumed, look_in_vain
 
 ROOM = 40
 HEIGHT = 0.45
 """Flying height of first plans, in visibilities."""
+
+FIRST_SINKING = 0.3
+"""Part of a step by which vehicles may sink in first plans."""
+
+TOUR_SINKING, TOUR_HEIGHT = 0.6, 0.35
+"""How quickly vehicles sink on tours, in steps, and how high they fly, in visibilities."""
 
 HEDGE = 1.5
 """How much more information a landmark is presumed to need that was never seen, because its depth is a guess."""
@@ -58,6 +69,9 @@ OUTLETS = 400
 """Random moves to choose from where the plan's next step is not feasible."""
 
 UP_COUNTS = 0.3
+
+FEW_LEFT = 0.08
+"""Part of all landmarks of which tours from place to place are tried."""
 
 LINK_OF_RANGE = 29 / 30
 MAY_BE_LEFT = 0.008
@@ -110,9 +124,11 @@ class RolloutPlanner(PlannerBase):
             raise ValueError(f"sensor: whole-mission rollouts need a RangeSensor, not {type(sensor).__name__}")
         super().__init__(options, sensor)
         self._range = sensor
+        self._least_m: FloatArray = np.zeros(0)
         self._names: tuple[str, ...] = ()
         self._kept: Backbone | None = None
         self._heights: FloatArray = np.zeros(0)
+        self._sinking: FloatArray = np.zeros(0)
         self._planned = 0
         self._free: tuple[Constraints, Free] | None = None
         self._felt = FeltBottom()
@@ -127,6 +143,8 @@ class RolloutPlanner(PlannerBase):
             "at_m": None if kept is None else kept.at_m,
             "chain": None if kept is None else kept.chain,
             "heights": self._heights,
+            "sinking": self._sinking,
+            "least": self._least_m,
             "felt": self._felt.remember(),
             "routes": self._routes,
             "away": self._away,
@@ -135,6 +153,8 @@ class RolloutPlanner(PlannerBase):
     def _recall(self, state: dict[str, Any]) -> None:
         self._names, self._planned = tuple(state["names"]), int(state["planned"])
         self._heights = np.array(state["heights"], dtype=np.float64)
+        self._sinking = np.array(state["sinking"], dtype=np.float64)
+        self._least_m = np.array(state["least"], dtype=np.float64)
         self._felt.recall(state["felt"])
         self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 2) for name, at in state["routes"].items()}
         self._away = {str(name): float(part) for name, part in state["away"].items()}
@@ -157,17 +177,21 @@ class RolloutPlanner(PlannerBase):
         if self._free is None or not _same(self._free[0], team.constraints):
             self._free = (team.constraints, free_space(team.constraints))
         self._felt.feel(team)
+        deeper_m, bottom = self._look_for_unseen(team, bottom)
         mission = _Mission(
-            team, bottom, self._felt.points_m, self._free[1], self._range, self.options, np.random.default_rng(seed)
-        )
+            team, bottom, self._felt.points_m, deeper_m, self._least_m, self._free[1], self._range, self.options,
+            np.random.default_rng(seed),
+        )  # fmt: skip
         best = None
         if self._kept is not None and len(self._kept.at_m):
-            best = mission.plan(self._kept, self._heights)
+            best = mission.plan(self._kept, self._heights, self._sinking)
         # Sweeps over unseen ground look better than they are: the plan that stands is not given up for one
         # (measured: changing for a new sweep every 8 steps costs 8 steps, only for one better by 10 still costs them).
         if best is None or self._planned in (0, BACK_SOON):
             rivals = [mission.refine(start, FRESH_SEARCH) for start in mission.fresh_starts(FRESH_STARTS)]
             best = min([*rivals, *([] if best is None else [best])], key=lambda start: start.score, default=None)
+        tour = mission.tour(FRESH_SEARCH)
+        best = tour if best is None or (tour is not None and tour.score < best.score - 1.0) else best
         best = mission.convoy(team.constraints) if best is None else best
         if best is None:
             return Proposal(mission.way_out(team, bottom, mission.towards_work(team.constraints)), 0.0)
@@ -180,6 +204,7 @@ class RolloutPlanner(PlannerBase):
             positions, passed = mission.way_out(team, bottom, wishes[0]), 0
         self._kept = Backbone(best.flown.plan.at_m[passed : best.count].copy(), best.flown.plan.chain.copy())
         self._heights = best.flown.plan.height_m[passed : best.count].copy()
+        self._sinking = best.flown.plan.sinking[passed : best.count].copy()
         self._planned = max(1, self._planned + 1)
         self._felt.ask(team.vehicles, positions)
         terms = {
@@ -237,6 +262,21 @@ class RolloutPlanner(PlannerBase):
         closer = here + leg * np.minimum(1.0, 0.99 * team.constraints.max_step_m / length)
         return settle(team, bottom, np.array([here, closer]))[0]
 
+    def _look_for_unseen(self, team: Situation, bottom: Bottom) -> tuple[FloatArray, Bottom]:
+        """Return landmarks (k, 3) that must lie deeper than their surroundings, and the sea floor with them."""
+        belief, none = team.belief, np.zeros((0, 3))
+        if belief.covariance_m2 is not None or not belief.on_floor or not belief.complete:
+            return none, bottom
+        if len(self._least_m) != len(belief.depth_m):
+            self._least_m = np.full(len(belief.depth_m), -np.inf)
+        sight, deepest = self._range.visibility_m, team.constraints.max_depth_m
+        self._least_m = look_in_vain(self._least_m, belief, team.positions, sight, deepest)
+        deeper = deeper_than_presumed(belief, self._least_m)
+        if not len(deeper):
+            return none, bottom
+        places, depths = np.vstack([belief.xy_m, deeper[:, :2]]), np.append(belief.depth_m, deeper[:, 2])
+        return deeper, Bottom.from_landmarks(places, depths)
+
     def _effort(self, mission: "_Mission") -> int:
         """Return how many changes to try now: many for the first plan, few for what little is left in the end."""
         if self._planned == 0:
@@ -275,6 +315,8 @@ class _Mission:
         team: Situation,
         bottom: Bottom,
         felt_m: FloatArray,
+        deeper_m: FloatArray,
+        least_m: FloatArray,
         free: Free,
         sensor: RangeSensor,
         options: PlannerOptions,
@@ -289,11 +331,12 @@ class _Mission:
         self._com_range = constraints.com_range_m
         self._link = constraints.com_range_m * LINK_OF_RANGE
         self._horizon = float(max(1, team.steps_total - team.step + 1))
+        self._sinking = SINKING if belief.covariance_m2 is not None else FIRST_SINKING
         clearance = constraints.min_altitude_m
         self._height = max(HEIGHT * visibility, clearance + margin_m(visibility, clearance), constraints.lowest_m)
         unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + self._height)
         self._floor: FloorEstimate = estimate_floor(
-            belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m
+            belief, bottom, felt_m, constraints.area, visibility, clearance, unknown, constraints.lowest_m, deeper_m
         )
         self._free = free
         self._rules = Rules(
@@ -306,15 +349,19 @@ class _Mission:
             self._free.everywhere,
             belief.covariance_m2 is not None,
         )
-        self._work: Work = self._left(belief, options)
+        self._work: Work = self._left(belief, least_m, options)
         self._task = Task(self._work, self._floor, self._rules, self._horizon)
 
-    def _left(self, belief: Belief, options: PlannerOptions) -> Work:
+    def _left(self, belief: Belief, least_m: FloatArray, options: PlannerOptions) -> Work:
         hedge = HEDGE if belief.covariance_m2 is None else 1.0
         left = lacking(belief, options.accuracy_sd_m, hedge)
         shown = _sample(left, belief)
         xyz = np.column_stack([belief.xy_m, belief.depth_m])[left.row[shown]]
+        unseen = np.isnan(xyz[:, 2])
         fill_depths(xyz, self._floor)
+        if len(least_m):
+            least = least_m[left.row[shown]] + SLACK * self._sight
+            xyz[unseen, 2] = np.maximum(xyz[unseen, 2], least[unseen])
         tasks = len(belief.xy_m) * len(left.row) / max(1, int((~belief.accurate).sum()))
         part = len(shown) / max(1, len(left.row))
         allowed = np.floor(MAY_BE_LEFT * tasks * part)
@@ -333,14 +380,17 @@ class _Mission:
         """Whether more is left than a plan may leave over."""
         return self._work.allowed > 0.0
 
-    def plan(self, backbone: Backbone, heights: FloatArray, checkpoints: Checkpoints | None = None) -> _Best | None:
+    def plan(
+        self, backbone: Backbone, heights: FloatArray, sinking: FloatArray, checkpoints: Checkpoints | None = None
+    ) -> _Best | None:
         """Complete team waypoints to a plan and fly it; None when there is no allowed way.
 
         A ``checkpoints`` given is overwritten instead of making a new one.
         """
         n, count = len(self._start), min(len(backbone.at_m), ROOM - 4)
-        plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), backbone.chain)
+        plan = Plan(np.zeros((ROOM, n, 2)), np.zeros(ROOM), np.zeros(ROOM), backbone.chain)
         plan.at_m[:count], plan.height_m[:count] = backbone.at_m[:count], heights[:count]
+        plan.sinking[:count] = sinking[:count]
         start = np.ascontiguousarray(self._start[:, :2])
         k = 0
         while k < count:
@@ -353,6 +403,7 @@ class _Mission:
                     plan.at_m[k + 1 : count].copy(),
                     plan.height_m[k + 1 : count].copy(),
                 )
+                plan.sinking[k : count - 1] = plan.sinking[k + 1 : count].copy()
                 count -= 1
                 continue
             k += 1 + changed - count
@@ -372,10 +423,26 @@ class _Mission:
         )
         heights = np.full(ROOM, self._height)
         scratch = new_checkpoints(ROOM, len(self._start), len(self._work.need))
-        flown = [(self.plan(sweep, heights, scratch), sweep) for sweep in sweeps]
+        sinking = np.full(ROOM, self._sinking)
+        flown = [(self.plan(sweep, heights, sinking, scratch), sweep) for sweep in sweeps]
         order = sorted(((best.score, k) for k, (best, _) in enumerate(flown) if best is not None))
-        chosen = [self.plan(flown[k][1], heights) for _, k in order[:most]]
+        chosen = [self.plan(flown[k][1], heights, sinking) for _, k in order[:most]]
         return [best for best in chosen if best is not None]
+
+    def tour(self, changes: int) -> _Best | None:
+        """Return a tour over what is left, improved by some changes; None where that is too much for one."""
+        if len(self._work.need) > FEW_LEFT * self._work.total:
+            return None
+        floor = self._floor
+        above = np.array([
+            sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y) for x, y in self._work.xyz[:2].T
+        ])  # fmt: skip
+        tour = tour_of(self._work.xyz.T, above, self._start[:, :2], self._com_range, self._link, self._sight)
+        count = min(len(tour.dives), ROOM - 4)
+        sinking = np.where(tour.dives, DIVE, TOUR_SINKING)[:count]
+        backbone = Backbone(tour.at_m[:count], tour.chain)
+        best = self.plan(backbone, np.where(tour.dives, LOW, TOUR_HEIGHT)[:count] * self._sight, sinking)
+        return None if best is None else self.refine(best, changes)
 
     def convoy(self, constraints: Constraints) -> _Best | None:
         """Return a plan that brings the team, closed up, on the shortest way to the landmark nearest to its middle.
@@ -383,7 +450,9 @@ class _Mission:
         For when no sweep finds a way between the zones.
         """
         at = np.repeat(self._way_to_work(constraints)[:, None], len(self._start), axis=1)
-        return self.plan(Backbone(at, np.arange(len(self._start))), np.full(ROOM, self._height))
+        return self.plan(
+            Backbone(at, np.arange(len(self._start))), np.full(ROOM, self._height), np.full(ROOM, self._sinking)
+        )
 
     def towards_work(self, constraints: Constraints) -> FloatArray:
         """Return a step (n_vehicles, 3) of the whole team in the direction of that way."""
@@ -405,7 +474,7 @@ class _Mission:
         n = len(self._start)
         like = best.flown.plan
         trial = FlownPlan(
-            Plan(np.zeros_like(like.at_m), np.zeros(ROOM), like.chain),
+            Plan(np.zeros_like(like.at_m), np.zeros(ROOM), np.zeros(ROOM), like.chain),
             new_checkpoints(ROOM, n, len(self._work.need)),
             np.empty(len(self._work.need)),
         )

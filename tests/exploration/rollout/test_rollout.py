@@ -12,6 +12,7 @@ from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief
 from app.exploration.rollout.flight import (
+    DIVE,
     FlownPlan,
     Plan,
     Rules,
@@ -27,6 +28,8 @@ from app.exploration.rollout.floor import ENVELOPE_SLOPE, estimate_floor, sample
 from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
+from app.exploration.rollout.tour import shortest_order, tour_of
+from app.exploration.rollout.unseen import deeper_than_presumed, look_in_vain
 from tests.support.situations import SQUARE, make_situation
 
 CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -62,12 +65,13 @@ def make_case(seed: int, vehicles: int = 3, waypoints: int = 5) -> Any:
     start = np.column_stack([row - 0.8, np.zeros(vehicles)])
     for i in range(vehicles):
         start[i, 2] = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, *start[i, :2]) - 0.05
-    plan = Plan(np.zeros((ROOM, vehicles, 2)), np.zeros(ROOM), np.arange(vehicles))
+    plan = Plan(np.zeros((ROOM, vehicles, 2)), np.zeros(ROOM), np.zeros(ROOM), np.arange(vehicles))
     for k in range(waypoints):
         angle = rng.uniform(0.0, 2.0 * np.pi)
         turned = row @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         plan.at_m[k] = np.clip(rng.uniform(-0.7, 0.7, 2) + turned, -1.0, 1.0)
         plan.height_m[k] = rng.uniform(0.12, 0.25)
+        plan.sinking[k] = rng.choice([0.0, 0.5, DIVE])
     work, _ = make_work(np.column_stack([belief.xy_m, depth]), np.full(len(depth), 2500.0), CUBE, 0.15, 2.0, 250, 30.0)
     return start, plan, waypoints, work, floor
 
@@ -94,7 +98,7 @@ def flown(
 
 
 def copied(plan: Plan) -> Any:
-    return Plan(plan.at_m.copy(), plan.height_m.copy(), plan.chain)
+    return Plan(plan.at_m.copy(), plan.height_m.copy(), plan.sinking.copy(), plan.chain)
 
 
 @given(seed=st.integers(0, 1000), at=st.tuples(*[st.floats(-1.2, 1.2)] * 2, st.floats(-0.2, 0.9)))
@@ -125,7 +129,8 @@ def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: int) -> No
         for i in range(2):
             assert np.linalg.norm(after[i] - after[i + 1]) <= RULES.com_range_m + 1e-6
         for x, y, z in after:
-            assert z <= sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, x, y) - CLEARANCE + 1e-6
+            clear = sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+            assert z <= max(clear, sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)) + 1e-6
         at = after.copy()
     assert k == count, "the plan is flown to its end"
 
@@ -182,7 +187,7 @@ def test_ways_lead_round_zones_with_the_team_together(seed: int) -> None:
     constraints = Constraints(CUBE, (zone,))
     free = free_space(constraints)
     start = np.array([[-0.9, -0.9], [-0.9, -0.7], [-0.9, -0.5]])
-    plan = Plan(np.zeros((ROOM, 3, 2)), np.zeros(ROOM), np.arange(3))
+    plan = Plan(np.zeros((ROOM, 3, 2)), np.zeros(ROOM), np.zeros(ROOM), np.arange(3))
     plan.at_m[0] = [[0.9, 0.5], [0.9, 0.7], [0.9, 0.9]]
     assert settle_waypoint(free, plan.at_m[0], plan.chain, LINK)
     count = clear_ways(free, plan, 1, start, 0, 0, LINK)
@@ -195,6 +200,114 @@ def test_ways_lead_round_zones_with_the_team_together(seed: int) -> None:
             assert not ((at > low) & (at < high)).all(axis=1).any()
             assert (np.hypot(*np.diff(at, axis=0).T) <= LINK + 1e-9).all()
         here = plan.at_m[k]
+
+
+def over_a_pit() -> Any:
+    """Two vehicles beside a pit at (0, 0), narrower than it is deep; one landmark on its bottom, at 0.9."""
+    rng = np.random.default_rng(0)
+    xy = np.vstack([rng.uniform(-1.0, 1.0, (900, 2)), np.zeros((1, 2))])
+    depth = np.where(np.hypot(*xy.T) < 0.12, 0.9, 0.3)
+    belief = Belief(xy, depth, np.full(len(xy), 0.01), np.zeros(len(xy), dtype=bool), np.ones(len(xy)), 0.2)
+    start = np.array([[-0.3, 0.0, 0.15], [-0.1, 0.0, 0.15]])
+    plan = Plan(np.zeros((ROOM, 2, 2)), np.full(ROOM, 0.1), np.zeros(ROOM), np.arange(2))
+    plan.at_m[0] = [[-0.01, 0.0], [0.01, 0.0]]
+    plan.at_m[1] = [[0.3, 0.0], [0.5, 0.0]]
+    return belief, start, plan
+
+
+def test_only_a_dive_goes_down_into_a_steep_pit_and_comes_up_again() -> None:
+    belief, start, plan = over_a_pit()
+    floor = floor_of(belief)
+    lowest = []
+    for dives in (False, True):
+        plan.sinking[0] = DIVE if dives else 0.5
+        at, k, after, path = start, 0, np.empty_like(start), []
+        while k < 2 and len(path) < 100:
+            k = fly_step(at, plan, k, 2, floor, RULES, after)
+            assert (np.linalg.norm(after - at, axis=1) <= RULES.step_m + 1e-9).all()
+            assert np.linalg.norm(after[0] - after[1]) <= RULES.com_range_m + 1e-6
+            at = after.copy()
+            path.append(at)
+        assert k == 2
+        lowest.append(max(float(step[:, 2].max()) for step in path))
+        assert (path[-1][:, 2] < 0.3).all()
+    assert lowest[0] < 0.45
+    assert lowest[1] > 0.7
+
+
+def test_a_plan_that_leaves_what_can_be_taken_costs_more_than_one_that_takes_it() -> None:
+    belief, start, plan = over_a_pit()
+    floor = floor_of(belief)
+    xyz = np.array([[0.0, 0.0, 0.9], [0.01, 0.01, 0.9]])
+    work, _ = make_work(xyz, np.full(2, 2500.0), CUBE, 0.15, 0.0, 900, 30.0)
+    scores = []
+    for sinking in (DIVE, 0.0):
+        plan.sinking[0] = sinking
+        score, left, _ = flown(start, plan, 2, work, floor)
+        scores.append(score)
+        assert (left > 0.0).any() == (sinking == 0.0)
+    assert scores[0] < scores[1]
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=25, deadline=None)
+def test_landmarks_looked_for_in_vain_are_never_presumed_deeper_than_they_are(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-1.0, 1.0, (300, 2))
+    depth = np.where(np.hypot(*(xy - rng.uniform(-0.5, 0.5, 2)).T) < 0.25, rng.uniform(0.6, 1.0), 0.3)
+    depth_known, least = np.full(300, np.nan), np.full(300, -np.inf)
+    for _ in range(12):
+        at = np.column_stack([rng.uniform(-1.0, 1.0, (3, 2)), rng.uniform(0.0, 0.24, 3)])
+        away = np.linalg.norm(at[:, None] - np.column_stack([xy, depth])[None], axis=2).min(axis=0)
+        depth_known[away < 0.4] = depth[away < 0.4]
+        belief = Belief(xy, depth_known.copy(), np.ones(300), np.zeros(300, dtype=bool), np.ones(300), 0.2)
+        least = look_in_vain(least, belief, at, 0.4, 1.0)
+    assert (least <= depth + 1e-9).all()
+    deeper = deeper_than_presumed(belief, least)
+    assert np.isnan(depth_known[[int(np.hypot(*(xy - at[:2]).T).argmin()) for at in deeper]]).all()
+
+
+def test_a_landmark_on_a_wall_above_is_not_presumed_deep() -> None:
+    xy = np.array([[0.0, 0.0], [0.3, 0.0], [0.31, 0.0]])
+    depth = np.array([0.9, 0.2, np.nan])
+    belief = Belief(xy, depth, np.ones(3), np.zeros(3, dtype=bool), np.ones(3), 0.2)
+    in_the_pit, above = np.array([[0.0, 0.0, 0.8]]), np.array([[0.3, 0.0, 0.1]])
+    none = np.full(3, -np.inf)
+    assert look_in_vain(none, belief, in_the_pit, 0.4, 1.5)[2] == -np.inf
+    assert look_in_vain(none, belief, above, 0.4, 1.5)[2] == pytest.approx(0.1 + np.sqrt(0.4**2 - 0.01**2))
+
+
+@given(seed=st.integers(0, 1000), n=st.integers(1, 40))
+@settings(max_examples=25, deadline=None)
+def test_a_tour_passes_every_landmark_and_keeps_its_links(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    left = np.column_stack([rng.uniform(-0.9, 0.9, (n, 2)), rng.uniform(0.3, 0.9, n)])
+    here = np.array([[-0.9, -0.9], [-0.8, -0.9], [-0.9, -0.8]])
+    tour = tour_of(left, np.full(n, 0.2), here, 0.3, LINK, 0.4)
+    gaps = np.hypot(*np.diff(tour.at_m[:, tour.chain], axis=1).transpose(2, 0, 1))
+    assert (gaps <= LINK).all()
+    middles = tour.at_m.mean(axis=1)
+    away = np.hypot(*(left[:, None, :2] - middles[None]).transpose(2, 0, 1))
+    assert (away.min(axis=1) <= 2 * 0.35 * 0.4).all()
+    deep = left[:, 2] - 0.2 > 0.75 * 0.4
+    assert tour.dives.any() == deep.any()
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=25, deadline=None)
+def test_no_section_of_a_short_way_is_better_flown_the_other_way_round(seed: int) -> None:
+    places = np.random.default_rng(seed).uniform(-1.0, 1.0, (7, 2))
+    start = np.zeros(2)
+    order = shortest_order(start, places)
+    assert sorted(order) == list(range(7))
+
+    def length(which: Any) -> float:
+        return float(np.hypot(*np.diff(np.vstack([start, places[which]]), axis=0).T).sum())
+
+    for i in range(7):
+        for j in range(i + 1, 7):
+            turned = np.concatenate([order[:i], order[i : j + 1][::-1], order[j + 1 :]])
+            assert length(order) <= length(turned) + 1e-9
 
 
 def test_the_envelope_lets_every_rise_be_climbed() -> None:
