@@ -12029,7 +12029,7 @@ export interface operations {
     importSoundings: {
         parameters: {
             query: {
-                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or .000 (ENC cell) */
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars) */
                 filename: string;
                 /** @description Where it comes from, kept with the mission */
                 source?: string;
@@ -12307,7 +12307,7 @@ export interface operations {
     setReference: {
         parameters: {
             query: {
-                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102) or .000 (ENC cell) */
+                /** @description Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5 (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars) */
                 filename: string;
                 /** @description Where it comes from, kept with the mission */
                 source?: string;
