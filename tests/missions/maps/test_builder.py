@@ -1,12 +1,15 @@
 """From soundings to the map and the belief."""
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
 
 from app.mapping.swath.pings import Footprints, Pings
+from app.missions.maps import builder as builder_module
 from app.missions.maps.builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
 from tests.support.missions.maps import AREA, built_of, soundings
 
@@ -47,6 +50,31 @@ def test_a_map_of_its_own_soundings_knows_nothing_of_imported_ones() -> None:
     np.testing.assert_array_equal(own.depth_m, expected.depth_m)
     np.testing.assert_array_equal(own.sd_m, expected.sd_m)
     assert np.abs(fused.map.depth_m - own.depth_m).max() > 0.03
+
+
+def test_no_decision_waits_for_a_map_that_is_made_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(builder_module, "HEAVY", 1)
+    builder = built_of(soundings(60))
+    newest, begun, go_on = builder.newest, threading.Event(), threading.Event()
+
+    def elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:
+        begun.set()
+        assert go_on.wait(240)
+        return work(*arguments)
+
+    builder.elsewhere = elsewhere
+    with ThreadPoolExecutor(1) as pool:
+        thorough = pool.submit(builder.build, thorough=True)
+        assert begun.wait(240)
+        builder.add(soundings(5, seed=7))
+        assert builder.build() is newest
+        go_on.set()
+        made = thorough.result()
+    assert made is not None
+    assert made.thorough
+    after = builder.build()
+    assert after is not None
+    assert after.soundings == 65
 
 
 def test_the_same_soundings_give_the_same_digest() -> None:
