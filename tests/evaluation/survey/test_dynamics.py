@@ -16,7 +16,7 @@ from app.exploration.planner.options import PlannerOptions
 from simulator.seafloors import generate
 from simulator.terrain_files import save_npz
 
-MINUTES = 2.5
+MINUTES = 1.5
 QUICK = PlannerOptions(search=50, candidates=16)
 
 

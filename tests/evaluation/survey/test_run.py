@@ -57,13 +57,13 @@ def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Terrain) -> No
 
 
 def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Terrain) -> None:
-    run = run_survey(SurveyScenario(harbour, steps=14, seed=0), "cao", QUICK)
+    run = run_survey(SurveyScenario(harbour, steps=8, seed=0), "cao", QUICK)
     relief = float(np.std(harbour.z_m))
     for result in (run, run.usual_practice, run.coverage, run.even, run.oracle):
         assert 0.0 < result.rmse_m < relief
         assert result.l2_norm == pytest.approx(result.rmse_m * 60.0, rel=1e-6)
         assert 0.0 <= result.coverage_pct <= 100.0
-        assert result.distance_m <= 2 * 140.0 + 1e-6
+        assert result.distance_m <= 2 * 80.0 + 1e-6
     assert run.usual_practice.distance_m <= run.distance_m + 1e-6
     assert run.ratio == pytest.approx(run.rmse_m / min(r.rmse_m for r in (run.usual_practice, run.coverage, run.even)))
     assert run.recorded_track is None
@@ -95,7 +95,7 @@ def test_floors_with_holes_are_surveyed_also_when_the_first_place_gives_no_echo(
     floor = generate("reef", 1, width_m=40.0, height_m=40.0)
     holes = floor.z_m.copy()
     holes[:14, :20] = np.nan
-    run = run_survey(SurveyScenario(replace(floor, z_m=holes), 2, 12, 10.0), "cao", PlannerOptions(search=40))
+    run = run_survey(SurveyScenario(replace(floor, z_m=holes), 2, 6, 10.0), "cao", PlannerOptions(search=40))
     assert 0.0 < run.rmse_m < 3.0
     assert 0.0 < run.even.rmse_m < 3.0
     nothing = Terrain(np.where(np.isnan(holes), 5.0, np.nan), 1.0)
@@ -117,7 +117,7 @@ def test_even_lines_are_whole_and_fit_into_the_distance() -> None:
 def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated() -> None:
     ratios = []
     for seed in (1, 2):
-        scenario = SurveyScenario(generate("harbour", seed, width_m=70.0, height_m=70.0), steps=40, seed=seed)
+        scenario = SurveyScenario(generate("harbour", seed, width_m=60.0, height_m=60.0), steps=28, seed=seed)
         track = fly_planner(scenario, "cao", PlannerOptions())
         ours, _ = rmse_m(default_map(track.soundings, scenario.grid), scenario.terrain)
         lawnmower = lawnmower_baseline(
