@@ -60,7 +60,7 @@ def deeper_than_presumed(belief: Belief, least_m: FloatArray) -> FloatArray:
 def _presumed(belief: Belief, known: IntArray, rows: IntArray) -> FloatArray:
     """Return the mean depth of the known neighbours of some landmarks, the closer ones counting more."""
     k = min(NEIGHBOURS, len(known))
-    away, which = cKDTree(belief.xy_m[known]).query(belief.xy_m[rows], k=k)
-    away, which = away.reshape(len(rows), k), which.reshape(len(rows), k)
+    found = cKDTree(belief.xy_m[known]).query(belief.xy_m[rows], k=k)
+    away, which = (np.asarray(part).reshape(len(rows), k) for part in found)
     weight = 1.0 / (away**2 + 1e-6)
     return np.asarray((weight * belief.depth_m[known][which]).sum(axis=1) / weight.sum(axis=1))

@@ -221,7 +221,8 @@ def test_only_a_dive_goes_down_into_a_steep_pit_and_comes_up_again() -> None:
     lowest = []
     for dives in (False, True):
         plan.sinking[0] = DIVE if dives else 0.5
-        at, k, after, path = start, 0, np.empty_like(start), []
+        at, k, after = start, 0, np.empty_like(start)
+        path: list[Any] = []
         while k < 2 and len(path) < 100:
             k = fly_step(at, plan, k, 2, floor, RULES, after)
             assert (np.linalg.norm(after - at, axis=1) <= RULES.step_m + 1e-9).all()
