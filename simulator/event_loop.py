@@ -44,7 +44,7 @@ class SimulatedTimeLoop(asyncio.SelectorEventLoop):
         self.in_threads -= 1
 
 
-class _Selector(selectors.DefaultSelector):  # type: ignore[valid-type,misc]
+class _Selector(selectors.DefaultSelector):
     """Lets the time go on where the loop would wait for it."""
 
     def __init__(self, loop: SimulatedTimeLoop) -> None:
