@@ -10,7 +10,7 @@ import asyncio
 import resource
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.mapping.georeference import LocalFrame
@@ -23,7 +23,7 @@ from tests.support.multibeam import line, write_gsf, write_kmall
 
 FRAME = LocalFrame(41.185, -8.704)
 PLACE = MapExtent(FRAME, Grid(-500.0, -500.0, 1.0, 1000, 1000), 10.0)
-WRITERS = {"gsf": write_gsf, "kmall": write_kmall}
+WRITERS: dict[str, Callable[..., bytes]] = {"gsf": write_gsf, "kmall": write_kmall}
 BEGIN_BYTES = {"gsf": 20, "kmall": 0}
 """What stands at a file's begin only."""
 
