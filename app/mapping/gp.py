@@ -118,8 +118,6 @@ class GaussianProcessMap:
     merge_m
         Side of the squares whose soundings are merged into one; by default 1/100 of the extent of the
         soundings, less where there are many.
-    least_merge_m
-        The squares do not get smaller than that however many soundings there are, unless 1/100 of the extent is.
     reject_outliers
         Leave out soundings that ``flag_outliers`` rejects.
     hole_m
@@ -129,6 +127,9 @@ class GaussianProcessMap:
 
     Attributes
     ----------
+    least_merge_m : float
+        May be set before ``fit``: the squares of merged soundings do not get smaller than that however many soundings
+        there are, unless 1/100 of the extent is.
     hyperparameters_ : Hyperparameters
         As used in the prediction.
     stationary_hyperparameters_ : Hyperparameters
@@ -150,7 +151,6 @@ class GaussianProcessMap:
         learning_points: int = 350,
         hole_points: int | None = None,
         merge_m: float | None = None,
-        least_merge_m: float = 0.0,
         hole_m: float | None = None,
         reject_outliers: bool = True,
         calibrate: bool = True,
@@ -164,7 +164,7 @@ class GaussianProcessMap:
         self.learning_points = learning_points
         self.hole_points = hole_points
         self.merge_m = merge_m
-        self.least_merge_m = least_merge_m
+        self.least_merge_m = 0.0
         self.hole_m = hole_m
         self.reject_outliers = reject_outliers
         self.calibrate = calibrate

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Boolean, ColumnElement, Double, Integer, Select, cast, make_url
 from sqlalchemy.dialects import sqlite
-from sqlalchemy.dialects.postgresql import asyncpg
 
 from app.storage.database import BUSY_TIMEOUT_MS, Database
 
@@ -76,10 +75,10 @@ async def _stream(database: Database, query: Select[*tuple[Any, ...]], take: Tak
 
 async def _copy(database: Database, query: Select[*tuple[Any, ...]], width: int, take: TakeNumbers) -> None:
     wanted = query.with_only_columns(*map(_as_double, query.selected_columns))
-    compiled = wanted.compile(dialect=asyncpg.dialect())
-    values = [compiled.params[name] for name in compiled.positiontup or ()]
     copied = _Copied(width, take)
     async with database.reading() as session:
+        compiled = wanted.compile(dialect=session.get_bind().dialect)
+        values = [compiled.params[name] for name in compiled.positiontup or ()]
         pooled = await (await session.connection()).get_raw_connection()
         connection: Any = pooled.driver_connection
         await connection.copy_from_query(str(compiled), *values, output=copied.receive, format="binary")
