@@ -196,7 +196,10 @@ def try_it(ship: Ship, file: str) -> None:
         ship.run("systemctl", "stop", "bathyfleet")
         _expect((ship.shows("Result"), ship.shows("ExecMainStatus")), ("success", "0"))
         log = ship.run("journalctl", "--no-pager", "--unit=bathyfleet.service")
-        _expect("acknowledged the stop" in log, True)
+        _expect(
+            [name for name in ("first", "second") if f"the service ends: {name} acknowledged the stop" in log],
+            ["first", "second"],
+        )
     with Step("upgraded: install.sh again, the version before stays, the mission goes on"):
         ship.run("sh", "-c", install)
         ship.run("test", "-x", "/opt/bathyfleet.old/bin/bathyfleet")
