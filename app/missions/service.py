@@ -185,7 +185,12 @@ class MissionService:
         self.compute.end()
         await self._failover.end()
         await self.alarms.close()
-        await asyncio.gather(*(self._supervisor.halt(live) for live in self._registry if live.id in self._runs))
+        flying = [live for live in self._registry if live.id in self._runs]
+        for live, stops in zip(flying, await asyncio.gather(*map(self._supervisor.halt, flying)), strict=True):
+            for stop in stops:
+                tell = log.info if stop.acknowledged else log.error
+                words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
+                tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
         await self.maps.close()
         await self.traffic.close()
         await self.hub.close()

@@ -15,6 +15,7 @@ import rasterio
 from PIL import Image
 from shapely.geometry import Point, Polygon
 from sqlalchemy import event, select
+from structlog.testing import CapturingLogger
 
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Proposal, Situation
@@ -663,6 +664,18 @@ async def test_a_restart_goes_on_after_the_last_step(harbour: Harbour, database:
     verdicts = [row.verdict for row in await soundings_of(await harbour.service.get(mission_id))]
     ended = await view_of(harbour.service, mission_id)
     assert ended.progress.soundings == verdicts.count("accepted")
+
+
+async def test_the_log_of_a_service_that_ends_says_who_was_stopped(
+    harbour: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mission_id = await started(harbour.service, sim_spec("a", "b", steps=50))
+    await until_step(harbour.service, mission_id, 1)
+    log = CapturingLogger()
+    monkeypatch.setattr("app.missions.service.log", log)
+    await harbour.close()
+    said = [call.args[0] for call in log.calls if call.method_name == "info"]
+    assert said == [f"the service ends: {name} acknowledged the stop" for name in ("a", "b")]
 
 
 async def test_a_paused_mission_is_paused_after_a_restart_and_keeps_its_vehicles(harbour: Harbour) -> None:
