@@ -182,7 +182,6 @@ def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(page
         for i in range(64)
     ]
     service.post(f"/missions/{mission}/measurements", {"items": items})
-    service.get(f"/missions/{mission}/map")
     show(page, mission)
     by_id(page, "open-3d").click()
     by_id(page, "toggle-points").click()
