@@ -22,7 +22,7 @@ def test_what_was_learned_predicts_the_same_without_the_soundings() -> None:
     bare = fitted.learned()
     assert len(pickle.dumps(bare)) < 5000
     expected = fitted.fit(Soundings.of_rows(rows()), learn=False).predict(GRID, EVERYWHERE)
-    found, model = mapped(rows(), bare, GRID, EVERYWHERE)
+    found, model = mapped(rows(), np.ones(150, dtype=bool), bare, GRID, EVERYWHERE)
     np.testing.assert_array_equal(found.depth_m, expected.depth_m)
     np.testing.assert_array_equal(found.claim_sd_m, expected.claim_sd_m)
     assert model.hyperparameters_ == fitted.hyperparameters_
@@ -35,8 +35,10 @@ def test_outliers_are_named_by_number_but_for_those_that_are_trusted() -> None:
     model = GaussianProcessMap(reject_outliers=False)
     assert sorted(judged(wrong, trusted, model)[1]) == [20, 70]
     trusted[70] = True
-    learned, reasons = judged(wrong, trusted, model)
+    learned, reasons, made = judged(wrong, trusted, model, GRID, EVERYWHERE)
     assert list(reasons) == [20]
     assert reasons[20]
+    assert made is not None
+    assert judged(wrong, trusted, model)[2] is None
     assert not hasattr(model, "hyperparameters_")
     assert hasattr(learned, "hyperparameters_")
