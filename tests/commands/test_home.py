@@ -116,3 +116,12 @@ def test_missions_go_the_same_way_whenever_they_are_flown_with_lost_links(
     for name, vehicle in once["vehicles"].items():
         assert vehicle["from_point_m"] == pytest.approx(again["vehicles"][name]["from_point_m"], abs=5.0)
         assert vehicle["energy_left_pct"] == pytest.approx(again["vehicles"][name]["energy_left_pct"], abs=0.2)
+
+
+def test_who_has_energy_for_the_legs_it_has_and_no_further_one_keeps_nobody_busy() -> None:
+    """It was decided for again and again meanwhile: here time stood still, elsewhere nobody else was led."""
+    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 5.0}]
+    spec = sim_spec(side_m=60.0, steps=1000, recovery={"point": lon_lat(30.0, -40.0)}, vehicles=vehicles)
+    found = fly_mission(spec, SimulationSettings(), None, 0, 20.0)
+    assert found["wrong"] == [], found
+    assert "energy" in found["vehicles"]["a"]["why"]

@@ -214,6 +214,8 @@ class OwnLegs:
             return True
         if not member.ahead and not member.ordered:
             self._live.withdraw(member, Response.RETURN, "its energy lasts for its way home and for no further leg")
+        # It flies the legs it has. Looked at again at once it would be decided for all that time, and others wait.
+        self._look_later({member.name})
         return False
 
     def _has_leg(self, name: str, number: int) -> bool:
