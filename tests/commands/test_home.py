@@ -100,22 +100,16 @@ def test_missions_follow_from_their_seed() -> None:
     assert [drawn(seed, still=False)[1].consumption_factor for seed in range(5)] == [1.0, 1.0, 1.0, 1.0, 1.3]
 
 
-def test_missions_go_the_same_way_whenever_they_are_flown_with_lost_links(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_everybody_comes_home_although_links_are_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(home, "WITHIN_REACH_S", (15.0, 40.0))
     monkeypatch.setattr(home, "OUT_OF_REACH_S", (5.0, 30.0))
     spec = sim_spec("a", "b", side_m=60.0, steps=8, recovery={"point": lon_lat(30.0, -40.0)})
-    flown = [fly_mission(spec, SimulationSettings(current_mps=(0.1, 0.0)), None, 1, 20.0) for _ in range(2)]
-    assert flown[0]["wrong"] == [], flown[0]
-    assert flown[0]["links_lost"] > 0
-    assert flown[0]["minutes"] > 2.0
-    # What two threads finish at the same moment comes in either order: metres and figures after the point may differ.
-    once, again = flown
-    assert (once["minutes"], once["links_lost"]) == (again["minutes"], again["links_lost"])
-    for name, vehicle in once["vehicles"].items():
-        assert vehicle["from_point_m"] == pytest.approx(again["vehicles"][name]["from_point_m"], abs=5.0)
-        assert vehicle["energy_left_pct"] == pytest.approx(again["vehicles"][name]["energy_left_pct"], abs=0.2)
+    flown = fly_mission(spec, SimulationSettings(current_mps=(0.1, 0.0)), None, 1, 20.0)
+    assert flown["wrong"] == [], flown
+    assert flown["links_lost"] > 0
+    assert flown["minutes"] > 2.0
+    assert len(flown["vehicles"]) == 2
+    assert all(vehicle["from_point_m"] <= 25.0 for vehicle in flown["vehicles"].values())
 
 
 def test_who_has_energy_for_the_legs_it_has_and_no_further_one_keeps_nobody_busy() -> None:

@@ -9,6 +9,7 @@ import pytest
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import FaultKind
 from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.flight.commit import home_of
 from app.missions.flown import Phase
 from app.missions.operations.history import events_after
 from app.missions.running.homecoming import call_home, hold
@@ -122,7 +123,10 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     live = await service.get(mission.id)
     await call_home(live, "a", "Ana")
     on_its_way = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
-    assert on_its_way.way_home[-1] == pytest.approx(OUTSIDE, abs=1e-6)
+    berth_m = home_of(live.team.members["a"], live.spec)
+    assert berth_m is not None
+    lat, lon = live.frame.to_geographic(*berth_m)
+    assert on_its_way.way_home[-1] == pytest.approx((float(lon), float(lat)), abs=1e-6)
     with pytest.raises(ConflictError, match="called home by Ana"):
         await call_home(live, "a", "Ana")
 

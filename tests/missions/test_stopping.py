@@ -2,8 +2,9 @@
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -42,15 +43,15 @@ class Hold:
 async def held_maps(harbour: Harbour, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Hold]:
     """Thorough maps take as long as a test wants, with the builder's own lock held."""
     hold = Hold()
-    learn = MapBuilder.learn
+    learn = MapBuilder._learn
 
-    def held(builder: MapBuilder, *, always: bool = False) -> None:
+    def held(builder: MapBuilder, compute: Callable[..., Any], *, always: bool, mapping: bool = False) -> Any:
         if always:
             hold.begun.set()
             hold.free.wait()
-        learn(builder, always=always)
+        return learn(builder, compute, always=always, mapping=mapping)
 
-    monkeypatch.setattr(MapBuilder, "learn", held)
+    monkeypatch.setattr(MapBuilder, "_learn", held)
     yield hold
     hold.free.set()
 

@@ -12,6 +12,7 @@ import pytest
 
 from app.missions.errors import InvalidRequestError, MapNotReadyError, ProductUnavailableError
 from app.missions.operations.workshop import Workshop
+from tests.support.children import new_children
 from tests.support.waiting import until
 
 
@@ -103,8 +104,9 @@ async def test_a_process_that_is_not_needed_after_all_leaves_room(workshop: Work
     with pytest.raises(MapNotReadyError):
         async with workshop.process("json"):
             raise MapNotReadyError("there is nothing yet")
+    children = new_children()
     async with workshop.process("json") as process:
-        psutil.Process().children()[0].kill()
+        children()[0].kill()
         with pytest.raises(ProductUnavailableError, match="signal 9"):
             await process.make(divide, 1.0, 2.0)
     assert await workshop.make(divide, 1.0, 2.0) == 0.5

@@ -19,6 +19,7 @@ from app.missions.report.kinds import REPORTS
 from app.missions.report.texts import Language
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
+from tests.support.children import new_children
 from tests.support.missions.harbour import Harbour
 from tests.support.missions.specs import make_spec
 from tests.support.tracks import flown, lawnmower, pinged
@@ -81,10 +82,10 @@ async def test_they_are_what_they_would_be_here(
 
 
 async def test_one_that_everybody_left_makes_room_for_the_next(harbour: Harbour, live: LiveMission) -> None:
-    here = psutil.Process()
+    children = new_children()
     first, second = (asyncio.create_task(reported(harbour, live)) for _ in range(2))
-    await until(here.children, "a process makes the report")
-    (process,) = here.children()
+    await until(children, "a process makes the report")
+    (process,) = children()
     first.cancel()
     await asyncio.wait([first])
     assert process.is_running(), "somebody waits for it"
@@ -96,10 +97,10 @@ async def test_one_that_everybody_left_makes_room_for_the_next(harbour: Harbour,
 async def test_one_whose_process_is_killed_is_told_so_and_can_be_asked_for_again(
     harbour: Harbour, live: LiveMission
 ) -> None:
-    here = psutil.Process()
+    children = new_children()
     asked = asyncio.create_task(exported(harbour, live, "tif"))
-    await until(here.children, "a process makes the file")
-    here.children()[0].kill()
+    await until(children, "a process makes the file")
+    children()[0].kill()
     with pytest.raises(ProductUnavailableError, match="memory may be short"):
         await asked
     assert (await exported(harbour, live, "tif")).content[:2] in (b"II", b"MM")
@@ -107,6 +108,7 @@ async def test_one_whose_process_is_killed_is_told_so_and_can_be_asked_for_again
 
 async def test_without_a_map_there_is_no_process(harbour: Harbour, live: LiveMission) -> None:
     empty = await harbour.service.get((await harbour.service.create(make_spec(name="empty"))).id)
+    children = new_children()
     with pytest.raises(MapNotReadyError):
         await exported(harbour, empty, "tif")
-    assert not psutil.Process().children()
+    assert not children()
