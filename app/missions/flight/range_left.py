@@ -11,11 +11,12 @@ from app.exploration.core.constraints import Constraints
 from app.missions import safety
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
-from app.missions.recovery.berths import DepthLayer, layer_of
+from app.missions.recovery.berths import layer_of
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
+from imc_bridge.control.layers import DepthLayer
 
 LAND_PERIOD_S = 10.0
 """How often is looked whether the map shows other shallows, seconds of the event loop's time."""

@@ -38,7 +38,7 @@ def berth_m(home_m: FloatArray, slot: int, sharing: int, spacing_m: float) -> Fl
     """
     if sharing < 2 and slot == 0:
         return home_m
-    return home_m + spacing_m * _places(slot + 1)[slot]
+    return np.asarray(home_m + spacing_m * _places(slot + 1)[slot])
 
 
 def berth_spacing_m(spec: MissionSpec) -> float:

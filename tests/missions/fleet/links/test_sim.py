@@ -165,7 +165,7 @@ async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_
                 await refused
         assert not (await link.stop(NAME)).acknowledged
         heard, before = len(events), link.battery_pct(NAME)
-        await until(lambda: link.vehicles()[0].age_s * 20.0 > FORSAKEN_S + 20.0, "it is silent for long")
+        await until(lambda: (link.vehicles()[0].age_s or 0.0) * 20.0 > FORSAKEN_S + 20.0, "it is silent for long")
         assert len(events) == heard
         assert link.battery_pct(NAME) < before, "it lives on"
         await until(lambda: link.true_position(NAME).depth_m < 0.2, "it has come up")
