@@ -10,10 +10,13 @@ from __future__ import annotations
 import asyncio
 import selectors
 import sys
+import time
 from typing import Any
 
 BEGIN_S = 1000.0
 """Where its time begins."""
+
+RESOLUTION_S = time.get_clock_info("monotonic").resolution
 
 THREADS = frozenset({"asyncio.futures", "aiosqlite.core"})
 """Modules that make futures which a thread settles: whatever runs in an executor, and connections to SQLite."""
@@ -58,5 +61,6 @@ class _Selector(selectors.DefaultSelector):
             return ready
         ready = super().select(0.0)
         if not ready and timeout > 0.0:
-            self._loop.now_s += timeout
+            # Never by less than the loop tells moments apart: rounding would have it wait for the same one again.
+            self._loop.now_s += max(timeout, RESOLUTION_S)
         return ready

@@ -131,8 +131,9 @@ class OwnLegs:
     async def _until_needed(self, sending: asyncio.Task[None]) -> None:
         if sending.done():
             sending.result()  # raises what went wrong
-        later_s = min(self._again_at_s.values(), default=None)
         now_s = asyncio.get_running_loop().time()
+        # Whose time has come and who gets no leg all the same needs none now: waiting for it would be no waiting.
+        later_s = min((at_s for at_s in self._again_at_s.values() if at_s > now_s), default=None)
         # Vehicles come nearer to the end of their legs without telling anything new.
         fastest_mps = max((self._spec.speed_of(member.spec) for member in self._live.team), default=1.0)
         soon_s = now_s + 0.5 * self._spec.limits.max_step_m / (fastest_mps * self._time_scale)
@@ -148,7 +149,7 @@ class OwnLegs:
                 or self._nobody_to_lead
                 or sending.done()
             ),
-            soon_s if later_s is None else min(max(later_s, now_s), soon_s),
+            soon_s if later_s is None else min(later_s, soon_s),
         )
 
     async def _decide(self, getting: list[Member]) -> None:
