@@ -113,9 +113,9 @@ def test_everybody_comes_home_although_links_are_lost(monkeypatch: pytest.Monkey
 
 
 def test_who_has_energy_for_the_legs_it_has_and_no_further_one_keeps_nobody_busy() -> None:
-    """It was decided for again and again meanwhile: here time stood still, elsewhere nobody else was led."""
-    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 5.0}]
+    """It was looked at and decided for without a pause meanwhile: here time stood still, elsewhere others waited."""
+    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 5.0}, {"name": "b", "kind": "sim", "endurance_min": 7.0}]
     spec = sim_spec(side_m=60.0, steps=1000, recovery={"point": lon_lat(30.0, -40.0)}, vehicles=vehicles)
     found = fly_mission(spec, SimulationSettings(), None, 0, 20.0)
     assert found["wrong"] == [], found
-    assert "energy" in found["vehicles"]["a"]["why"]
+    assert all("energy" in vehicle["why"] for vehicle in found["vehicles"].values())
