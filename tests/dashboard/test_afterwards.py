@@ -222,7 +222,9 @@ def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(page
     withdrawn = service.get(f"/missions/{mission}/soundings?state=withdrawn")["items"]
     assert {sounding["reason"] for sounding in withdrawn} == {"rejected by local operator: fish"}
     by_id(page, "lasso").focus()
-    page.keyboard.press("Control+z")
+    with page.expect_response("**/soundings/restore") as answered:
+        page.keyboard.press("Control+z")
+    assert answered.value.ok
     expect(by_id(page, "points-undo")).to_be_disabled()
     assert states() == {"restored": fewer, "used": 64 - fewer}
     by_id(page, "close-3d").click()

@@ -189,7 +189,8 @@ def test_an_entry_into_a_zone_is_told_over_the_map_and_on_the_card(page: Page, s
     expect(by_id(other, "alarms")).to_contain_text("rover is in keep-out zone 1")
     by_id(page, "take-alarms").click()
     for either in (page, other):
-        expect(by_id(either, "alarms")).not_to_be_visible()
+        # Another alarm may have come meanwhile: on a busy machine the vehicle counts as lost.
+        expect(by_id(either, "alarms").locator("li", has_text="keep-out zone 1")).to_have_count(0)
         expect(by_id(either, "taken-alarm")).to_contain_text("took “rover is in keep-out zone 1")
     other.close()
 
