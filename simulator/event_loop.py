@@ -1,8 +1,8 @@
 """An event loop whose time is simulated: it goes on as soon as nobody has anything left to do.
 
-A service that runs on it lives as fast as the machine allows, and no slower machine or busier moment changes what
-happens when: while a thread works for it (a planner, the database) time stands still, and while everybody waits it goes
-straight on to the next moment that somebody waits for.
+A service that runs on it lives as fast as the machine allows: while a thread works for it (a planner, the database)
+time stands still, and while everybody waits it goes straight on to the next moment that somebody waits for. What
+several threads finish at the same moment comes in either order.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ Areas of 100 to 300 m, two or three vehicles with 20 to 60 minutes of endurance 
 the area, at times a keep-out zone, currents to 0.5 m/s, in every fifth mission batteries that empty 30 % faster than
 told, in every third one that joins later, in every other one vehicles that are out of reach at times. The missions'
 length is no limit: energy is. Time is simulated, of the service, too: it goes on only when nobody has anything left to
-do, so that a slow or busy machine changes nothing but how long it takes.
+do, so that no energy is used while a slow or busy machine decides. Threads may finish in another order in another run:
+a seed's missions are alike, not the same to the last step.
 """
 
 import asyncio

@@ -54,9 +54,9 @@ class Raised:
         return error
 
 
-def outcome_of(work: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Packed:
-    """Do work and return what came of it, packed: ``(result, None)`` or ``(None, Raised)``."""
+def outcome(work: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, Raised | None]:
+    """Do work and return what came of it: its result and None, or None and what it raised."""
     try:
-        return pack((work(*arguments, **named), None))
+        return work(*arguments, **named), None
     except Exception as error:
-        return pack((None, Raised(type(error), error.args, error.__dict__)))
+        return None, Raised(type(error), error.args, error.__dict__)

@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from app import __version__
 from app.arrays import ByteArray
-from app.compute.packing import Packed, outcome_of, unpack
+from app.compute.packing import Packed, outcome, pack, unpack
 
 PACKAGES = ("numpy", "scipy", "numba")
 """What results depend on beside this program."""
@@ -50,4 +50,4 @@ def work_there(asked_with: Facts, head: bytes, buffers: Sequence[ByteArray]) -> 
     if ours != asked_with:
         raise OtherVersions(ours)
     work, arguments, named = unpack(Packed(head, list(buffers)))
-    return outcome_of(work, arguments, named)
+    return pack(outcome(work, arguments, named))

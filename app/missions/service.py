@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import structlog
 
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.exploration.planners import INSTALLED
 from app.missions import states
 from app.missions.alarms.desk import AlarmDesk
@@ -34,7 +34,7 @@ from app.missions.operations.sites import Sites
 from app.missions.operations.traffic import places_of, traffic_view
 from app.missions.operations.uploads import Uploads
 from app.missions.operations.web_tiles import WebTiles
-from app.missions.operations.workshop import Workshop
+from app.missions.operations.work_processes import WorkProcesses
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.descriptions import describe_anew
@@ -110,8 +110,8 @@ class MissionService:
             links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody, is_own_user).link)
         self.hub = FleetHub(links)
         """All links."""
-        self._workshop = Workshop()
-        self.compute = Compute(settings.compute, self._workshop)
+        self._processes = WorkProcesses()
+        self.compute = Compute(settings.compute, self._processes)
         """Does what computes long."""
         self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
         self._claims = Claims(self.hub)
@@ -181,7 +181,7 @@ class MissionService:
         Running missions stay running: another process takes them up, or this one at its next start.
         """
         self._started = False
-        await self._workshop.close()
+        await self._processes.close()
         self.compute.end()
         await self._failover.end()
         await self.alarms.close()

@@ -27,13 +27,13 @@ import numpy as np
 import psutil
 
 from app.arrays import FloatArray
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.compute.settings import ComputeSettings
 from app.missions.fleet.interface import LinkCapabilities
 from app.missions.forecast.request import starts_of
 from app.missions.forecast.simulate import Flown, floors_under, fly_over
 from app.missions.maps.builder import MapBuilder
-from app.missions.operations.workshop import Workshop
+from app.missions.operations.work_processes import WorkProcesses
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
 from benchmarks.common.report import LOAD, make_parser, write_section
@@ -170,8 +170,8 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
             worker = dask.start_worker("--preload=app.compute.preload")
             # Before it has threads, which are on the same core then.
             os.sched_setaffinity(worker.pid, {cores[number % len(cores)]})
-        workshop = Workshop()
-        compute = Compute(ComputeSettings(scheduler=dask.address), workshop)
+        processes = WorkProcesses()
+        compute = Compute(ComputeSettings(scheduler=dask.address), processes)
         compute.start()
         await until(lambda: compute.workers == WORKERS, "all workers are there")
         for one in (compute, None):  # what is only made ready by doing it
@@ -185,7 +185,7 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 here, alone = await timed(partial(do, None))
             figures[name] = told(alone, shared, idle) | {"same": there == here}
         await compute.close()
-        await workshop.close()
+        await processes.close()
     return figures
 
 

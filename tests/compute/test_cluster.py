@@ -14,11 +14,11 @@ import pytest
 from prometheus_client import REGISTRY
 
 from app.compute import cluster as cluster_module
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.compute.settings import ComputeSettings
 from app.compute.worker import facts
 from app.missions.errors import InvalidRequestError, ProductUnavailableError
-from app.missions.operations.workshop import Workshop
+from app.missions.operations.work_processes import WorkProcesses
 from tests.support import heavy_work
 from tests.support.cluster import DaskCluster, dask_cluster
 from tests.support.paths import PROJECT
@@ -42,15 +42,15 @@ def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskCluster]:
 
 @pytest.fixture
 async def compute(dask: DaskCluster) -> AsyncIterator[Compute]:
-    workshop = Workshop()
-    compute = Compute(ComputeSettings(scheduler=dask.address), workshop)
+    processes = WorkProcesses()
+    compute = Compute(ComputeSettings(scheduler=dask.address), processes)
     compute.start()
     while len(dask.workers) < 2:
         dask.start_worker()
     await until(lambda: compute.elsewhere and workers() == 2, "both workers are there")
     yield compute
     await compute.close()
-    await workshop.close()
+    await processes.close()
 
 
 def workers() -> float:
@@ -124,13 +124,13 @@ async def test_what_is_late_is_done_here_and_the_cluster_may_leave_it(
     compute: Compute, dask: DaskCluster, tmp_path: Path
 ) -> None:
     impatient = ComputeSettings.model_construct(scheduler=dask.address, timeout_s=0.5)
-    workshop = Workshop()
-    other = Compute(impatient, workshop)
+    processes = WorkProcesses()
+    other = Compute(impatient, processes)
     other.start()
     await until(lambda: other.elsewhere, "the cluster is there")
     assert await other.run(heavy_work.hang_workers, tmp_path) == os.getpid()
     await other.close()
-    await workshop.close()
+    await processes.close()
     for process in begun_by(tmp_path):
         os.kill(process, signal.SIGKILL)
         await until(lambda: any(worker.poll() is not None for worker in dask.workers), "it has ended")
@@ -138,14 +138,14 @@ async def test_what_is_late_is_done_here_and_the_cluster_may_leave_it(
 
 
 async def test_what_is_under_way_when_the_service_ends_is_not_begun_here(dask: DaskCluster, tmp_path: Path) -> None:
-    workshop = Workshop()
-    compute = Compute(ComputeSettings(scheduler=dask.address), workshop)
+    processes = WorkProcesses()
+    compute = Compute(ComputeSettings(scheduler=dask.address), processes)
     compute.start()
     await until(lambda: compute.elsewhere, "the cluster is there")
     work = asyncio.create_task(compute.run(heavy_work.begin_and_hang_first, tmp_path))
     waiting = asyncio.create_task(asyncio.to_thread(compute.in_thread, heavy_work.begin_and_hang_first, tmp_path))
     worker = await begun(tmp_path, work)
-    await workshop.close()
+    await processes.close()
     compute.end()
     with pytest.raises(ProductUnavailableError, match="the service is ending"):
         await work
@@ -199,7 +199,7 @@ async def test_a_cluster_that_is_gone_in_the_middle_costs_a_repetition_and_is_us
     assert await in_turn == os.getpid()
     await waiting
     assert counted("repeated_total", why="lost") > repeated
-    assert dask.address in (compute.state or "")
+    await until(lambda: dask.address in (compute.state or ""), "it is told to be gone")
     assert workers() == 0
     async with compute.process("json") as process:
         assert await process.make(heavy_work.process) not in {os.getpid(), *(one.pid for one in dask.workers)}
@@ -214,15 +214,15 @@ async def test_without_a_cluster_that_answers_everything_is_done_here(
     unused_tcp_port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster_module, "CONNECT_S", 0.2)
-    workshop = Workshop()
-    compute = Compute(ComputeSettings(scheduler=f"tcp://127.0.0.1:{unused_tcp_port}"), workshop)
+    processes = WorkProcesses()
+    compute = Compute(ComputeSettings(scheduler=f"tcp://127.0.0.1:{unused_tcp_port}"), processes)
     compute.start()
     assert await compute.run(heavy_work.process) == os.getpid()
     await until(lambda: "no Dask scheduler answers" in (compute.state or ""), "it was looked for")
     assert str(unused_tcp_port) in (compute.state or "")
     assert await asyncio.to_thread(compute.in_thread, heavy_work.process) == os.getpid()
     await compute.close()
-    await workshop.close()
+    await processes.close()
 
 
 def signed(folder: Path, name: str) -> tuple[str, str]:
@@ -247,10 +247,10 @@ async def test_an_encrypted_cluster_takes_work_by_certificate_only(
     stranger.mkdir()
     signed(stranger, "ca")
     options = [f"--tls-ca-file={authority}", f"--tls-cert={certificate}", f"--tls-key={key}"]
-    workshop = Workshop()
+    processes = WorkProcesses()
     with dask_cluster(tmp_path, 1, "tls", options) as dask:
         files = {"tls_ca_file": authority, "tls_certificate": certificate, "tls_key": key}
-        compute = Compute(ComputeSettings.model_validate({"scheduler": dask.address} | files), workshop)
+        compute = Compute(ComputeSettings.model_validate({"scheduler": dask.address} | files), processes)
         compute.start()
         await until(lambda: compute.elsewhere, "it lets us in")
         assert await compute.run(heavy_work.process) == dask.workers[0].pid
@@ -258,9 +258,9 @@ async def test_an_encrypted_cluster_takes_work_by_certificate_only(
         monkeypatch.setattr(cluster_module, "CONNECT_S", 2.0)
         certificate, key = signed(stranger, "other")
         files |= {"tls_certificate": certificate, "tls_key": key}
-        compute = Compute(ComputeSettings.model_validate({"scheduler": dask.address} | files), workshop)
+        compute = Compute(ComputeSettings.model_validate({"scheduler": dask.address} | files), processes)
         compute.start()
         await until(lambda: "no Dask scheduler answers" in (compute.state or ""), "it does not let a stranger in")
         assert await compute.run(heavy_work.process) == os.getpid()
         await compute.close()
-    await workshop.close()
+    await processes.close()

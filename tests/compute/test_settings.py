@@ -35,5 +35,5 @@ def test_what_can_be_is_taken(scheduler: str) -> None:
 
 
 def test_a_start_does_not_load_what_only_a_cluster_needs() -> None:
-    program = "import sys, app.compute.door; assert not {'distributed', 'dask', 'tornado'} & set(sys.modules)"
+    program = "import sys, app.compute.compute; assert not {'distributed', 'dask', 'tornado'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", program], check=True)

@@ -8,7 +8,7 @@ import pytest
 from prometheus_client import REGISTRY
 
 from app.compute import cluster as cluster_module
-from app.compute import door, packing
+from app.compute import compute, packing
 from app.compute.packing import Packed
 from app.compute.settings import ComputeSettings
 from app.missions.clock import now
@@ -71,7 +71,7 @@ def sent(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
         found.append(packed.head + b"".join(buffer.tobytes() for buffer in packed.buffers))
         return packed
 
-    monkeypatch.setattr(door, "pack", recorded)
+    monkeypatch.setattr(compute, "pack", recorded)
     return found
 
 

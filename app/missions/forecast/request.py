@@ -11,7 +11,7 @@ from pydantic import Field
 from shapely.geometry import Point, Polygon
 
 from app.arrays import FloatArray
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub

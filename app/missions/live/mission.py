@@ -14,7 +14,7 @@ import structlog
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.estimation import Sensor, SingleBeam
 from app.mapping.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m

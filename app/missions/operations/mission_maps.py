@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.mapping.products.tracks import Track, TrackPoint
 from app.mapping.types import SoundingRows
 from app.missions.clock import now

@@ -16,7 +16,7 @@ import orjson
 
 from app import __version__
 from app.arrays import FloatArray
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.mapping.products.tracks import Track
 from app.mapping.s44 import Order
 from app.missions.clock import now

@@ -8,7 +8,7 @@ from functools import partial
 import structlog
 from sqlalchemy import delete, select
 
-from app.compute.door import Compute
+from app.compute.compute import Compute
 from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import take_up

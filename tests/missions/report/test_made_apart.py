@@ -14,7 +14,7 @@ from app.missions.maps.products import Product, ProductOptions
 from app.missions.operations.measurements import measure
 from app.missions.operations.mission_maps import export
 from app.missions.operations.reports import ReportOptions
-from app.missions.operations.workshop import MakingProcess
+from app.missions.operations.work_processes import WorkProcess
 from app.missions.report.kinds import REPORTS
 from app.missions.report.texts import Language
 from app.missions.settings import ServiceSettings
@@ -63,15 +63,15 @@ def exported(harbour: Harbour, live: LiveMission, name: str) -> Any:
 async def test_they_are_what_they_would_be_here(
     harbour: Harbour, live: LiveMission, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    make = MakingProcess.make
+    make = WorkProcess.make
     same: list[bool] = []
 
-    async def twice(process: MakingProcess, work: Callable[..., Any], *arguments: Any) -> Any:
+    async def twice(process: WorkProcess, work: Callable[..., Any], *arguments: Any) -> Any:
         there = await make(process, work, *arguments)
         same.append(there == await asyncio.to_thread(work, *arguments))
         return there
 
-    monkeypatch.setattr(MakingProcess, "make", twice)
+    monkeypatch.setattr(WorkProcess, "make", twice)
     for name in FILES:
         product: Product = await exported(harbour, live, name)
         assert product.content

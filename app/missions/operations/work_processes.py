@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, Any, ParamSpec, TypeVar
 
 import app
+from app.compute.packing import Raised, outcome
 from app.mapping.readers.confinement import ResourceLimits, limit
 from app.missions.errors import ProductUnavailableError
 from app.missions.operations.uploads import unnamed_file
@@ -38,7 +39,7 @@ P = ParamSpec("P")
 Made = TypeVar("Made")
 
 
-class Workshop:
+class WorkProcesses:
     """Has functions computed by processes, each of which does one thing, yields to others and ends."""
 
     def __init__(self) -> None:
@@ -65,7 +66,7 @@ class Workshop:
             return await process.make(work, *arguments, **named)
 
     @asynccontextmanager
-    async def process(self, *modules: str) -> AsyncIterator["MakingProcess"]:
+    async def process(self, *modules: str) -> AsyncIterator["WorkProcess"]:
         """Have a process, for one thing, that loads modules while what it will be given is gathered.
 
         Raises
@@ -82,7 +83,7 @@ class Workshop:
                 try:
                     if self._closing.is_set():
                         _kill(process)
-                    yield MakingProcess(process, task, result, self._closing.is_set)
+                    yield WorkProcess(process, task, result, self._closing.is_set)
                 finally:
                     _kill(process)
                     await process.wait()
@@ -97,7 +98,7 @@ class Workshop:
         await asyncio.gather(*(process.wait() for process in processes))
 
 
-class MakingProcess:
+class WorkProcess:
     """A process that makes one thing."""
 
     def __init__(self, process: Process, task: IO[bytes], result: IO[bytes], closed: Callable[[], bool]) -> None:
@@ -106,14 +107,14 @@ class MakingProcess:
         self._closed = closed
 
     async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
-        """Return what a function returns; see :meth:`Workshop.make`."""
+        """Return what a function returns; see :meth:`WorkProcesses.make`."""
         await to_the_end(asyncio.to_thread(_write, self._task, (work, arguments, named)))
         code = await self._ended()
         if code:
             raise _ending() if self._closed() else _broken_off(code)
-        made, error = await to_the_end(asyncio.to_thread(_read, self._result))
-        if error is not None:
-            raise _raised(*error)
+        made, raised = await to_the_end(asyncio.to_thread(_read, self._result))
+        if isinstance(raised, Raised):
+            raise raised.error()
         return made  # type: ignore[no-any-return]
 
     async def _ended(self) -> int:
@@ -181,18 +182,9 @@ def _read(file: IO[bytes]) -> Any:
     return pickle.load(file)  # noqa: S301 - this program wrote it
 
 
-def _raised(kind: type[Exception], arguments: tuple[Any, ...], state: dict[str, Any]) -> Exception:
-    """Return an exception as it was; its class may be made of other arguments than it keeps."""
-    error = kind.__new__(kind)
-    error.args = arguments
-    error.__dict__.update(state)
-    return error
-
-
 def main() -> None:
     """Do what standard input asks, and write down what came of it."""
     limit(LIMITS)
-    made, told = None, None
     task, result = (int(number) for number in sys.argv[1:3])
     for module in sys.argv[3:]:
         import_module(module)
@@ -200,12 +192,8 @@ def main() -> None:
         return  # it is not needed after all
     with open(task, "rb", closefd=False) as file:
         work, arguments, named = _read(file)
-    try:
-        made = work(*arguments, **named)
-    except Exception as error:
-        told = type(error), error.args, error.__dict__
     with open(result, "wb", closefd=False) as out:
-        _write(out, (made, told))
+        _write(out, outcome(work, arguments, named))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The one door for heavy work: a cluster does it where there is one, else a thread or a process of this machine."""
+"""Has heavy work done: by a cluster where there is one, else by a thread or a process of this machine."""
 
 import asyncio
 import pickle
