@@ -62,6 +62,8 @@ class Watch:
         self._live, self._link = live, link
         self._zones = [Polygon(live.spec.to_local(zone)) for zone in live.spec.keep_out]
         self._before: dict[str, Place] = {}
+        self._last: dict[str, tuple[Place, float]] = {}
+        """Where each was seen last, and what it had left then, percent."""
         self._been_apart: set[tuple[str, str]] = set()
         self.seen: dict[str, Seen] = {}
         self.in_zones: set[str] = set()
@@ -87,19 +89,23 @@ class Watch:
             seen = self.seen.setdefault(member.name, Seen())
             if seen.from_point_m is not None or member.report is None:
                 continue  # It was taken out of the water.
-            place = self._place(member.name)
-            self._note(member, seen, place)
+            if self._link.swims(member.name):
+                self._last[member.name] = self._place(member.name), self._link.battery_pct(member.name)
+            elif member.name not in self._last:
+                continue
+            # The mission's end takes vehicles out between two looks: then they were where they were seen last.
+            place, left_pct = self._last[member.name]
+            self._note(member, seen, place, left_pct)
             self._look_at_zones(member.name, place)
             out[member.name] = member, place
         for (a, (one, here)), (b, (other, there)) in combinations(sorted(out.items()), 2):
             returning = any(m.withdrawal is not None and not m.withdrawal.asked for m in (one, other))
             self._compare((a, b), here, there, returning=returning)
 
-    def _note(self, member: "Member", seen: Seen, place: Place) -> None:
+    def _note(self, member: "Member", seen: Seen, place: Place, left_pct: float) -> None:
         from app.missions.flight.commit import point_of
         from app.missions.flown import Phase
 
-        left_pct = self._link.battery_pct(member.name)
         if seen.surveys_at_pct is None and member.flown.phase is Phase.SURVEY:
             seen.surveys_at_pct = left_pct
         if member.withdrawal is not None and seen.turned_at_pct is None:

@@ -155,6 +155,8 @@ class Member:
     """How long its way home takes from where it is; None: it has none, or it is not known yet."""
     way_home_m: NDArray[np.float64] | None = None
     """The corners of its way home from about where it is, (n, 2); None: it has none, or it is not known yet."""
+    way_left_alone_m: NDArray[np.float64] | None = None
+    """The same from anywhere on its leg, for a vehicle that gets no further order."""
     turn_back_m: NDArray[np.float64] | None = None
     """Where on its planned legs it has to turn back at the latest, (2,); None: on none of them, or not known."""
     failsafes: list[Active] = field(default_factory=list)

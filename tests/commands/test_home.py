@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.commands import home
+from app.commands import home, home_watch
 from app.commands.home import drawn, fly_mission, summary, wrong_with
 from app.commands.home_watch import Seen
 from app.missions.settings import SimulationSettings
@@ -119,3 +119,11 @@ def test_who_has_energy_for_the_legs_it_has_and_no_further_one_keeps_nobody_busy
     found = fly_mission(spec, SimulationSettings(), None, 0, 20.0)
     assert found["wrong"] == [], found
     assert all("energy" in vehicle["why"] for vehicle in found["vehicles"].values())
+
+
+def test_vehicles_that_the_end_takes_out_count_where_they_were_seen_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(home_watch, "TICK_S", 0.5)  # ten seconds of the vehicle's time
+    spec = sim_spec("a", side_m=60.0, steps=2, recovery={"point": lon_lat(30.0, -10.0)})
+    found = fly_mission(spec, SimulationSettings(), None, 0, 20.0)
+    assert found["state"] == "finished"
+    assert found["vehicles"]["a"]["from_point_m"] < 40.0

@@ -219,6 +219,11 @@ class LegCommit:
         member.set_order(order, target)
         member.status = WaypointStatus.PLANNED
 
+    def followed_to_m(self, member: Member, end_m: FloatArray) -> FloatArray:
+        """Return how far a vehicle goes on its leg that gets no further order, (2,): beyond the end where it is led."""
+        lead = None if member.order is None else member.order.lead
+        return end_m if lead is None else self._local(lead)
+
     def holding(self, member: Member) -> WaypointOrder | None:
         """Return an order that keeps a vehicle circling near where it is; None where there is no room for that."""
         if member.report is None or member.order is None:

@@ -80,6 +80,7 @@ class FailsafeWatch:
         news: list[tuple[str, list[Active]]] = []
         for member in self._live.team:
             member.way_home_m = self._range.way(member)
+            member.way_left_alone_m = self._range.way_left_alone(member)
             member.return_needs_s = self._range.needs_s(member)
             member.turn_back_m = self._range.turn_back(member)
             over = member.withdrawal is not None and member.withdrawal.over

@@ -9,13 +9,14 @@ from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleRefusedError
 from app.missions.flight.range_left import RangeLeft
+from app.missions.flight.waiting import LEAST_LOOK_S
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 from app.missions.views.mission import Level
 
 PERIOD_S = 5.0
-"""How often is looked whether a way has changed, seconds of the wall clock: it costs the radio."""
+"""How often is looked whether a way has changed, by the vehicles' clock: it costs the radio."""
 
 CHANGED_M = 5.0
 """A way whose corners moved less is the same."""
@@ -26,7 +27,8 @@ log = structlog.get_logger(__name__)
 class OnboardWays:
     """Keeps the ways home of one running mission's vehicles on board, and takes them away with its end."""
 
-    def __init__(self, live: LiveMission, hub: FleetHub, range_left: RangeLeft) -> None:
+    def __init__(self, live: LiveMission, hub: FleetHub, range_left: RangeLeft, time_scale: float) -> None:
+        self._time_scale = time_scale
         self._range = range_left
         self._live = live
         self._hub = hub
@@ -38,7 +40,7 @@ class OnboardWays:
         while True:
             able = [member for member in self._live.team if member.capabilities.keeps_way_home and member.present]
             await asyncio.gather(*(self._renew(member) for member in able))
-            await asyncio.sleep(PERIOD_S)
+            await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_LOOK_S))
 
     async def drop(self) -> None:
         """Take all ways away again, where the mission has ended and its vehicles can be reached."""
@@ -48,7 +50,7 @@ class OnboardWays:
         await asyncio.gather(*(self._drop(member) for member in able))
 
     async def _renew(self, member: Member) -> None:
-        way_m = member.way_home_m
+        way_m = member.way_left_alone_m
         if member.withdrawal is not None and member.withdrawal.over and self._kept.pop(member.name, None) is not None:
             await self._drop(member)
         if way_m is None or (member.withdrawal is not None and member.withdrawal.over):

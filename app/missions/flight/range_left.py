@@ -67,18 +67,38 @@ class RangeLeft:
             self._found[member.name] = here_m, way_m
         return way_m
 
+    def way_left_alone(self, member: Member) -> FloatArray | None:
+        """Return a way home, (n, 2), for a vehicle that flies its leg to the end and then gets no order; None: none.
+
+        It may set out from anywhere on that leg. Where something stands between the leg and the way from where the
+        vehicle is now, it goes to the leg's end first, along the leg.
+        """
+        way_m, home_m, end_m = self.way(member), home_of(member, self._live.spec), member.target_m
+        if way_m is None or home_m is None or end_m is None or not member.ordered or member.withdrawal is not None:
+            return way_m
+        here_m = member.place_m(self._live.frame)
+        last_m = self._committing.followed_to_m(member, end_m)
+        on_leg = here_m + np.linspace(0.0, 1.0, safety.LEG_SAMPLES)[:, None] * (last_m - here_m)
+        if self._ways_to(home_m)[0].sees(on_leg, np.broadcast_to(way_m[0], on_leg.shape)).all():
+            return way_m
+        beyond = self.way_from(end_m, home_m)
+        return way_m if beyond is None else np.vstack([end_m, beyond])
+
     def way_from(self, here_m: FloatArray, home_m: FloatArray) -> FloatArray | None:
         """Return the corners of the way home from a place, (n, 2); None: there is none."""
         self._look_for_land()
+        anyhow, off_land = self._ways_to(home_m)
+        way_m = None if off_land is None else off_land.way(here_m)
+        # Better over ground that looks too shallow, at the surface, than not at all.
+        return anyhow.way(here_m) if way_m is None else way_m
+
+    def _ways_to(self, home_m: FloatArray) -> tuple[WaysHome, WaysHome | None]:
         key = (float(home_m[0]), float(home_m[1]))
         if key not in self._ways:
             bottom, least_m = self._committing.bottom, self._least_m
             off_land = WaysHome(self._constraints, home_m, bottom, least_m) if self._land else None
             self._ways[key] = WaysHome(self._constraints, home_m), off_land
-        anyhow, off_land = self._ways[key]
-        way_m = None if off_land is None else off_land.way(here_m)
-        # Better over ground that looks too shallow, at the surface, than not at all.
-        return anyhow.way(here_m) if way_m is None else way_m
+        return self._ways[key]
 
     def depths_m(self, member: Member, here_m: FloatArray, way_m: FloatArray) -> list[float]:
         """Return how deep a vehicle travels to each corner of a way, (n, 2): less over a shallow bottom.

@@ -77,7 +77,7 @@ class Runner:
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
         self._range = RangeLeft(live, constraints, self._committing)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
-        self._onboard = OnboardWays(live, hub, self._range)
+        self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
         self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)
         self._withdrawals = Withdrawals(live, hub, self._committing, self._dispatch, self._range, time_scale)

@@ -54,9 +54,10 @@ async def waypoint(
     if found is not None and link is not None:
         link.has_waypoint(vehicle, found.step)
         found = live.waypoints.of(vehicle)
-    if found is None or member.way_home_m is None:
+    way_m = member.way_left_alone_m
+    if found is None or way_m is None:
         return found
-    lats, lons = live.frame.to_geographic(member.way_home_m[:, 0], member.way_home_m[:, 1])
+    lats, lons = live.frame.to_geographic(way_m[:, 0], way_m[:, 1])
     way = [(float(lon), float(lat)) for lat, lon in zip(lats, lons, strict=True)]
     return found.model_copy(update={"way_home": way})
 

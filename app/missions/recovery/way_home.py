@@ -86,7 +86,7 @@ class WaysHome:
         rings = [ring for part in _polygons(inner) for ring in (part.exterior, *part.interiors)]
         self._nodes = nodes = np.vstack([last, *(np.asarray(ring.coords)[:-1] for ring in rings)])
         a, b = np.triu_indices(len(nodes), 1)
-        seen = self._sees(nodes[a], nodes[b])
+        seen = self.sees(nodes[a], nodes[b])
         length = np.hypot(*(nodes[a[seen]] - nodes[b[seen]]).T)
         graph = csr_array((np.maximum(length, 1e-9), (a[seen], b[seen])), shape=(len(nodes), len(nodes)))
         away, before = dijkstra(graph, directed=False, indices=[0], return_predecessors=True)
@@ -102,7 +102,7 @@ class WaysHome:
         inside = self._inner.covers(Point(start_m))
         first = start_m if inside else _coords(nearest_points(self._inner, Point(start_m))[0])
         total_m = np.hypot(*(self._nodes - first).T) + self._away_m
-        total_m[~self._sees(np.broadcast_to(first, self._nodes.shape), self._nodes)] = np.inf
+        total_m[~self.sees(np.broadcast_to(first, self._nodes.shape), self._nodes)] = np.inf
         node = int(np.argmin(total_m))
         if not np.isfinite(total_m[node]):
             return None
@@ -112,7 +112,10 @@ class WaysHome:
             node = int(self._before[node])
         return np.array([*way, self._home_m])
 
-    def _sees(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
+    def sees(self, from_m: FloatArray, to_m: FloatArray) -> BoolArray:
+        """Return whether straight lines from places (n, 2) to others (n, 2) keep off everything, (n,)."""
+        if not self._reachable:
+            return np.zeros(len(from_m), dtype=np.bool_)
         lines = shapely.linestrings(np.stack([from_m, to_m], axis=1))
         return np.asarray(shapely.covers(self._roomy, lines), dtype=np.bool_)
 

@@ -368,6 +368,10 @@ class SimFleetLink(FleetLink):
             self._sink(swimmer.make_report())
             self._sink(LinkReport(vehicle, LinkState.READY))
 
+    def swims(self, vehicle: str) -> bool:
+        """Whether a vehicle is in the world."""
+        return vehicle in self._swimmers
+
     def true_position(self, vehicle: str) -> Position:
         """Return where a vehicle is, whatever it takes itself to be."""
         swimmer = self._swimmers[vehicle]
