@@ -99,7 +99,7 @@ class Service:
         return answer.raise_for_status().json()
 
     def create(self, **changes: Any) -> str:
-        """Describe a mission over the API and return its id."""
+        """Describe a mission over the API, without what is None, and return its id."""
         spec = {
             "name": "Harbour basin",
             "area": AREA,
@@ -107,7 +107,8 @@ class Service:
             "vehicles": [{"name": "sim-1", "kind": "sim", "sensor": "dvl"}],
             "planner": {"name": "random"},
         }
-        answer = self._http.post("/api/v1/missions", json=spec | changes)
+        told = {name: value for name, value in (spec | changes).items() if value is not None}
+        answer = self._http.post("/api/v1/missions", json=told)
         return str(answer.raise_for_status().json()["id"])
 
     def act(self, mission: str, action: str) -> None:

@@ -1,0 +1,247 @@
+"""The guides' pictures of the page: ``python -m tests.dashboard.guide_pictures [NAME …]``.
+
+Real missions of simulated vehicles over generated sea floors, in Chromium without a graphics card, into
+``docs/images``. Look at each before it is committed: runs differ.
+"""
+
+import argparse
+import io
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.dashboard.conftest import CHROMIUM, FLAGS
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, click_round, show
+from tests.support.missions.specs import lon_lat, rectangle
+from tests.support.paths import PROJECT
+
+IMAGES = PROJECT / "docs" / "images"
+COLOURS = 192
+WIDE, PHONE = (1440, 900), (390, 844)
+PATIENCE_MS = 180_000
+SETTLE_MS = 3000
+"""For charts and the sea floor to be drawn after what they show has come."""
+WIDTH_M, HEIGHT_M = 420, 300
+KM_EACH = 2.0
+WHOLE_M = 3 * 1000.0 * KM_EACH
+ZONE = rectangle(300, 60, 340, 100)
+HOME = lon_lat(-25.0, 20.0)
+LOOK_S = 0.3
+
+
+@dataclass
+class Guide:
+    """A service, its missions by what they are for, and a browser."""
+
+    service: Service
+    browser: Browser
+    missions: dict[str, str] = field(default_factory=dict)
+
+    def page(self, size: tuple[int, int], theme: str) -> Page:
+        """A new window with the page as a watch-keeper has set it."""
+        context = self.browser.new_context(
+            viewport={"width": size[0], "height": size[1]}, base_url=self.service.url, reduced_motion="reduce"
+        )
+        context.add_init_script(f"localStorage.setItem('bathyfleet.theme', {json.dumps(json.dumps(theme))})")
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE_MS)
+        return page
+
+    def wait(self, mission: str, enough: Callable[[dict[str, Any]], bool]) -> None:
+        """Wait until a mission is as it should be."""
+        while not enough(self.service.get(f"/missions/{mission}")):
+            time.sleep(LOOK_S)
+
+    def survey(self, share: float) -> str:
+        """The survey of three vehicles, once so much of its length is flown."""
+        if "survey" not in self.missions:
+            vehicles = [
+                {"name": name, "kind": "sim", "sensor": "dvl", "endurance_min": 90}
+                for name in ("lauv-1", "lauv-2", "lauv-3")
+            ]
+            made = self.service.create(
+                name="Canyon off the mole",
+                area=rectangle(0, 0, WIDTH_M, HEIGHT_M),
+                keep_out=[ZONE],
+                vehicles=vehicles,
+                planner={"name": "cao"},
+                budget={"km_per_vehicle": KM_EACH},
+                steps=None,
+                accuracy_m=0.25,
+                limits={"max_depth_m": 20, "min_altitude_m": 1.5},
+                recovery={"point": HOME},
+            )
+            self.missions["survey"] = made
+            self.service.act(made, "start")
+        mission = self.missions["survey"]
+        self.wait(mission, lambda one: one["state"] != "running" or one["progress"]["distance_m"] > share * WHOLE_M)
+        return mission
+
+    def flown(self) -> str:
+        """The same survey at its end."""
+        mission = self.survey(0.0)
+        self.wait(mission, lambda one: one["state"] == "finished")
+        return mission
+
+
+def dashboard(guide: Guide, page: Page) -> None:
+    """A survey under way."""
+    show(page, guide.survey(0.55))
+
+
+def watch(guide: Guide, page: Page) -> None:
+    """Orders from the map, and what needs a person."""
+    show(page, guide.survey(0.6))
+    by_id(page, "hold-lauv-2").click()
+    by_id(page, "attention-more").click()
+    page.mouse.click(640, 420, button="right")
+
+
+def watch_done(guide: Guide, page: Page) -> None:
+    page.keyboard.press("Escape")
+    by_id(page, "resume-lauv-2").click()
+
+
+def phone(guide: Guide, page: Page) -> None:
+    """The watch on a phone at night."""
+    show(page, guide.survey(0.5))
+
+
+def planning(guide: Guide, page: Page) -> None:
+    """The plan before the start."""
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Anchorage, north")
+    by_id(page, "planner-lawnmower").click()
+    by_id(page, "field-recovery").fill("41.1850 -8.7052")
+    by_id(page, "draw-polygon").click()
+    click_round(page, [(520, 300), (980, 330), (940, 640), (540, 600)])
+    page.wait_for_selector('[data-testid="planned"][data-plan="new"]')
+    by_id(page, "planned-whole").scroll_into_view_if_needed()
+
+
+def checklist(guide: Guide, page: Page) -> None:
+    """The checklist before the start."""
+    service = guide.service
+    vehicles = [{"name": f"second-{n}", "kind": "sim", "sensor": "dvl", "endurance_min": 60} for n in (1, 2)]
+    show(page, service.create(name="Anchorage", vehicles=vehicles, recovery={"point": HOME}))
+    by_id(page, "start").click()
+    page.wait_for_selector('[data-testid="preflight"][data-ready]')
+
+
+def space(guide: Guide, page: Page) -> None:
+    """Soundings in space, some of them chosen with the lasso."""
+    show(page, guide.flown())
+    by_id(page, "open-3d").click()
+    by_id(page, "toggle-points").click()
+    page.wait_for_timeout(SETTLE_MS)
+    box = by_id(page, "lasso").bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.45 * box["width"], box["y"] + 0.4 * box["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for right, down in ((150, -20), (190, 60), (60, 90), (-20, 40), (0, 0)):
+        page.mouse.move(x + right, y + down)
+    page.mouse.up()
+
+
+def profile(guide: Guide, page: Page) -> None:
+    """The bottom along a line."""
+    show(page, guide.flown())
+    by_id(page, "measure").click()
+    page.mouse.click(470, 330)
+    page.mouse.click(930, 520)
+    page.get_by_role("button", name="Profile").click()
+    by_id(page, "profile-chart").locator("canvas").first.wait_for()
+
+
+def charts(guide: Guide, page: Page) -> None:
+    """How a mission went."""
+    show(page, guide.flown())
+    by_id(page, "toggle-charts").click()
+    by_id(page, "charts").locator("canvas").first.wait_for()
+
+
+def dashboard_replay(guide: Guide, page: Page) -> None:
+    """A mission as it was some steps before its end."""
+    show(page, guide.flown())
+    last = int(by_id(page, "slider").get_attribute("max") or 0)
+    by_id(page, "slider").fill(str(round(0.4 * last)))
+    by_id(page, "replayed-at").wait_for()
+
+
+def swath(guide: Guide, page: Page) -> None:
+    """Full coverage with multibeams: density and holidays."""
+    service = guide.service
+    vehicles = [{"name": f"wide-{n}", "kind": "sim", "sensor": "multibeam"} for n in (1, 2)]
+    mission = service.create(
+        name="Full coverage",
+        area=rectangle(0, 0, 240, 160),
+        vehicles=vehicles,
+        planner={"name": "swath"},
+        budget={"minutes": 60},
+        steps=None,
+        limits={"max_depth_m": 20},
+    )
+    service.act(mission, "start")
+    guide.wait(mission, lambda one: one["state"] != "running" or (one["progress"]["ensonified_pct"] or 0) > 60)
+    show(page, mission)
+    by_id(page, "layer").select_option(label="Density")
+
+
+SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = {
+    "dashboard": (dashboard, WIDE, "light"),
+    "watch": (watch, WIDE, "light"),
+    "phone": (phone, PHONE, "night"),
+    "planning": (planning, WIDE, "light"),
+    "checklist": (checklist, WIDE, "dark"),
+    "swath": (swath, WIDE, "light"),
+    "space": (space, WIDE, "dark"),
+    "profile": (profile, WIDE, "light"),
+    "charts": (charts, WIDE, "light"),
+    "dashboard-replay": (dashboard_replay, WIDE, "light"),
+}
+AFTERWARDS = {"watch": watch_done}
+
+
+def keep(picture: bytes, path: Path) -> None:
+    """Write a picture with few colours: a tenth of the bytes, and nobody sees it."""
+    Image.open(io.BytesIO(picture)).convert("RGB").quantize(COLOURS).save(path, optimize=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", choices=[*SCENES, []], metavar="NAME", help=", ".join(SCENES))
+    parser.add_argument("--out", type=Path, default=IMAGES)
+    options = parser.parse_args()
+    settings = {"simulation__family": "canyon", "time_scale": "10"}
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        service = Service(Path(folder), **settings)
+        service.start()
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        guide = Guide(service, browser)
+        try:
+            for name in options.names or SCENES:
+                scene, size, theme = SCENES[name]
+                page = guide.page(size, theme)
+                scene(guide, page)
+                page.wait_for_timeout(SETTLE_MS)
+                keep(page.screenshot(animations="disabled"), options.out / f"{name}.png")
+                if name in AFTERWARDS:
+                    AFTERWARDS[name](guide, page)
+                page.context.close()
+        finally:
+            browser.close()
+            service.kill()
+
+
+if __name__ == "__main__":
+    main()
