@@ -34,6 +34,7 @@ KM_EACH = 2.0
 WHOLE_M = 3 * 1000.0 * KM_EACH
 ZONE = rectangle(300, 60, 340, 100)
 HOME = lon_lat(-25.0, 20.0)
+HELD = ("lauv-2", "lauv-3")
 LOOK_S = 0.3
 
 
@@ -100,14 +101,16 @@ def dashboard(guide: Guide, page: Page) -> None:
 def watch(guide: Guide, page: Page) -> None:
     """Orders from the map, and what needs a person."""
     show(page, guide.survey(0.6))
-    by_id(page, "hold-lauv-2").click()
+    for name in HELD:
+        by_id(page, f"hold-{name}").click()
     by_id(page, "attention-more").click()
     page.mouse.click(640, 420, button="right")
 
 
 def watch_done(guide: Guide, page: Page) -> None:
     page.keyboard.press("Escape")
-    by_id(page, "resume-lauv-2").click()
+    for name in HELD:
+        by_id(page, f"resume-{name}").click()
 
 
 def phone(guide: Guide, page: Page) -> None:

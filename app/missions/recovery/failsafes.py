@@ -1,5 +1,6 @@
 """The one table of failsafes: what is detected, what is done then, and how long it must last before and after."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -32,6 +33,12 @@ class Rule:
 
 LOW_RATIO, LOW_RESERVE_S = 1.1, 60.0
 """A vehicle turns back when what it has for sure is this many times its way home, and so much more."""
+
+UNHEARD_S = 240.0
+"""So long may a vehicle that is not heard drift without its motor: from a minute on, until DUNE brings it home."""
+
+LEAST_HEADWAY = 0.05
+"""The least part of its speed that a vehicle is taken to make good against the current."""
 
 LAST_S = 90.0
 """A vehicle that will not get home goes on towards it until so little is left, then it comes up while it still can."""
@@ -75,8 +82,8 @@ TABLE: Mapping[Failsafe, Rule] = {
         after_s=10.0,
     ),
     Failsafe.LOW_ENERGY: Rule(
-        f"what it has left for sure is less than {LOW_RATIO:g} of its way home and {LOW_RESERVE_S:g} s; without a "
-        f"recovery point a battery below {LOW_PCT:g} %",
+        f"what it has left for sure is less than {LOW_RATIO:g} of its way home, {LOW_RESERVE_S:g} s, and what makes up "
+        f"for a drift of {UNHEARD_S:g} s; without a recovery point a battery below {LOW_PCT:g} %",
         Response.RETURN,
         "alarm: it turns back",
         after_s=2.0,
@@ -187,9 +194,18 @@ class FailsafeJudge:
         return self.overrides.get(failsafe, TABLE[failsafe].response)
 
 
-def with_reserve_s(needs_s: float) -> float:
-    """Return what a vehicle has to have left for a way home that takes so long."""
-    return LOW_RATIO * needs_s + LOW_RESERVE_S
+def with_reserve_s(needs_s: float, adrift_s: float = 0.0) -> float:
+    """Return what a vehicle has to have left for a way home that takes so long, with what :func:`adrift_s` returns."""
+    return LOW_RATIO * needs_s + LOW_RESERVE_S + adrift_s
+
+
+def adrift_s(speed_mps: float, current_mps: tuple[float, float]) -> float:
+    """Return how long a vehicle takes to come back to where it was not heard any more and gave up its waypoint.
+
+    Meanwhile its motor is off and the current takes it along, east and north, wherever to.
+    """
+    strength_mps = math.hypot(*current_mps)
+    return UNHEARD_S * strength_mps / max(speed_mps - strength_mps, LEAST_HEADWAY * speed_mps)
 
 
 def table_text() -> str:

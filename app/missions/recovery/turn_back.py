@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.recovery.failsafes import with_reserve_s
+from app.missions.recovery.failsafes import adrift_s, with_reserve_s
 from app.missions.recovery.way_home import way_time_s
 
 STEP_M = 5.0
@@ -35,12 +35,12 @@ def turn_back_place(
     needs_s
         Returns how long the way home takes from a place (2,), seconds; inf where there is none.
     current_mps
-        East and north; what helps along the legs is not counted.
+        East and north; what helps along the legs is not counted, and the reserve has what makes up for a drift in it.
     """
     if not legs_m.size:
         return None
-    spent_s, last = 0.0, start_m
-    if with_reserve_s(needs_s(start_m)) > left_s:
+    spent_s, last = adrift_s(speed_mps, current_mps), start_m
+    if spent_s + with_reserve_s(needs_s(start_m)) > left_s:
         return start_m
     for a, b in pairwise(np.vstack([start_m, legs_m])):
         leg_s = way_time_s(a, b[None], speed_mps, current_mps)
