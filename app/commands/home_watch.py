@@ -67,6 +67,8 @@ class Watch:
         self._been_apart: set[tuple[str, str]] = set()
         self.seen: dict[str, Seen] = {}
         self.in_zones: set[str] = set()
+        self.drifted_into_zones: set[str] = set()
+        """Those that the current took into one while nobody heard them and their motor was off."""
         self.closest_m = math.inf
         """Least distance aside between two at about the same depth, of which one was on its way home."""
         self.too_close: set[tuple[str, str]] = set()
@@ -121,7 +123,8 @@ class Watch:
         self._before[name] = place
         track = LineString([before[:2], place[:2]])
         if any(zone.intersects(track) for zone in self._zones):
-            self.in_zones.add(name)
+            adrift = self._link.swims(name) and self._link.is_adrift(name)
+            (self.drifted_into_zones if adrift else self.in_zones).add(name)
 
     def _compare(self, pair: tuple[str, str], here: Place, there: Place, *, returning: bool) -> None:
         limits = self._live.spec.limits

@@ -372,6 +372,11 @@ class SimFleetLink(FleetLink):
         """Whether a vehicle is in the world."""
         return vehicle in self._swimmers
 
+    def is_adrift(self, vehicle: str) -> bool:
+        """Whether a vehicle was not heard for so long that it has given its waypoint up: the current takes it along."""
+        swimmer = self._swimmers[vehicle]
+        return swimmer.silent_since_s is not None and swimmer.order is None
+
     def true_position(self, vehicle: str) -> Position:
         """Return where a vehicle is, whatever it takes itself to be."""
         swimmer = self._swimmers[vehicle]

@@ -160,6 +160,7 @@ async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_
         await until(lambda: link.true_position(NAME).depth_m > 0.5, "it is under way")
         link.silence(NAME)
         assert [info.state for info in link.vehicles()] == [LinkState.LOST]
+        assert not link.is_adrift(NAME), "it goes on with its waypoint for a while"
         for refused in (link.engage(NAME), link.order(order(2, 10.0, 10.0))):
             with pytest.raises(VehicleRefusedError):
                 await refused
@@ -168,6 +169,7 @@ async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_
         await until(lambda: (link.vehicles()[0].age_s or 0.0) * 20.0 > FORSAKEN_S + 20.0, "it is silent for long")
         assert len(events) == heard
         assert link.battery_pct(NAME) < before, "it lives on"
+        assert link.is_adrift(NAME)
         await until(lambda: link.true_position(NAME).depth_m < 0.2, "it has come up")
         link.reach(NAME)
         assert [info.state for info in link.vehicles()] == [LinkState.READY]
