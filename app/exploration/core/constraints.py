@@ -214,13 +214,13 @@ class Constraints:
                 value, allowed, what = (
                     self.min_depth_m - excess_m,
                     self.min_depth_m,
-                    "depth {v:.2f} m is above {a:g} m",
+                    "depth of {v:.2f} m is shallower than {a:g} m",
                 )
             case Limit.MAX_DEPTH:
                 value, allowed, what = (
                     self.max_depth_m + excess_m,
                     self.max_depth_m,
-                    "depth {v:.2f} m is below {a:g} m",
+                    "depth of {v:.2f} m is deeper than {a:g} m",
                 )
             case Limit.ALTITUDE:
                 value, allowed = self.min_altitude_m - excess_m, self.min_altitude_m

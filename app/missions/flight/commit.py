@@ -70,8 +70,21 @@ class LegCommit:
         self._live = live
         self._constraints = constraints
         self._leads = leads
-        self.bottom = Bottom.unknown()
-        """The pessimistic sea floor of the last decision."""
+        self._bottom, self._below_datum_m = Bottom.unknown(), 0.0
+
+    @property
+    def bottom(self) -> Bottom:
+        """The pessimistic sea floor of the last decision; less deep by what the water has fallen since."""
+        fallen_m = self._water_below_datum_m() - self._below_datum_m
+        return replace(self._bottom, depth_m=self._bottom.depth_m - fallen_m) if fallen_m > 0.0 else self._bottom
+
+    def take_bottom(self, bottom: Bottom) -> None:
+        """Go by another sea floor, below the surface as it is now."""
+        self._bottom, self._below_datum_m = bottom, self._water_below_datum_m()
+
+    def _water_below_datum_m(self) -> float:
+        level_m = self._live.gate.corrections.water_level_m(now().timestamp())
+        return -float(safety.below_surface_m(np.zeros(1), level_m)[0])
 
     async def commit(self, decision: Decision, numbers: dict[str, int]) -> None:
         """Make a decision durable, its legs and the planner's memory together; then the vehicles have these legs ahead.
@@ -102,7 +115,7 @@ class LegCommit:
         if number > live.header.step:
             metrics.STEPS.inc()
             live.set_step(number, decision.objective, decision.terms)
-        self.bottom = decision.bottom
+        self.take_bottom(decision.bottom)
         starts_m = decision.origin_m
         for row, leg, member in zip(rows, decision.legs, getting, strict=True):
             now_of_name = live.team.get(row.vehicle) or live.team.left.get(row.vehicle)
@@ -144,7 +157,7 @@ class LegCommit:
                 )
 
         await live.journal.storage.done(lambda: to_the_end(store()))
-        self.bottom = decision.bottom
+        self.take_bottom(decision.bottom)
 
     def lead_home(self, member: Member, corners: list[tuple[FloatArray, float]]) -> None:
         """Give a vehicle legs that survey nothing: along corners (2,) at depths, metres.

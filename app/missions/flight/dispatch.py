@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from collections.abc import Iterable
 
 import numpy as np
 import structlog
@@ -80,11 +81,20 @@ class Dispatch:
             except TimeoutError:
                 continue
 
-    async def settle_late(self) -> list[Member]:
-        """End the legs that take too long; returns their vehicles."""
+    async def settle_late(self, of: Iterable[Member] | None = None) -> list[Member]:
+        """End the legs that take too long, of some vehicles or of all; returns their vehicles."""
         now_s = asyncio.get_running_loop().time()
-        late = [m for m in self._live.team if m.busy and self._late_at_s(m) <= now_s]
-        await self._tell_of_late(late)
+        late = [m for m in (self._live.team if of is None else of) if m.busy and self._late_at_s(m) <= now_s]
+        # All at once: while a line of the log is written, others may be sent on to their next legs.
+        numbers = [self._settle_late(member) for member in late]
+        for member, number in zip(late, numbers, strict=True):
+            await self._live.journal.log(
+                Level.WARNING,
+                "straggler",
+                f"{member.name} did not get to the end of its leg {number}: it goes on with the next",
+                step=number,
+                vehicles=[member.name],
+            )
         return late
 
     @property
@@ -209,16 +219,10 @@ class Dispatch:
     def _late_at_s(self, member: Member) -> float:
         return member.leg_began_s + member.leg_allowed_s / self._time_scale
 
-    async def _tell_of_late(self, late: list[Member]) -> None:
-        for member in late:
-            number = member.order.step if member.order is not None else member.legs
-            if member.target_m is not None:
-                self._note_given_up(member, [member.target_m])
-            self.settle(member, WaypointStatus.MISSED, f"not reached within {member.leg_allowed_s:.0f} s")
-            await self._live.journal.log(
-                Level.WARNING,
-                "straggler",
-                f"{member.name} did not get to the end of its leg {number}: it goes on with the next",
-                step=number,
-                vehicles=[member.name],
-            )
+    def _settle_late(self, member: Member) -> int:
+        """End a vehicle's leg and return its number."""
+        number = member.order.step if member.order is not None else member.legs
+        if member.target_m is not None:
+            self._note_given_up(member, [member.target_m])
+        self.settle(member, WaypointStatus.MISSED, f"not reached within {member.leg_allowed_s:.0f} s")
+        return number

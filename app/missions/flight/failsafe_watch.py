@@ -60,6 +60,8 @@ class FailsafeWatch:
         """Vehicles and alarms about ships that are still to be written."""
         self._below_since_s: dict[str, float] = {}
         """Since when vehicles have waited below for ships."""
+        self._have_waited: set[str] = set()
+        """Vehicles that have waited below for as long as they may."""
         self._been_apart: set[frozenset[str]] = set()
         """Vehicles are launched side by side: who has not been apart yet is not too close."""
 
@@ -139,18 +141,18 @@ class FailsafeWatch:
         held = any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in found)
         if not held:
             self._below_since_s.pop(member.name, None)
+            self._have_waited.discard(member.name)
             return found
         traffic = self._live.ships.traffic
         most_s = math.inf if traffic is None else traffic.settings.hold_s
         withdrawal = member.withdrawal
         if withdrawal is not None and withdrawal.below:
             since_s = self._below_since_s.setdefault(member.name, now_s)
-            if since_s > -math.inf and now_s - since_s > most_s:
-                self._below_since_s[member.name] = -math.inf
+            if member.name not in self._have_waited and now_s - since_s > most_s:
+                self._have_waited.add(member.name)
                 words = f"{member.name} waited {most_s:.0f} s for ships to pass, and comes up"
                 self._words_of_ships.append((member.name, words))
-        waited = self._below_since_s.get(member.name) == -math.inf
-        if not waited and not self._live.ships.is_up(member):
+        if member.name not in self._have_waited and not self._live.ships.is_up(member):
             return found
         warned = [replace(one, response=Response.WARN) if one.failsafe is Failsafe.TRAFFIC else one for one in found]
         return sorted(warned, key=lambda one: -STRENGTH[one.response])

@@ -69,7 +69,7 @@ class OrderBook:
     # Taking orders down
 
     async def accept(self, names: list[str], kind: OrderKind, find: Find, actor: str, words: str) -> OrderView:
-        """Take an order down for the first of some vehicles that can carry it out.
+        """Take an order down for the first of some vehicles that can carry it out; ``words`` say what it does then.
 
         Raises
         ------
@@ -111,7 +111,8 @@ class OrderBook:
             )
             session.add(row)
         member.asked = OperatorOrder(row.id, kind, OrderState.ACCEPTED, corners, actor, at)
-        await live.journal.log(Level.INFO, "order", words.format(vehicle=name), vehicle=name, actor=actor, order=row.id)
+        said = f"{name} {words}: ordered by {actor}"
+        await live.journal.log(Level.INFO, "order", said, vehicle=name, actor=actor, order=row.id)
         live.changed.set()
         live.publish_summary()
         return order_view(row)
@@ -342,13 +343,9 @@ class OrderBook:
                 await order_queries.change(session, order.id, state, why, now())
 
         await live.journal.storage.done(write)
-        what = (
-            DONE_WORDS[order.kind]
-            if state is OrderState.DONE
-            else f"{member.name} does not do what it was ordered: {why}"
-        )
+        what = DONE_WORDS[order.kind] if state is OrderState.DONE else f"does not do what it was ordered: {why}"
         level = Level.WARNING if state is OrderState.FAILED else Level.INFO
-        await live.journal.log(level, "order", what.format(vehicle=member.name), vehicle=member.name, order=order.id)
+        await live.journal.log(level, "order", f"{member.name} {what}", vehicle=member.name, order=order.id)
         live.publish_summary()
 
     # Places
@@ -367,10 +364,10 @@ class OrderBook:
 
 
 DONE_WORDS = {
-    OrderKind.GO: "{vehicle} was where it was ordered and goes on with its part",
-    OrderKind.SKIP_LINE: "{vehicle} leaves out the rest of its line",
-    OrderKind.REPEAT_LINE: "{vehicle} has flown the line again and goes on with its part",
-    OrderKind.DENSER: "{vehicle} has flown the lines ordered and goes on with its part",
+    OrderKind.GO: "was where it was ordered and goes on with its part",
+    OrderKind.SKIP_LINE: "leaves out the rest of its line",
+    OrderKind.REPEAT_LINE: "has flown the line again and goes on with its part",
+    OrderKind.DENSER: "has flown the lines ordered and goes on with its part",
 }
 
 

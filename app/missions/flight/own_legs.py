@@ -49,10 +49,10 @@ LEAST_WAY_M = 1.0
 """A vehicle with less way left is done."""
 
 SOON = 1.3
-"""Whose legs last no longer than so many times that gets one together with another that needs one."""
+"""A vehicle whose legs end within this many times the usual lead is decided for together with one that needs a leg."""
 
 HARDLY_BEGUN = 0.6
-"""Part of a leg that may be left when its vehicle gets a leg together with another that needs one."""
+"""A leg is decided together with those of others where no more than this part of a longest leg is left before it."""
 
 
 class OwnLegs:
@@ -126,7 +126,9 @@ class OwnLegs:
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
         left = any(self._wants_legs(member) for member in self._live.team.surveying)
-        return "nothing is left to ensonify" if left and self._done else "every step is done"
+        if left and self._done:
+            return "nothing is left to ensonify"
+        return "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
 
     async def _until_needed(self, sending: asyncio.Task[None]) -> None:
         if sending.done():

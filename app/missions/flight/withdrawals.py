@@ -72,8 +72,7 @@ class Withdrawals:
                     except Exception:
                         # Whatever keeps one from being led now keeps nobody else, and is tried again.
                         log.exception("a vehicle could not be led", vehicle=member.name)
-            if any(member.withdrawal is not None for member in self._live.team):
-                await self._dispatch.settle_late()
+            await self._dispatch.settle_late([m for m in self._live.team if m.withdrawal is not None])
             await until_next_look(self._time_scale)
 
     async def finished(self) -> None:

@@ -74,8 +74,8 @@ class Claims:
                 self.claim(live, member.spec)
         except ConflictError:
             for member in live.team:
-                if member.key not in before:
-                    self._hub.release(member.key, live.id)
+                if member.key not in before and self._hub.claimed_by(member.key) == live.id:
+                    self.release(live, member.spec)
             raise
 
     def claim(self, live: LiveMission, vehicle: VehicleSpec) -> None:
@@ -87,6 +87,12 @@ class Claims:
         except VehicleRefusedError as error:
             self._hub.release(key, live.id)
             raise ConflictError(f"vehicle {vehicle.name!r} {error.reason}", error.remedy) from error
+
+    def release(self, live: LiveMission, vehicle: VehicleSpec) -> None:
+        """Leave one vehicle of a mission that goes on to others; a simulated one is put away."""
+        self._hub.release((vehicle.kind, vehicle.name), live.id)
+        if self._hub.capabilities(vehicle.kind).simulated:
+            self._hub.withdraw(_deployment(live, vehicle))
 
     def release_team(self, live: LiveMission) -> None:
         """Give every vehicle of a mission up."""

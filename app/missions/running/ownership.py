@@ -27,8 +27,6 @@ PERIOD_S = 1.0
 TRIES = 5
 """Entering is tried again when another process looks at the wrong moment."""
 
-"""States in which somebody has to have a mission."""
-
 log = structlog.get_logger(__name__)
 
 

@@ -42,7 +42,7 @@ class TeamChanges:
             try:
                 slot = await _store_joining(live, vehicle)
             except BaseException:
-                self._hub.release((vehicle.kind, vehicle.name), live.id)
+                self._claims.release(live, vehicle)
                 raise
             live.team.join(vehicle, slot)
             if live.header.state is MissionState.DRAFT:

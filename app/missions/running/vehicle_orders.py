@@ -36,17 +36,12 @@ async def go(live: LiveMission, name: str, order: GoOrder, actor: str) -> OrderV
             ) from error
         region = await live.in_thread(free_region, flight.constraints)
         if not is_free(region, place_m):
-            inside = Polygon(flight.constraints.area).covers(
-                Polygon(flight.constraints.area).intersection(region)
-            ) and is_free(Polygon(flight.constraints.area), place_m)
-            what = (
-                "lies in a keep-out zone or its margin" if inside else "lies outside the area, or too near its border"
-            )
+            inside = is_free(Polygon(flight.constraints.area), place_m)
+            what = "lies in a keep-out zone or its margin" if inside else "lies outside the area"
             raise InvalidRequestError("position", f"{lat:.6f}, {lon:.6f} {what}", "a place inside, clear of the zones")
         return place_m[None]
 
-    words = f"{{vehicle}} goes to {lat:.6f}, {lon:.6f}: ordered by {actor}"
-    return await book.accept([name], OrderKind.GO, find, actor, words)
+    return await book.accept([name], OrderKind.GO, find, actor, f"goes to {lat:.6f}, {lon:.6f}")
 
 
 async def skip_line(live: LiveMission, name: str, actor: str) -> OrderView:
@@ -64,7 +59,7 @@ async def skip_line(live: LiveMission, name: str, actor: str) -> OrderView:
             raise ConflictError(f"vehicle {name!r} has not begun a line yet", "wait until it has")
         return np.zeros((0, 2))
 
-    words = f"{{vehicle}} is to leave out the rest of its line: ordered by {actor}"
+    words = "is to leave out the rest of its line"
     return await live.part(OrderBook).accept([name], OrderKind.SKIP_LINE, find, actor, words)
 
 
@@ -79,8 +74,7 @@ async def repeat_line(live: LiveMission, name: str, order: RepeatOrder, actor: s
             raise ConflictError(f"vehicle {name!r} has not flown a line yet", "wait until it has")
         return line
 
-    words = f"{{vehicle}} flies a line again: ordered by {actor}"
-    return await book.accept([name], OrderKind.REPEAT_LINE, find, actor, words)
+    return await book.accept([name], OrderKind.REPEAT_LINE, find, actor, "flies a line again")
 
 
 async def survey_denser(live: LiveMission, order: DenserOrder, actor: str) -> OrderView:
@@ -108,8 +102,7 @@ async def survey_denser(live: LiveMission, order: DenserOrder, actor: str) -> Or
         except ValueError as error:
             raise InvalidRequestError("area", str(error), "draw another part, or give line_spacing_m") from error
 
-    words = f"{{vehicle}} surveys {part.area:.0f} m² denser: ordered by {actor}"
-    return await book.accept(names, OrderKind.DENSER, find, actor, words)
+    return await book.accept(names, OrderKind.DENSER, find, actor, f"surveys {part.area:.0f} m² denser")
 
 
 def _nearest_first(live: LiveMission, part: Polygon) -> list[str]:

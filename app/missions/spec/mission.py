@@ -418,7 +418,8 @@ class MissionSpec(Model):
         default=60.0,
         gt=0,
         le=86_400,
-        description="After this many seconds of vehicle time a step goes on without stragglers",
+        description="Least time that a leg is given, seconds of vehicle time, longer where it is long; after that it "
+        "counts as missed and the vehicle flies its next, or, in steps of the whole team, the step ends without it",
     )
     accuracy_m: float = Field(
         default=0.25,

@@ -7,7 +7,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Belief
 from app.exploration.planners import create_planner
 from app.mapping.tides import TideTable
-from app.missions.clock import now
+from app.missions.clock import now, told_by
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flight.commit import LegCommit
 from app.missions.flight.decision import Knowledge, Place, decide, make_constraints
@@ -65,6 +65,27 @@ async def test_the_guard_gets_the_bottom_below_the_surface(
     assert {round(place.depth_m, 6) for place in member.order.bottom} == {expected_m}
 
 
+async def test_the_bottom_of_a_leg_that_begins_later_is_as_much_less_deep_as_the_water_has_fallen(
+    service: MissionService,
+) -> None:
+    live = await service.get((await service.create(sim_spec("a"))).id)
+    begun = now().timestamp()
+    falling = TideTable("pier", np.array([begun, begun + 7200.0]), np.array([0.5, -1.5]), "0" * 64)
+    live.gate.corrections.table = falling
+    committing = LegCommit(live, make_constraints(live.spec), leads=True)
+
+    def deep_m(after_s: float) -> float:
+        with told_by(lambda: begun + after_s):
+            return float(committing.bottom.at(np.array([[15.0, 15.0]]))[0])
+
+    with told_by(lambda: begun):
+        committing.take_bottom(Bottom(0.0, 0.0, 30.0, np.full((1, 1), 10.0)))
+    assert deep_m(0.0) == 10.0
+    assert deep_m(1800.0) == pytest.approx(10.0), "above the datum nothing is counted"
+    assert deep_m(3600.0) == pytest.approx(9.5), "halfway down"
+    assert deep_m(7200.0) == pytest.approx(8.5)
+
+
 async def test_an_order_is_no_deeper_than_the_turn_into_its_leg_and_the_circle_after_it_allow(
     service: MissionService,
 ) -> None:
@@ -73,7 +94,7 @@ async def test_an_order_is_no_deeper_than_the_turn_into_its_leg_and_the_circle_a
     committing = LegCommit(live, make_constraints(live.spec), leads=True)
     east, north = np.meshgrid(np.arange(0.5, 30.0), np.arange(0.5, 30.0))
     rising_west = 8.0 + 0.2 * east
-    committing.bottom = Bottom.from_landmarks(np.column_stack([east.ravel(), north.ravel()]), rising_west.ravel())
+    committing.take_bottom(Bottom.from_landmarks(np.column_stack([east.ravel(), north.ravel()]), rising_west.ravel()))
     member = live.team.join(live.spec.vehicles[0], 0)
 
     def ordered_m(heading_rad: float) -> float:

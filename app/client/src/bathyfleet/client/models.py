@@ -1013,7 +1013,9 @@ class MissionSpec(Model):
     arrival_radius_m: float = 3.0
     """Horizontal distance at which a waypoint counts as reached"""
     step_deadline_s: float = 60.0
-    """After this many seconds of vehicle time a step goes on without stragglers"""
+    """Least time that a leg is given, seconds of vehicle time, longer where it is long; after that it counts as
+    missed and the vehicle flies its next, or, in steps of the whole team, the step ends without it
+    """
     accuracy_m: float = 0.25
     """Standard deviation below which a cell counts as accurately known"""
     shoal_depth_m: float | None = None

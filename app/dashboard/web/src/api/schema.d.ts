@@ -3886,7 +3886,7 @@ export interface components {
             arrival_radius_m: number;
             /**
              * Step Deadline S
-             * @description After this many seconds of vehicle time a step goes on without stragglers
+             * @description Least time that a leg is given, seconds of vehicle time, longer where it is long; after that it counts as missed and the vehicle flies its next, or, in steps of the whole team, the step ends without it
              * @default 60
              */
             step_deadline_s: number;
@@ -4085,7 +4085,7 @@ export interface components {
                 arrival_radius_m: number;
                 /**
                  * Step Deadline S
-                 * @description After this many seconds of vehicle time a step goes on without stragglers
+                 * @description Least time that a leg is given, seconds of vehicle time, longer where it is long; after that it counts as missed and the vehicle flies its next, or, in steps of the whole team, the step ends without it
                  * @default 60
                  */
                 step_deadline_s: number;
