@@ -17,9 +17,9 @@ export function symbolOf({ unit }: LayerView): string {
   return SYMBOLS[unit] ?? unit;
 }
 
-/** The layer's colours, of depths those that the operator chose; null: it is drawn by classes. */
-export function paletteOf(layer: LayerView, depth: DepthPalette): Palette | null {
-  return layer.palette === "deep" ? DEPTH_PALETTES[depth].palette : PALETTES[layer.palette];
+/** The layer's colours, of depths those that the operator chose; of a drawing of its own any, for nothing asks for them. */
+export function paletteOf({ palette }: LayerView, depth: DepthPalette): Palette {
+  return palette in PALETTES ? PALETTES[palette as keyof typeof PALETTES] : DEPTH_PALETTES[depth].palette;
 }
 
 /**

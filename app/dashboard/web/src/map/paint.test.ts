@@ -17,7 +17,7 @@ function painted(changes: Partial<Painting> = {}) {
     depths: values,
     low: 0,
     high: 100,
-    table: lookupTable(DEEP),
+    colours: lookupTable(DEEP),
     guesses: null,
     light: null,
     ring: [],

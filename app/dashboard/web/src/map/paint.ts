@@ -1,8 +1,8 @@
 /** Turns a layer into a picture: colours, light and shadow, and how sure the map is. Pure; runs in a worker. */
 
 import { isMeasured, strengthOf } from "./certainty";
+import { type Drawn, drawingOf } from "./drawings";
 import { hillshade } from "./hillshade";
-import { LANDMARK_COLOURS, landmarkState } from "./landmarks";
 import { ACCURATE, UNKNOWN } from "./seafloor";
 
 export interface Painting {
@@ -15,8 +15,8 @@ export interface Painting {
   /** Of the first and the last colour, in the layer's whole numbers. */
   low: number;
   high: number;
-  /** 256 colours, three bytes each; null: the values are flags whose landmark states are shown. */
-  table: Uint8Array | null;
+  /** 256 colours, three bytes each, or the name of a drawing of its own. */
+  colours: Uint8Array | Drawn;
   /** Deviations of depths, and between which of them guesses fade; null: the layer is not of depths. */
   guesses: { sds: Int32Array; full: number; none: number } | null;
   /** Where light comes from, and how many of the depths' whole numbers are a cell's side; null: no light. */
@@ -56,7 +56,9 @@ export function strengths({ values, flags, guesses }: Pick<Painting, "values" | 
 
 /** The picture, a pixel for each cell, northern row first; cells without a value are transparent. */
 export function paint(painting: Painting, strong = strengths(painting)): Picture {
-  const { rows, cols, values, flags, depths, low, high, table, guesses, light, ring } = painting;
+  const { rows, cols, values, flags, depths, low, high, colours, guesses, light, ring } = painting;
+  const table = typeof colours === "string" ? null : colours;
+  const drawing = typeof colours === "string" ? drawingOf(colours) : null;
   const pixels = new Uint8ClampedArray(4 * rows * cols);
   const guessed = guesses && new Uint8ClampedArray(4 * rows * cols);
   const scale = 255 / Math.max(1e-9, high - low);
@@ -72,7 +74,7 @@ export function paint(painting: Painting, strong = strengths(painting)): Picture
       for (let i = 0; i < 3; i++) {
         const part = table
           ? (table[3 * index + i] as number)
-          : (LANDMARK_COLOURS[landmarkState(value)]?.[i] as number);
+          : (drawing?.colours[drawing.classOf(value)]?.[i] as number);
         pixels[into + i] = bright < 1 ? part * bright : part + (255 - part) * (bright - 1) * GLARE;
       }
       pixels[into + 3] = 255 * (strong[at] as number);

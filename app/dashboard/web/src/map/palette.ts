@@ -2,6 +2,7 @@
 
 import type { LayerView } from "../api/types";
 import { say } from "../words/say";
+import type { Drawn } from "./drawings";
 
 export type Rgb = readonly [number, number, number];
 
@@ -91,13 +92,12 @@ const BALANCE = palette(
 /** Of layers by classes: missed, too few, enough; as landmarks are drawn. */
 const CLASSES = palette("b03a2e f4c450 2e7d6e");
 
-/** The palettes that layers name beside that of depths; null: the layer is drawn by classes. */
-export const PALETTES: Readonly<Record<Exclude<LayerView["palette"], "deep">, Palette | null>> = {
+/** The palettes that layers name beside that of depths, and beside those with drawings of their own. */
+export const PALETTES: Readonly<Record<Exclude<LayerView["palette"], "deep" | Drawn>, Palette>> = {
   violet: VIOLET,
   matter: MATTER,
   balance: BALANCE,
   classes: CLASSES,
-  landmarks: null,
 };
 
 /** The colour of a value between `low` and `high`; values outside take the end's colour. */

@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
 import type { LayerView, LngLat } from "../api/types";
 import { contours } from "./contours";
-import { landmarkShares } from "./landmarks";
+import { drawnShares } from "./drawings";
+import { LANDMARKS } from "./landmarks";
 import { fittingRange, shareOutside } from "./layers";
 import { roundRange } from "./palette";
 import { differenceOf, placeIn, readCell, type SeaFloor, UNKNOWN, valueAt, withTiles } from "./seafloor";
@@ -174,7 +175,7 @@ describe("ranges", () => {
 it("landmarks are never seen, visible or accurate", () => {
   const flags = [0, 8, 8 | 4, 1 | 8 | 4];
   const map = withTiles(null, answer({ 0: { depth: [1, 1, 1, 1], flags } }, { cols: 2, tile: 2 }));
-  expect(landmarkShares(map as SeaFloor)).toEqual([0.25, 0.25, 0.5]);
+  expect(drawnShares(map as SeaFloor, "flags", LANDMARKS)).toEqual([0.25, 0.25, 0.5]);
 });
 
 describe("contours", () => {

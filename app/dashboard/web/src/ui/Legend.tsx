@@ -3,7 +3,7 @@ import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { LayerView } from "../api/types";
-import { LANDMARK_COLOURS, landmarkShares, landmarkWords } from "../map/landmarks";
+import { drawingOf, drawnBy, drawnShares } from "../map/drawings";
 import { classShares, paletteOf, type Range, rangeFault, shareOutside, symbolOf } from "../map/layers";
 import { colourAt, DEPTH_PALETTES, type Palette, type Rgb } from "../map/palette";
 import type { SeaFloor } from "../map/seafloor";
@@ -39,6 +39,7 @@ export function Legend() {
   const shown = shownLayer.value;
   if (!mission.value || !shown) return null;
   const palette = paletteOf(shown, depthPalette.value);
+  const drawn = drawnBy(shown);
   return (
     <section
       class={`legend${legendOpen.value ? "" : " folded"}`}
@@ -57,22 +58,22 @@ export function Legend() {
         />
       </label>
       {map && range ? (
-        palette && shown.classes.length > 0 ? (
+        drawn ? (
+          <Classes
+            words={drawingOf(drawn).words()}
+            colours={drawingOf(drawn).colours}
+            shares={drawnShares(map, shown.name, drawingOf(drawn))}
+            id={drawn}
+          />
+        ) : shown.classes.length > 0 ? (
           <Classes
             words={shown.classes}
             colours={shown.classes.map((_, i) => colourAt(palette, i, range.low, range.high))}
             shares={classShares(map, shown)}
             id={shown.name}
           />
-        ) : palette ? (
-          <Scale shown={shown} palette={palette} range={range} />
         ) : (
-          <Classes
-            words={landmarkWords()}
-            colours={LANDMARK_COLOURS}
-            shares={landmarkShares(map) ?? []}
-            id="landmarks"
-          />
+          <Scale shown={shown} palette={palette} range={range} />
         )
       ) : (
         <p class="empty">{map ? missing(map, shown) : say("legend.theSeaFloorAppearsWithThe")}</p>

@@ -8,6 +8,7 @@ import { ringOf } from "../map/area";
 import type { Chart, Pin } from "../map/chart";
 import { contourInterval } from "../map/contours";
 import { outliersOf, placeOf } from "../map/crossings";
+import { drawnBy } from "../map/drawings";
 import { paletteOf } from "../map/layers";
 import type { PlanLines } from "../map/lively";
 import type { PlaceMark, Route, Track } from "../map/marks";
@@ -288,7 +289,6 @@ function followSeaFloor(chart: Chart): () => void {
     const shown = shownLayer.value;
     const values = shown && map?.layers[shown.name];
     const { flags, depth, uncertainty } = map?.layers ?? {};
-    const palette = shown && paletteOf(shown, depthPalette.value);
     const wanted = showContours.value;
     const certainty = shownCertainty.value;
     const azimuth_deg = shown?.palette === "deep" ? lightFrom.value : null;
@@ -310,7 +310,7 @@ function followSeaFloor(chart: Chart): () => void {
         depths: depth,
         low: range.low * layerScale,
         high: range.high * layerScale,
-        table: palette ? lookupTable(palette) : null,
+        colours: drawnBy(shown) ?? lookupTable(paletteOf(shown, depthPalette.value)),
         guesses:
           certainty && uncertainty && shown.of_depths
             ? { sds: uncertainty, full: certainty.full_m * sdScale, none: certainty.none_m * sdScale }

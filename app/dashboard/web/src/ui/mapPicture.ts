@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import type { Chart } from "../map/chart";
-import { LANDMARK_COLOURS, landmarkWords } from "../map/landmarks";
+import { drawingOf, drawnBy } from "../map/drawings";
 import { paletteOf, symbolOf } from "../map/layers";
 import { drawSheet, fitted, type SheetLegend, type SheetVehicle, sheetFor } from "../map/mapSheet";
 import { colourAt, type Rgb } from "../map/palette";
@@ -93,11 +93,12 @@ function legend(): SheetLegend | null {
   if (!shown || !range) return null;
   const unit = symbolOf(shown);
   const title = named("layer", shown.name, shown.title) + (unit ? `, ${unit}` : "");
-  const palette = paletteOf(shown, depthPalette.peek());
-  if (!palette) {
-    const classes = landmarkWords().map((words, i) => ({ words, colour: css(LANDMARK_COLOURS[i] as Rgb) }));
-    return { title, classes };
+  const drawn = drawnBy(shown);
+  if (drawn) {
+    const { words, colours } = drawingOf(drawn);
+    return { title, classes: words().map((one, i) => ({ words: one, colour: css(colours[i] as Rgb) })) };
   }
+  const palette = paletteOf(shown, depthPalette.peek());
   const colour = (value: number) => css(colourAt(palette, value, range.low, range.high));
   if (shown.classes.length > 0)
     return { title, classes: shown.classes.map((words, i) => ({ words, colour: colour(i) })) };
