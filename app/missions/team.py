@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.georeference import LocalFrame
+from app.missions.errors import VehicleNotFoundError
 from app.missions.fleet.hub import VehicleKey
 from app.missions.fleet.interface import (
     LinkCapabilities,
@@ -307,6 +308,14 @@ class Team:
     def get(self, name: str) -> Member | None:
         """Return the vehicle of this name, if it takes part."""
         return self.members.get(name)
+
+    def named(self, name: str) -> Member:
+        """Return the vehicle of this name. Raises VehicleNotFoundError when it takes no part."""
+        member = self.members.get(name)
+        if member is None:
+            those = ", ".join(self.members) or "none"
+            raise VehicleNotFoundError(f"vehicle {name!r} takes no part in this mission", f"those that do: {those}")
+        return member
 
     @property
     def present(self) -> list[Member]:

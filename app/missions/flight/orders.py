@@ -19,7 +19,7 @@ from app.exploration.core.routes import FreeSpace
 from app.exploration.lines.flown_lines import flown_lines, length_m, line_now
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.clock import now
-from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.errors import ConflictError
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.range_left import RangeLeft
 from app.missions.live.mission import LiveMission
@@ -120,10 +120,7 @@ class OrderBook:
     def able(self, name: str) -> tuple[Member, Flight]:
         """Return a vehicle that can take orders, and its flight. Raises VehicleNotFoundError, ConflictError."""
         live = self._live
-        member = live.team.get(name)
-        if member is None:
-            present = ", ".join(m.name for m in live.team) or "none"
-            raise VehicleNotFoundError(f"vehicle {name!r} takes no part in this mission", f"those that do: {present}")
+        member = live.team.named(name)
         if live.header.state is not MissionState.RUNNING:
             raise ConflictError(f"the mission is {live.header.state}: nobody is led", "start or resume it first")
         if live.ending is not None:

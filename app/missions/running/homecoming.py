@@ -1,6 +1,6 @@
-"""Whether vehicles go home before a mission ends, and single ones in the middle of it."""
+"""Whether vehicles go home before a mission ends; single ones called home, held where they are, and sent on."""
 
-from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.errors import ConflictError
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
 from app.missions.running.supervisor import MissionSupervisor
@@ -34,7 +34,7 @@ def returns(live: LiveMission, action: Action, asked: bool | None) -> bool:
 
 async def call_home(live: LiveMission, name: str, actor: str) -> None:
     """Send one vehicle home and go on without it. Raises VehicleNotFoundError, ConflictError."""
-    member = _member(live, name)
+    member = live.team.named(name)
     if live.header.state is not MissionState.RUNNING:
         raise ConflictError(f"the mission is {live.header.state}: nobody is led", "resume it first")
     if live.spec.recovery_of(member.spec) is None:
@@ -46,7 +46,7 @@ async def call_home(live: LiveMission, name: str, actor: str) -> None:
 
 async def hold(live: LiveMission, name: str, actor: str) -> None:
     """Keep one vehicle where it is until it is sent on. Raises VehicleNotFoundError, ConflictError."""
-    member = _member(live, name)
+    member = live.team.named(name)
     if live.header.state is not MissionState.RUNNING or live.ending is not None:
         raise ConflictError(f"the mission is {_what(live)}: nobody is held", "see to the mission first")
     if member.withdrawal is None and live.team.surveying == [member] and not live.part(OrderBook).led_apart:
@@ -58,7 +58,7 @@ async def hold(live: LiveMission, name: str, actor: str) -> None:
 
 async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, actor: str) -> None:
     """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
-    member = _member(live, name)
+    member = live.team.named(name)
     if member.withdrawal is None and await live.part(OrderBook).cancel(member, actor):
         return
     if member.withdrawal is None:
@@ -79,14 +79,6 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
     await live.journal.log(Level.INFO, "recovery", f"{name} goes on with the survey", vehicle=name, actor=actor)
     live.changed.set()
     live.publish_summary()
-
-
-def _member(live: LiveMission, name: str) -> Member:
-    member = live.team.get(name)
-    if member is None:
-        present = ", ".join(m.name for m in live.team) or "none"
-        raise VehicleNotFoundError(f"vehicle {name!r} takes no part in this mission", f"those that do: {present}")
-    return member
 
 
 def _what(live: LiveMission) -> str:

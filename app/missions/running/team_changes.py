@@ -72,12 +72,7 @@ class TeamChanges:
             The latter when it takes part in another mission meanwhile.
         """
         async with self._supervisor.acting(live.id):
-            member = live.team.get(name)
-            if member is None:
-                present = ", ".join(m.name for m in live.team) or "none"
-                raise VehicleNotFoundError(
-                    f"vehicle {name!r} takes no part in this mission", f"those that do: {present}"
-                )
+            member = live.team.named(name)
             if live.header.state in ENDED:
                 return [await self._stop_again(live, member)]
             return await self._leave(live, member, actor)
