@@ -267,12 +267,12 @@ def decide(
         proposal.objective,
         dict(proposal.terms),
         planner.snapshot(),
-        notes,
-        fixes,
-        floor.cautious,
-        pursuits,
-        where,
-        frozenset(place.vehicle for place in team if place.moving and place.vehicle in proposal.done),
+        notes=notes,
+        fixes=fixes,
+        bottom=floor.cautious,
+        pursuits=pursuits,
+        origin_m=where,
+        done=frozenset(place.vehicle for place in team if place.moving and place.vehicle in proposal.done),
     )
 
 
