@@ -36,6 +36,8 @@ ZONE = rectangle(300, 60, 340, 100)
 HOME = lon_lat(-25.0, 20.0)
 HELD = ("lauv-2", "lauv-3")
 LOOK_S = 0.3
+TIME_SCALE = "6"
+"""Faster, a busy machine's vehicles circle while they wait for decisions."""
 
 
 @dataclass
@@ -96,6 +98,7 @@ class Guide:
 def dashboard(guide: Guide, page: Page) -> None:
     """A survey under way."""
     show(page, guide.survey(0.55))
+    by_id(page, "range-low").wait_for()
 
 
 def watch(guide: Guide, page: Page) -> None:
@@ -201,11 +204,12 @@ def swath(guide: Guide, page: Page) -> None:
 
 
 SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = {
-    "dashboard": (dashboard, WIDE, "light"),
-    "watch": (watch, WIDE, "light"),
-    "phone": (phone, PHONE, "night"),
+    # Before there is any mission.
     "planning": (planning, WIDE, "light"),
     "checklist": (checklist, WIDE, "dark"),
+    "dashboard": (dashboard, WIDE, "light"),
+    "phone": (phone, PHONE, "night"),
+    "watch": (watch, WIDE, "light"),
     "swath": (swath, WIDE, "light"),
     "space": (space, WIDE, "dark"),
     "profile": (profile, WIDE, "light"),
@@ -225,7 +229,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", choices=[*SCENES, []], metavar="NAME", help=", ".join(SCENES))
     parser.add_argument("--out", type=Path, default=IMAGES)
     options = parser.parse_args()
-    settings = {"simulation__family": "canyon", "time_scale": "10"}
+    settings = {"simulation__family": "canyon", "time_scale": TIME_SCALE}
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         service = Service(Path(folder), **settings)
         service.start()
