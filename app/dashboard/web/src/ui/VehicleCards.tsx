@@ -318,7 +318,12 @@ function Orders({ of: v, ended }: { of: VehicleView; ended: boolean }) {
           abortDialogOpen.value = true;
         }}
       >
-        {ended ? say("cards.stopAgain", { v: v.name }) : say("cards.abort", { v: v.name })}
+        <span class="in-full">
+          {ended ? say("cards.stopAgain", { v: v.name }) : say("cards.abort", { v: v.name })}
+        </span>
+        <span class="in-short" aria-hidden="true">
+          {ended ? say("cards.stopAgainShort") : say("cards.abortShort")}
+        </span>
       </Button>
       {typingFor.value === v.name ? <TypedPlace name={v.name} /> : null}
     </div>

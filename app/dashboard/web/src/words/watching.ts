@@ -54,7 +54,9 @@ export const WATCHING = {
   },
   "cards.resumeSurvey": { en: "Resume survey", pt: "Retomar o levantamento" },
   "cards.stopAgain": { en: "Stop {v} again", pt: "Parar {v} de novo" },
+  "cards.stopAgainShort": { en: "Stop again", pt: "Parar de novo" },
   "cards.abort": { en: "Abort {v}", pt: "Abortar {v}" },
+  "cards.abortShort": { en: "Abort", pt: "Abortar" },
   "cards.vehicleAtStep": {
     en: "Vehicle {name} at step {replayStep}",
     pt: "Veículo {name} no passo {replayStep}",
