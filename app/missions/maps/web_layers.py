@@ -1,5 +1,6 @@
 """What web maps and GIS are shown of a mission's map: layers with colours that stay the same while the map grows."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.layers import ACCURATE, LAYERS, SOUNDED, VISIBLE
+from app.mapping.map_windows import geographic_bounds
 from app.mapping.products.tile_pictures import Pixels, coarser, coarser_grid, paint, paint_classes, shade
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.types import Grid
@@ -86,6 +88,33 @@ def _count(snapshot: MapSnapshot) -> FloatArray:
     if snapshot.live is not None:
         count[snapshot.live.cells] = np.maximum(count[snapshot.live.cells], snapshot.live.count)
     return count
+
+
+@dataclass(frozen=True)
+class CellValues:
+    """What a map knows of a place; ``soundings`` 0: its depth was estimated between soundings."""
+
+    depth_m: float
+    sd_m: float
+    soundings: int
+    vertical_datum: str
+
+
+def values_at(snapshot: MapSnapshot, lat_deg: float, lon_deg: float) -> CellValues | None:
+    """Return what the cell at a place holds; None where nothing is known."""
+    grid, frame = snapshot.built.map.grid, snapshot.facts.frame
+    south, west, north, east = geographic_bounds(grid, frame)
+    if not (south <= lat_deg <= north and west <= lon_deg <= east):
+        return None
+    place_east, place_north = frame.to_local(lat_deg, lon_deg)
+    row = int((place_north - grid.south_m) // grid.cell_m)
+    col = int((place_east - grid.west_m) // grid.cell_m)
+    if not (0 <= row < grid.rows and 0 <= col < grid.cols):
+        return None
+    depth_m, sd_m = (float(layer[row, col]) for layer in _with_live(snapshot))
+    if not math.isfinite(depth_m):
+        return None
+    return CellValues(depth_m, sd_m, int(_count(snapshot)[row, col]), snapshot.facts.vertical_datum.statement)
 
 
 def _two_classes(_: MissionSpec) -> Range:
