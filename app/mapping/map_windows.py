@@ -117,10 +117,9 @@ def window_cells(window: MapWindow, grid: Grid, frame: LocalFrame) -> WindowCell
         return None
     pixel_x = (window.east - window.west) / window.width_px
     pixel_y = (window.north - window.south) / window.height_px
-    first_col, last_col = _span((x.min() - window.west) / pixel_x, (x.max() - window.west) / pixel_x, window.width_px)
-    first_row, last_row = _span(
-        (window.north - y.max()) / pixel_y, (window.north - y.min()) / pixel_y, window.height_px
-    )
+    ends_x, ends_y = np.array([x.min(), x.max()]) - window.west, window.north - np.array([y.max(), y.min()])
+    first_col, last_col = _span(ends_x / pixel_x, window.width_px)
+    first_row, last_row = _span(ends_y / pixel_y, window.height_px)
     rows, cols = last_row - first_row, last_col - first_col
     if rows <= 0 or cols <= 0:
         return None

@@ -1,6 +1,7 @@
 """Layers of a map as pictures in tiles, for web maps and GIS."""
 
 import io
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -119,3 +120,18 @@ def window_png(picture: Words) -> bytes:
 def empty_png(width_px: int, height_px: int) -> bytes:
     """Return a picture that shows nothing."""
     return window_png(np.zeros((height_px, width_px), dtype=np.uint32))
+
+
+def stacked(contents: Sequence[bytes], size: tuple[int, int], background: tuple[int, int, int] | None) -> bytes:
+    """Return PNGs over each other as one of the same width and height, the lowest first.
+
+    ``background``: red, green and blue of a ground without any opening; None: transparent where all are.
+    """
+    if not contents and background is None:
+        return empty_png(*size)
+    sheet = Image.new("RGBA", size, (*background, 255) if background is not None else (0, 0, 0, 0))
+    for content in contents:
+        sheet.alpha_composite(Image.open(io.BytesIO(content)).convert("RGBA"))
+    stream = io.BytesIO()
+    (sheet if background is None else sheet.convert("RGB")).save(stream, "PNG", compress_level=1)
+    return stream.getvalue()

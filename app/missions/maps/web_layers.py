@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -13,13 +14,25 @@ from app.mapping.products.tile_pictures import Pixels, coarser, coarser_grid, pa
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.types import Grid
 from app.missions.maps.snapshot import MapSnapshot
-from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mission import Limits
 
 Range = tuple[float, float]
 """Values of the first and of the last colour."""
 
 SURE_TIMES = 4.0
 """Uncertainty is coloured up to so many times the accuracy that a mission asks for."""
+
+
+class Ranging(Protocol):
+    """What the colours of a mission's layers follow from."""
+
+    @property
+    def limits(self) -> Limits:
+        """How deep vehicles may go, and how near to the bottom."""
+
+    @property
+    def accuracy_m(self) -> float:
+        """The standard deviation that is asked for."""
 
 
 @dataclass(frozen=True)
@@ -34,17 +47,20 @@ class WebLayer:
         Of ``min`` and ``max``; empty for layers by classes, which have neither.
     default_range
         Returns the range of a mission's colours, from what it is to do: it never changes while the map grows.
+    classes
+        Words for the classes 1, 2 and so on of layers without a unit.
     """
 
     name: str
     title: str
     meaning: str
     unit: str
-    default_range: Callable[[MissionSpec], Range]
+    default_range: Callable[[Ranging], Range]
     paint: Callable[[MapSnapshot, Range], Pixels]
+    classes: tuple[str, ...] = ()
 
 
-def _depth_range(spec: MissionSpec) -> Range:
+def _depth_range(spec: Ranging) -> Range:
     """Return from the surface to the deepest bottom that vehicles may follow."""
     return 0.0, spec.limits.max_depth_m + spec.limits.min_altitude_m
 
@@ -117,7 +133,7 @@ def values_at(snapshot: MapSnapshot, lat_deg: float, lon_deg: float) -> CellValu
     return CellValues(depth_m, sd_m, int(_count(snapshot)[row, col]), snapshot.facts.vertical_datum.statement)
 
 
-def _two_classes(_: MissionSpec) -> Range:
+def _two_classes(_: Ranging) -> Range:
     return 0.0, 2.0
 
 
@@ -147,6 +163,7 @@ WEB_LAYERS = {
             "",
             _two_classes,
             _density,
+            (f"1 to {LEAST_SOUNDINGS - 1} soundings in the cell", f"{LEAST_SOUNDINGS} and more"),
         ),
         WebLayer(
             "coverage",
@@ -155,6 +172,7 @@ WEB_LAYERS = {
             "",
             _two_classes,
             _coverage,
+            ("near a sounding", "known to the accuracy asked for"),
         ),
     )
 }

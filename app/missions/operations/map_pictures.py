@@ -5,17 +5,19 @@ pictures are asked for, and a picture is only made anew when what it shows did c
 """
 
 import asyncio
+import contextlib
 import hashlib
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from app.mapping.map_windows import MapWindow, window_cells, window_pixel_cells
-from app.mapping.products.tile_pictures import Words, empty_png, window_png, window_words, words_of
+from app.mapping.products.tile_pictures import Words, empty_png, stacked, window_png, window_words, words_of
 from app.missions.errors import MapNotReadyError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.snapshot import MapSnapshot
@@ -105,6 +107,15 @@ class MapPictures:
             making.add_done_callback(lambda _: self._making.pop(key, None))
         # Whoever stops waiting does not end it for the others.
         return await asyncio.shield(making)
+
+    async def together(
+        self, contents: Sequence[bytes], window: MapWindow, background: tuple[int, int, int] | None
+    ) -> bytes:
+        """Return pictures of a window as one, the lowest first, on a ground of red, green and blue or on none."""
+        loop = asyncio.get_running_loop()
+        size = window.width_px, window.height_px
+        async with self._turns if window.pixels > SMALL_PX else contextlib.nullcontext():
+            return await loop.run_in_executor(self._executor, stacked, contents, size, background)
 
     async def values(self, live: LiveMission, maps: FinalMaps, lat_deg: float, lon_deg: float) -> CellValues | None:
         """Return what the newest map knows of a place; None where it knows nothing."""
