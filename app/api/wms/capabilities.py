@@ -8,10 +8,10 @@ from urllib.parse import urlencode
 import numpy as np
 
 from app.api.ogc.crs import Box
-from app.api.wms.parameters import DEFAULT_STYLE, INFO_FORMATS, MOST_PX, PNG, names_of
+from app.api.wms.parameters import DEFAULT_STYLE, LISTED_INFO_FORMATS, MOST_PX, PNG, names_of
 from app.api.wms.problems import NEW
 from app.mapping.map_windows import WGS84, projection
-from app.mapping.products.legend import HEIGHT_PX, WIDTH_PX
+from app.mapping.products.legend import CLASSES_PX, RANGE_PX
 from app.missions.maps.web_layers import WEB_LAYERS, WebLayer
 from imc_bridge.printable import printable
 
@@ -60,7 +60,7 @@ def capabilities(offer: Offer, version: str) -> bytes:
     operations = {
         "GetCapabilities": ["text/xml" if new else "application/vnd.ogc.wms_xml"],
         "GetMap": [PNG],
-        "GetFeatureInfo": list(INFO_FORMATS),
+        "GetFeatureInfo": list(LISTED_INFO_FORMATS),
         "sld:GetLegendGraphic" if new else "GetLegendGraphic": [PNG],
     }
     for name, formats in operations.items():
@@ -126,8 +126,8 @@ def _add_layer(root: ET.Element, offer: Offer, layer: WebLayer, version: str) ->
     style = ET.SubElement(described, "Style")
     ET.SubElement(style, "Name").text = DEFAULT_STYLE
     ET.SubElement(style, "Title").text = "Colours that stay the same while the map grows"
-    height = HEIGHT_PX["range" if layer.unit else "classes"]
-    legend = ET.SubElement(style, "LegendURL", width=str(WIDTH_PX), height=str(height))
+    width, height = RANGE_PX if layer.unit else CLASSES_PX
+    legend = ET.SubElement(style, "LegendURL", width=str(width), height=str(height))
     ET.SubElement(legend, "Format").text = PNG
     query = {"SERVICE": "WMS", "VERSION": version, "REQUEST": "GetLegendGraphic", "LAYER": layer.name, "FORMAT": PNG}
     if version == NEW:

@@ -21,6 +21,9 @@ LEAST_SIDE = 1e-9
 PNG = "image/png"
 HTML, TEXT, JSON = "text/html", "text/plain", "application/json"
 INFO_FORMATS = (HTML, TEXT, JSON)
+LISTED_INFO_FORMATS = (HTML, TEXT)
+"""QGIS would ask for JSON if it were listed, and take the answer for GML unless it begins with ``Content-Type`` in this
+very writing, which our server does not use."""
 DEFAULT_STYLE = "default"
 MAX_VALUE_M = 20_000.0
 

@@ -100,7 +100,7 @@ async def _legend(request: Request, state: EdgeState, data: Dataset, given: Para
     layer = WEB_LAYERS[layer_of_legend(given)]
     if layer.unit:
         range_ = range_of(given) or usual_range(layer, data.rows)
-        content = await asyncio.to_thread(range_legend, layer.title, layer.unit, range_, LAYERS[layer.name].fit)
+        content = await asyncio.to_thread(range_legend, layer.title, "m", range_, LAYERS[layer.name].fit)
     else:
         content = await asyncio.to_thread(class_legend, layer.title, layer.classes)
     return Response(content, media_type=PNG, headers={"Cache-Control": "private, max-age=60"})

@@ -9,9 +9,8 @@ from PIL import Image, ImageDraw, ImageFont
 from app.mapping.layers import Fit
 from app.mapping.products.colours import CLASS_COLOURS, palette
 
-WIDTH_PX = 240
-HEIGHT_PX = {"range": 190, "classes": 70}
-"""Of legends with a range of values, and of those with two classes."""
+RANGE_PX, CLASSES_PX = (130, 190), (240, 70)
+"""Width and height of legends with a range of values, and of those with two classes."""
 
 _MARGIN, _BAR, _TITLE, _LINE, _TEXT_PX = 8, 18, 24, 22, 12
 _TICKS = 5
@@ -20,8 +19,8 @@ _INK = (30, 30, 30, 255)
 
 def range_legend(title: str, unit: str, range_: tuple[float, float], fit: Fit) -> bytes:
     """Return a bar of the colours between the values of the first (above) and of the last one, as PNG."""
-    picture, draw, font = _sheet(f"{title}, {unit}", HEIGHT_PX["range"])
-    height = HEIGHT_PX["range"] - _TITLE - 2 * _MARGIN - _TEXT_PX
+    picture, draw, font = _sheet(f"{title} ({unit})", RANGE_PX)
+    height = RANGE_PX[1] - _TITLE - 2 * _MARGIN - _TEXT_PX
     colours = palette(fit)(np.linspace(0.0, 1.0, height), bytes=True)[:, None, :]
     bar = Image.fromarray(np.ascontiguousarray(np.repeat(colours, _BAR, axis=1)))
     top = _TITLE + _MARGIN
@@ -36,7 +35,7 @@ def range_legend(title: str, unit: str, range_: tuple[float, float], fit: Fit) -
 
 def class_legend(title: str, words: Sequence[str]) -> bytes:
     """Return the colours of classes 1, 2 and so on with their words, as PNG."""
-    picture, draw, font = _sheet(title, HEIGHT_PX["classes"])
+    picture, draw, font = _sheet(title, CLASSES_PX)
     for number, (word, colour) in enumerate(zip(words, CLASS_COLOURS[1:], strict=False)):
         top = _TITLE + number * _LINE
         draw.rectangle([(_MARGIN, top), (_MARGIN + _BAR, top + 14)], fill=(*colour, 255))
@@ -44,8 +43,8 @@ def class_legend(title: str, words: Sequence[str]) -> bytes:
     return _png(picture)
 
 
-def _sheet(title: str, height: int) -> tuple[Image.Image, ImageDraw.ImageDraw, ImageFont.FreeTypeFont]:
-    picture = Image.new("RGBA", (WIDTH_PX, height), (255, 255, 255, 255))
+def _sheet(title: str, size: tuple[int, int]) -> tuple[Image.Image, ImageDraw.ImageDraw, ImageFont.FreeTypeFont]:
+    picture = Image.new("RGBA", size, (255, 255, 255, 255))
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(_TEXT_PX)
     if not isinstance(font, ImageFont.FreeTypeFont):

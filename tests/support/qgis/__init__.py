@@ -65,6 +65,10 @@ class Qgis:
         """*Add XYZ Layer*."""
         self._ask("add_tiles", name=name, address=address, max_zoom=max_zoom)
 
+    def add_map(self, name: str, address: str, layers: list[str], crs: str = "EPSG:3857") -> None:
+        """*Add WMS/WMTS Layer*."""
+        self._ask("add_map", name=name, address=address, layers=layers, crs=crs)
+
     def add_features(self, name: str, address: str, collection: str) -> None:
         """*Add WFS / OGC API – Features Layer*."""
         self._ask("add_features", name=name, address=address, collection=collection)
@@ -74,9 +78,21 @@ class Qgis:
         return int(self._ask("count", name=name))
 
     def extent(self, name: str) -> list[float]:
-        """Where the layer's features lie: west, south, east, north in EPSG:3857."""
+        """Where the layer lies: west, south, east, north in EPSG:3857."""
         return [float(value) for value in self._ask("extent", name=name)]
 
-    def picture(self, path: Path, names: list[str], extent: list[float], width: int = 800, height: int = 600) -> None:
-        """Reload and draw layers, the topmost first, into a PNG file."""
-        self._ask("picture", path=str(path), names=names, extent=extent, width=width, height=height)
+    def identify(self, name: str, extent: list[float], width: int = 100, height: int = 100) -> str:
+        """*Identify Features* in the middle of a view: what is said of it, HTML."""
+        return str(self._ask("identify", name=name, extent=extent, width=width, height=height))
+
+    def picture(
+        self,
+        path: Path,
+        names: list[str],
+        extent: list[float],
+        size: tuple[int, int] = (800, 600),
+        crs: str = "EPSG:3857",
+    ) -> None:
+        """Reload and draw layers, the topmost first, into a PNG file, in a system of the view's own."""
+        width, height = size
+        self._ask("picture", path=str(path), names=names, extent=extent, width=width, height=height, crs=crs)
