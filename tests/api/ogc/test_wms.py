@@ -199,7 +199,7 @@ def test_a_place_tells_its_depth(gis: Gis, version: str) -> None:
     lon, lat = WEST + (column + 0.5) / 300 * (EAST - WEST), NORTH - (row + 0.5) / 200 * (NORTH - SOUTH)
     (east,), (north,) = FRAME.to_local([lat], [lon])
     crs = {"CRS": "CRS:84"} if version == "1.3.0" else {"CRS": None, "SRS": "EPSG:4326"}
-    asked = {"VERSION": version, "REQUEST": "GetFeatureInfo", "QUERY_LAYERS": "depth", **crs}
+    asked: dict[str, Any] = {"VERSION": version, "REQUEST": "GetFeatureInfo", "QUERY_LAYERS": "depth", **crs}
     asked |= {names[0]: column, names[1]: row}
     (feature,) = ask(gis, **asked, INFO_FORMAT="application/json").json()["features"]
     assert feature["geometry"]["coordinates"] == pytest.approx([lon, lat], abs=2e-8)

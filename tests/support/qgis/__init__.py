@@ -73,9 +73,9 @@ class Qgis:
         """*Add WFS / OGC API – Features Layer*."""
         self._ask("add_features", name=name, address=address, collection=collection)
 
-    def count(self, name: str) -> int:
-        """*Reload*, and how many features the layer has."""
-        return int(self._ask("count", name=name))
+    def count(self, name: str, extent: list[float] | None = None) -> int:
+        """*Reload*, and how many features the layer has, in a view or everywhere."""
+        return int(self._ask("count", name=name, extent=extent))
 
     def extent(self, name: str) -> list[float]:
         """Where the layer lies: west, south, east, north in EPSG:3857."""

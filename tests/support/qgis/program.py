@@ -8,6 +8,7 @@ from qgis.core import (
     QgsApplication,
     QgsCoordinateReferenceSystem,
     QgsCoordinateTransform,
+    QgsFeatureRequest,
     QgsMapRendererParallelJob,
     QgsMapSettings,
     QgsPointXY,
@@ -52,9 +53,13 @@ def add_features(name: str, address: str, collection: str) -> None:
     _add(name, QgsVectorLayer(f" url='{address}' typename='{collection}'", name, "OAPIF"))
 
 
-def count(name: str) -> int:
-    LAYERS[name].dataProvider().reloadData()
-    return sum(1 for _ in LAYERS[name].getFeatures())
+def count(name: str, extent: list[float] | None) -> int:
+    layer, asked = LAYERS[name], QgsFeatureRequest()
+    layer.dataProvider().reloadData()
+    if extent is not None:
+        to_layer = QgsCoordinateTransform(WEB_MERCATOR, layer.crs(), QgsProject.instance())
+        asked.setFilterRect(to_layer.transformBoundingBox(QgsRectangle(*extent)))
+    return sum(1 for _ in layer.getFeatures(asked))
 
 
 def extent(name: str) -> list[float]:
