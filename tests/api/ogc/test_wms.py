@@ -134,7 +134,8 @@ def test_layers_lie_over_each_other_on_a_ground(gis: Gis) -> None:
 
 def test_all_missions_are_in_one_map(gis: Gis) -> None:
     (west, south), (east, north) = place(-10.0, -10.0), place(270.0, 70.0)
-    around = {"LAYERS": "density", "BBOX": joined(west, south, east, north), "WIDTH": 560, "HEIGHT": 160}
+    box = joined(west, south, east, north)
+    around: dict[str, Any] = {"LAYERS": "density", "BBOX": box, "WIDTH": 560, "HEIGHT": 160}
     single, swath = (shown(gis, mission, **around) for mission in (gis.single, gis.swath))
     both = shown(gis, **around)
     assert single.any()

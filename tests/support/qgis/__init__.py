@@ -22,6 +22,12 @@ def installed() -> bool:
     return subprocess.run(asked, capture_output=True, check=False).returncode == 0
 
 
+def environment(home: Path) -> dict[str, str]:
+    """Return what QGIS runs in: settings and caches of its own, and nothing that leads to another Python's modules."""
+    clear = {name: os.environ[name] for name in ("LANG", "TMPDIR") if name in os.environ}
+    return clear | {"PATH": "/usr/bin:/bin", "HOME": str(home)}
+
+
 class Qgis:
     """A running QGIS. Each method is what a user does in it, and returns what it says.
 
@@ -29,8 +35,6 @@ class Qgis:
     """
 
     def __init__(self, folder: Path) -> None:
-        # Its settings and caches are its own, and nobody's variables lead its modules elsewhere.
-        clear = {name: os.environ[name] for name in ("PATH", "LANG", "TMPDIR") if name in os.environ}
         with (folder / "qgis.log").open("wb") as log:
             self._process = subprocess.Popen(
                 [SYSTEM_PYTHON, "-u", str(_PROGRAM)],
@@ -38,7 +42,7 @@ class Qgis:
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
-                env=clear | _WITHOUT_WINDOW | {"HOME": str(folder)},
+                env=environment(folder) | _WITHOUT_WINDOW,
             )
 
     def __enter__(self) -> Self:
