@@ -60,9 +60,10 @@ def usual_range(layer: WebLayer, rows: Sequence[MissionRow]) -> Range:
 async def pictures(request: Request, edge: EdgeState, data: Dataset, wanted: MapRequest) -> list[MapPicture]:
     """Return the pictures that lie over each other, the lowest first. Raises ProblemError, MissionNotFoundError."""
     rows = _about(data.rows, wanted.window.bounds_deg())
+    ranges = {name: _range(name, data, wanted) for name in wanted.layers}
     asked = [
-        _picture(request, edge, data, row, PictureRequest(row.id, name, _range(name, data, wanted), wanted.window))
-        for name in dict.fromkeys(wanted.layers)
+        _picture(request, edge, data, row, PictureRequest(row.id, name, range_, wanted.window))
+        for name, range_ in ranges.items()
         for row in rows
     ]
     return [found for found in await asyncio.gather(*asked) if found is not None]
