@@ -67,6 +67,7 @@ from app.api.shares import ShareMiddleware
 from app.api.state import EdgeState
 from app.api.tokens import Role, TokenStore
 from app.api.unread import UnreadBodyMiddleware
+from app.api.wms import routes as web_maps
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
 from app.malloc import keep_memory_together, settled
@@ -107,6 +108,7 @@ ROUTERS = (
     tiles.router,
     tiles.tile_router,
     features.router,
+    web_maps.router,
     soundings.router,
     pings.router,
     targets.router,

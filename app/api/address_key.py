@@ -1,4 +1,4 @@
-"""Keys in addresses, for programs that cannot send headers: ``/key/TOKEN/ogc`` and ``/key/TOKEN/api/v1/...``.
+"""Keys in addresses, for programs that cannot send headers: ``/key/TOKEN/ogc``, ``/wms`` and tiles.
 
 Addresses are stored in projects and shown to others, so only a token of role viewer is taken there, and only for
 reading what a GIS reads. The address is rewritten before anything else sees it: nothing is logged, counted or passed
@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.api.links import KEY_PREFIX
 
 _KEYED = re.compile(r"^/key/([A-Za-z0-9_-]{16,128})(/.*)$")
-_READ_BY_GIS = re.compile(r"^/ogc(?:/.*)?$|^/api/v1/missions/[A-Za-z0-9_-]+/tiles/.*$")
+_READ_BY_GIS = re.compile(r"^/(?:ogc|wms)(?:/.*)?$|^/api/v1/missions/[A-Za-z0-9_-]+/tiles/.*$")
 
 UNNAMED = "/key"
 """What is shown of an address with a key that opens nothing."""

@@ -15,10 +15,10 @@ from app.api.mission import Mission
 from app.api.problems import ProblemError, problems
 from app.api.schemas import API, MissionId
 from app.api.state import Service, edge_state
-from app.mapping.web_tiles import MAX_ZOOM, WebTile, finest_zoom
+from app.mapping.web_tiles import MAX_ZOOM, SIDE_PX, WebTile, finest_zoom
 from app.missions.live.mission import LiveMission
 from app.missions.maps.web_layers import WEB_LAYERS, Range, WebLayer
-from app.missions.operations.web_tiles import TileRequest
+from app.missions.operations.map_pictures import PictureRequest
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED
@@ -171,8 +171,9 @@ async def _answer(
     range_: Range,
     if_none_match: str | None,
 ) -> Response:
-    wanted = TileRequest(mission.id, kind.name, tile, double, range_)
-    picture = await service.web_tiles.tile(mission, service.maps, wanted)
+    window = tile.window(SIDE_PX * (2 if double else 1))
+    wanted = PictureRequest(mission.id, kind.name, range_, window)
+    picture = await service.map_pictures.picture(mission, service.maps, wanted)
     tag = f'"{picture.tag}"'
     fresh_s = FRESH_ENDED_S if mission.header.state in ENDED else FRESH_S
     headers = {"ETag": tag, "Cache-Control": f"private, max-age={fresh_s}"}

@@ -27,13 +27,13 @@ from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
 from app.missions.live.mission import Ending, LiveMission
 from app.missions.operations.imports import Imports
+from app.missions.operations.map_pictures import MapPictures
 from app.missions.operations.reading import Reader
 from app.missions.operations.recorrection import check_level_is_known
 from app.missions.operations.reports import Reports
 from app.missions.operations.sites import Sites
 from app.missions.operations.traffic import places_of, traffic_view
 from app.missions.operations.uploads import Uploads
-from app.missions.operations.web_tiles import WebTiles
 from app.missions.operations.work_processes import WorkProcesses
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
@@ -117,8 +117,8 @@ class MissionService:
         self._claims = Claims(self.hub)
         self.maps = FinalMaps()
         """Maps that are made while nobody waits for them."""
-        self.web_tiles = WebTiles()
-        """Tiles of maps for web maps and GIS."""
+        self.map_pictures = MapPictures()
+        """Pictures of maps for web maps and GIS."""
         self._compiling = ThreadPoolExecutor(WORKERS, thread_name_prefix="compiling")
         self._compilation = Compilation(self._compiling)
         self.forecaster = Forecaster(self.hub, self._compilation, self.compute)
@@ -203,7 +203,7 @@ class MissionService:
         await self.compute.close()
         self.forecaster.close()
         self.previews.close()
-        self.web_tiles.close()
+        self.map_pictures.close()
         self._at_once.close()
 
     async def _taken_up(self, live: LiveMission) -> None:

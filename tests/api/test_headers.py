@@ -8,7 +8,14 @@ from app.api.headers import add_security_headers
 
 @pytest.mark.parametrize(
     ("path", "allowed"),
-    [("/", "(self)"), ("/index.html", "(self)"), ("/api/docs", "()"), ("/api/v1/missions", "()"), ("/ogc", "()")],
+    [
+        ("/", "(self)"),
+        ("/index.html", "(self)"),
+        ("/api/docs", "()"),
+        ("/api/v1/missions", "()"),
+        ("/ogc", "()"),
+        ("/wms", "()"),
+    ],
 )
 def test_only_the_dashboard_may_ask_where_the_device_is(path: str, allowed: str) -> None:
     headers = MutableHeaders()

@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.mapping.georeference import LocalFrame
+from app.mapping.map_windows import geographic_bounds, window_cells
 from app.mapping.types import Grid
-from app.mapping.web_tiles import WORLD_M, WebTile, finest_zoom, geographic_bounds, tile_cells
+from app.mapping.web_tiles import WORLD_M, WebTile, finest_zoom
 
 TO_DEGREES = pyproj.Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
 
@@ -41,7 +42,7 @@ def test_each_pixel_shows_the_cell_under_its_middle(
     on_grid = (row >= 0) & (row < grid.rows) & (col >= 0) & (col < grid.cols)
     wanted = np.where(on_grid, np.where(on_grid, row, 0) * grid.cols + np.where(on_grid, col, 0), -1)
     found = np.full((side, side), -1)
-    part = tile_cells(tile, side, grid, frame)
+    part = window_cells(tile.window(side), grid, frame)
     if part is not None:
         rows, cols = part.source.shape
         found[part.top : part.top + rows, part.left : part.left + cols] = part.source
@@ -50,8 +51,8 @@ def test_each_pixel_shows_the_cell_under_its_middle(
 
 def test_tiles_beside_the_grid_show_nothing() -> None:
     grid, frame = Grid(0, 0, 1.0, 50, 50), LocalFrame(41.0, -8.0)
-    assert tile_cells(WebTile(10, 0, 0), 256, grid, frame) is None
-    assert tile_cells(WebTile(0, 0, 0), 256, grid, frame) is not None
+    assert window_cells(WebTile(10, 0, 0).window(256), grid, frame) is None
+    assert window_cells(WebTile(0, 0, 0).window(256), grid, frame) is not None
 
 
 @pytest.mark.parametrize("place", [(25, 0, 0), (-1, 0, 0), (3, 8, 0), (3, 0, -1)])

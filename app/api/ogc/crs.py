@@ -26,9 +26,13 @@ WHOLE_EARTH_DEG = 180.0
 
 def offered(rings: Sequence[Sequence[tuple[float, float]]]) -> list[str]:
     """Return the systems for missions of these areas: their UTM zone is among them where all lie in one."""
+    return [CRS84, WGS84, WEB_MERCATOR, *(f"{_EPSG}{zone}" for zone in common_zone(rings))]
+
+
+def common_zone(rings: Sequence[Sequence[tuple[float, float]]]) -> list[int]:
+    """Return the EPSG code of the UTM zone that areas lie in; none where that is more than one."""
     zones = {utm_epsg(lat, lon) for lon, lat in (np.mean(ring, axis=0).tolist() for ring in rings)}
-    own = [f"{_EPSG}{zone}" for zone in zones] if len(zones) == 1 else []
-    return [CRS84, WGS84, WEB_MERCATOR, *own]
+    return list(zones) if len(zones) == 1 else []
 
 
 def transformed(geometry: dict[str, Any], crs: str) -> dict[str, Any]:

@@ -5,7 +5,6 @@ What is there is described by a document of its own, OpenAPI 3.0, as clients of 
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated, Any
 from urllib.parse import quote, urlencode
@@ -16,18 +15,16 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from app.api.auth import Reader
-from app.api.links import link_root
 from app.api.ogc.collections import COLLECTIONS, Collection
-from app.api.ogc.crs import CRS84, offered, transformed
+from app.api.ogc.crs import CRS84, transformed
+from app.api.ogc.dataset import Dataset, dataset_of
 from app.api.ogc.document import GEOJSON, JSON, OPENAPI, SCHEMA, document
 from app.api.ogc.parameters import check_names, crs_of, items_query
 from app.api.ogc.sources import enlarged, extent, extent_of_ways, feature, page
 from app.api.problems import ProblemError
 from app.api.state import State
-from app.missions.errors import MissionNotFoundError
 from app.missions.operations.features import Feature, Kind, period_of
 from app.missions.traffic.roster import NEAR_M
-from app.storage.models import MissionRow
 
 OGC = "/ogc"
 
@@ -42,30 +39,9 @@ CONFORMS_TO = [
 QUERYABLES = "http://www.opengis.net/def/rel/ogc/1.0/queryables"
 
 
-@dataclass(frozen=True)
-class Dataset:
-    """What one landing page leads to: missions, oldest first, and the address of the page."""
-
-    rows: Sequence[MissionRow]
-    root: str
-    title: str
-
-    @property
-    def crs(self) -> list[str]:
-        """Return the systems that its features can be had in."""
-        return offered([row.spec["area"]["coordinates"][0][:-1] for row in self.rows])
-
-
 async def _dataset(request: Request, reader: Reader, state: State) -> Dataset:
     """Return what is asked for; nobody is told who may not even look. Raises MissionNotFoundError."""
-    mission_id = request.path_params.get("mission_id")
-    root = f"{link_root(request)}{OGC}"
-    if mission_id is None:
-        return Dataset(await state.service.rows(), root, "Missions")
-    rows = await state.service.rows(mission_id)
-    if not rows:
-        raise MissionNotFoundError(f"there is no mission {mission_id[:64]!r}", "GET /api/v1/missions lists all")
-    return Dataset(rows, f"{root}/missions/{rows[0].id}", rows[0].name)
+    return await dataset_of(request, state, OGC)
 
 
 Data = Annotated[Dataset, Depends(_dataset)]

@@ -1,6 +1,7 @@
 """Layers of a map as pictures in tiles, for web maps and GIS."""
 
 import io
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -9,11 +10,11 @@ from PIL import Image
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.layers import Fit
+from app.mapping.map_windows import WindowCells
 from app.mapping.products.colours import CLASS_COLOURS, palette, scaled
 from app.mapping.products.hillshade import hillshade
 from app.mapping.products.overlay import INTERPOLATED_ALPHA
 from app.mapping.types import Grid
-from app.mapping.web_tiles import TileCells
 
 Pixels = NDArray[np.uint8]
 """Red, green, blue and opacity, (rows, cols, 4)."""
@@ -100,17 +101,15 @@ def words_of(pixels: Pixels) -> Words:
     return np.concatenate([pixels.reshape(-1, 4), np.zeros((1, 4), dtype=np.uint8)]).view(np.uint32)[:, 0]
 
 
-def tile_words(words: Words, cells: TileCells, side_px: int) -> Words:
-    """Return the pixels of a tile, (side, side), northern row first, of what :func:`words_of` returned."""
-    picture = np.zeros((side_px, side_px), dtype=np.uint32)
+def window_words(words: Words, cells: WindowCells, onto: Words) -> None:
+    """Put what :func:`words_of` returned into the pixels of a window, (height, width), northern row first."""
     rows, cols = cells.source.shape
     # -1, for pixels that show no cell, takes the last.
-    picture[cells.top : cells.top + rows, cells.left : cells.left + cols] = words[cells.source]
-    return picture
+    onto[cells.top : cells.top + rows, cells.left : cells.left + cols] = words[cells.source]
 
 
-def tile_png(picture: Words) -> bytes:
-    """Return a tile's pixels, (side, side), as PNG."""
+def window_png(picture: Words) -> bytes:
+    """Return the pixels of a window, (height, width), as PNG."""
     stream = io.BytesIO()
     pixels = np.ascontiguousarray(picture).view(np.uint8).reshape(*picture.shape, 4)
     Image.fromarray(pixels).save(stream, "PNG", compress_level=1)
@@ -118,6 +117,21 @@ def tile_png(picture: Words) -> bytes:
 
 
 @lru_cache(maxsize=4)
-def empty_png(side_px: int) -> bytes:
-    """Return a tile that shows nothing."""
-    return tile_png(np.zeros((side_px, side_px), dtype=np.uint32))
+def empty_png(width_px: int, height_px: int) -> bytes:
+    """Return a picture that shows nothing."""
+    return window_png(np.zeros((height_px, width_px), dtype=np.uint32))
+
+
+def stacked(contents: Sequence[bytes], size: tuple[int, int], background: tuple[int, int, int] | None) -> bytes:
+    """Return PNGs over each other as one of the same width and height, the lowest first.
+
+    ``background``: red, green and blue of a ground without any opening; None: transparent where all are.
+    """
+    if not contents and background is None:
+        return empty_png(*size)
+    sheet = Image.new("RGBA", size, (*background, 255) if background is not None else (0, 0, 0, 0))
+    for content in contents:
+        sheet.alpha_composite(Image.open(io.BytesIO(content)).convert("RGBA"))
+    stream = io.BytesIO()
+    (sheet if background is None else sheet.convert("RGB")).save(stream, "PNG", compress_level=1)
+    return stream.getvalue()

@@ -1,23 +1,38 @@
 """What web maps and GIS are shown of a mission's map: layers with colours that stay the same while the map grows."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.layers import ACCURATE, LAYERS, SOUNDED, VISIBLE
+from app.mapping.map_windows import geographic_bounds
 from app.mapping.products.tile_pictures import Pixels, coarser, coarser_grid, paint, paint_classes, shade
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.types import Grid
 from app.missions.maps.snapshot import MapSnapshot
-from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mission import Limits
 
 Range = tuple[float, float]
 """Values of the first and of the last colour."""
 
 SURE_TIMES = 4.0
 """Uncertainty is coloured up to so many times the accuracy that a mission asks for."""
+
+
+class Ranging(Protocol):
+    """What the colours of a mission's layers follow from."""
+
+    @property
+    def limits(self) -> Limits:
+        """How deep vehicles may go, and how near to the bottom."""
+
+    @property
+    def accuracy_m(self) -> float:
+        """The standard deviation that is asked for."""
 
 
 @dataclass(frozen=True)
@@ -32,17 +47,20 @@ class WebLayer:
         Of ``min`` and ``max``; empty for layers by classes, which have neither.
     default_range
         Returns the range of a mission's colours, from what it is to do: it never changes while the map grows.
+    classes
+        Words for the classes 1, 2 and so on of layers without a unit.
     """
 
     name: str
     title: str
     meaning: str
     unit: str
-    default_range: Callable[[MissionSpec], Range]
+    default_range: Callable[[Ranging], Range]
     paint: Callable[[MapSnapshot, Range], Pixels]
+    classes: tuple[str, ...] = ()
 
 
-def _depth_range(spec: MissionSpec) -> Range:
+def _depth_range(spec: Ranging) -> Range:
     """Return from the surface to the deepest bottom that vehicles may follow."""
     return 0.0, spec.limits.max_depth_m + spec.limits.min_altitude_m
 
@@ -88,7 +106,34 @@ def _count(snapshot: MapSnapshot) -> FloatArray:
     return count
 
 
-def _two_classes(_: MissionSpec) -> Range:
+@dataclass(frozen=True)
+class CellValues:
+    """What a map knows of a place; ``soundings`` 0: its depth was estimated between soundings."""
+
+    depth_m: float
+    sd_m: float
+    soundings: int
+    vertical_datum: str
+
+
+def values_at(snapshot: MapSnapshot, lat_deg: float, lon_deg: float) -> CellValues | None:
+    """Return what the cell at a place holds; None where nothing is known."""
+    grid, frame = snapshot.built.map.grid, snapshot.facts.frame
+    south, west, north, east = geographic_bounds(grid, frame)
+    if not (south <= lat_deg <= north and west <= lon_deg <= east):
+        return None
+    place_east, place_north = frame.to_local(lat_deg, lon_deg)
+    row = int((place_north - grid.south_m) // grid.cell_m)
+    col = int((place_east - grid.west_m) // grid.cell_m)
+    if not (0 <= row < grid.rows and 0 <= col < grid.cols):
+        return None
+    depth_m, sd_m = (float(layer[row, col]) for layer in _with_live(snapshot))
+    if not math.isfinite(depth_m):
+        return None
+    return CellValues(depth_m, sd_m, int(_count(snapshot)[row, col]), snapshot.facts.vertical_datum.statement)
+
+
+def _two_classes(_: Ranging) -> Range:
     return 0.0, 2.0
 
 
@@ -118,6 +163,7 @@ WEB_LAYERS = {
             "",
             _two_classes,
             _density,
+            (f"1 to {LEAST_SOUNDINGS - 1} soundings in the cell", f"{LEAST_SOUNDINGS} and more"),
         ),
         WebLayer(
             "coverage",
@@ -126,6 +172,7 @@ WEB_LAYERS = {
             "",
             _two_classes,
             _coverage,
+            ("near a sounding", "known to the accuracy asked for"),
         ),
     )
 }

@@ -1,10 +1,12 @@
-"""Programs that people have: OWSLib and GDAL read features, GDAL reads tiles."""
+"""Programs that people have: OWSLib and GDAL read features and maps, GDAL reads tiles."""
 
+import io
 import json
 import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,15 @@ import httpx
 import numpy as np
 import pyogrio
 import pytest
+import shapely
 from owslib.ogcapi.features import Features
+from owslib.util import ServiceException
+from owslib.wms import WebMapService
+from PIL import Image
 from rasterio.warp import transform_bounds
 
 from tests.api.ogc.conftest import SOUNDINGS, Gis
+from tests.support.gis import picture_of
 from tests.support.missions.specs import FRAME
 
 DRIVER = "OAPIF"
@@ -77,6 +84,55 @@ def test_gdal_reads_every_layer_page_by_page(gis: Gis) -> None:
     assert found["moved"] == ["EPSG:32629", 1]
 
 
+@pytest.mark.parametrize("version", ["1.1.1", "1.3.0"])
+def test_owslib_reads_maps(gis: Gis, version: str) -> None:
+    address = f"{gis.url}/key/{gis.key}/wms/missions/{gis.single}"
+    service = WebMapService(address, version=version)
+    assert list(service.contents) == ["depth", "uncertainty", "density", "coverage"]
+    assert {one.name for one in service.operations} >= {"GetCapabilities", "GetMap", "GetFeatureInfo"}
+    layer = service["depth"]
+    assert (layer.title, layer.queryable) == ("Depth", 1)
+    assert {"EPSG:3857", "EPSG:4326", "EPSG:32629"} <= set(layer.crsOptions)
+    (area,) = gis.items("areas", mission=gis.single)["features"]
+    ends = shapely.geometry.shape(area["geometry"]).bounds
+    assert layer.boundingBoxWGS84 == pytest.approx(ends)
+    legend = gis.client.get(layer.styles["default"]["legend"])
+    assert picture_of(legend).shape == (190, 130, 4)
+    options = {"layers": ["depth"], "srs": "EPSG:4326", "bbox": ends, "size": (120, 90), "format": "image/png"}
+    found = service.getmap(**options, transparent=True)
+    picture = np.asarray(Image.open(io.BytesIO(found.read())))
+    assert (picture[..., 3] > 0).mean() > 0.3
+    said = service.getfeatureinfo(**options, query_layers=["depth"], info_format="text/plain", xy=(60, 45))
+    assert b"Depth: " in said.read()
+    with pytest.raises(ServiceException, match="from 1 to 4096"):
+        service.getmap(**options | {"size": (9000, 10)})
+
+
+def wms(gis: Gis, layer: str, folder: Path) -> Path:
+    """The description with which GDAL opens a map, here with the latitude first."""
+    root = ET.Element("GDAL_WMS")
+    service = ET.SubElement(root, "Service", name="WMS")
+    for name, value in (
+        ("Version", "1.3.0"),
+        ("ServerUrl", f"{gis.url}/key/{gis.key}/wms/missions/{gis.single}?"),
+        *(("Layers", layer), ("CRS", "EPSG:4326"), ("BBoxOrder", "yxYX"), ("ImageFormat", "image/png")),
+        ("Transparent", "TRUE"),
+    ):
+        ET.SubElement(service, name).text = value
+    window = ET.SubElement(root, "DataWindow")
+    lat, lon = FRAME.to_geographic([-30.0, 90.0], [-30.0, 90.0])
+    ends = {"UpperLeftX": lon[0], "UpperLeftY": lat[1], "LowerRightX": lon[1], "LowerRightY": lat[0]}
+    for name, number in ends.items():
+        ET.SubElement(window, name).text = repr(float(number))
+    for name in ("SizeX", "SizeY"):
+        ET.SubElement(window, name).text = "1200"
+    for name, value in (("Projection", "EPSG:4326"), ("BandsCount", "4")):
+        ET.SubElement(root, name).text = value
+    file = folder / f"{layer}.xml"
+    file.write_bytes(ET.tostring(root))
+    return file
+
+
 def tms(gis: Gis, layer: str, folder: Path) -> Path:
     """The description with which GDAL opens tiles."""
     tilejson = gis.client.get(f"{gis.url}/key/{gis.key}/api/v1/missions/{gis.single}/tiles/{layer}.json").json()
@@ -118,15 +174,18 @@ print(json.dumps(""))
 """
 
 
-def test_gdal_opens_tiles_where_the_map_lies(gis: Gis, tmp_path: Path) -> None:
-    """The tiles and the GeoTIFF, put onto the same pixels, show the same ground, and what is deeper is darker."""
+@pytest.mark.parametrize("described", [tms, wms])
+def test_gdal_opens_pictures_where_the_map_lies(
+    gis: Gis, tmp_path: Path, described: Callable[[Gis, str, Path], Path]
+) -> None:
+    """Tiles or WMS, and the GeoTIFF, put onto the same pixels, show the same ground, and what is deeper is darker."""
     file, output = tmp_path / "map.tif", tmp_path / "both.npz"
     file.write_bytes(gis.client.get(f"{gis.url}/api/v1/missions/{gis.single}/map.tif").content)
     lat, lon = FRAME.to_geographic([-20.0, 80.0], [-20.0, 80.0])
     bounds = transform_bounds("EPSG:4326", "EPSG:32629", lon[0], lat[0], lon[1], lat[1])
-    problem = elsewhere(REPROJECT, str(tms(gis, "depth", tmp_path)), str(file), str(output), *map(str, bounds))
+    problem = elsewhere(REPROJECT, str(described(gis, "depth", tmp_path)), str(file), str(output), *map(str, bounds))
     if problem:
-        pytest.skip(f"this GDAL opens no tiles: {problem}")
+        pytest.skip(f"this GDAL opens no pictures of the web: {problem}")
     with np.load(output) as both:
         depth, colour = both["depth"], both["colour"]
     known = np.isfinite(depth)
