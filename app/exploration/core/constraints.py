@@ -5,8 +5,9 @@ that is already broken where the vehicles are now (launched outside the area, pu
 each other) may stay broken only while the move lessens the excess; every other excess must be 0.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -99,6 +100,11 @@ class Constraints:
         Difference in depth that makes horizontal separation unnecessary.
     held_altitude_m : float or None
         Height above the sea floor that vehicles hold by themselves when they are sent deeper; None: the least altitude.
+    around : tuple of (n_vertices, 2)
+        Polygons about the keep-out zones that plans keep off, too: a vehicle begins its leg near where it was planned
+        to, and its way from there has to be free.
+    checked_by : Constraints or None
+        Of limits that plans keep to: what their legs are held to before they are sent; None: the same.
     """
 
     area: FloatArray
@@ -111,6 +117,20 @@ class Constraints:
     min_separation_m: float = 0.0
     min_vertical_separation_m: float = np.inf
     held_altitude_m: float | None = None
+    around: tuple[FloatArray, ...] = ()
+    checked_by: "Constraints | None" = None
+
+    @cached_property
+    def for_plans(self) -> "Constraints":
+        """The limits that plans keep to: the same object each time, for what planners make of it is made once."""
+        if not self.around:
+            return self
+        return replace(self, keep_out=(*self.keep_out, *self.around), around=(), checked_by=self)
+
+    @property
+    def for_checks(self) -> "Constraints":
+        """The limits that legs are held to before they are sent."""
+        return self if self.checked_by is None else self.checked_by
 
     @property
     def lowest_m(self) -> float:

@@ -216,6 +216,10 @@ class FreeSpace:
         east, north = (others - place).T
         return np.where(self._sees(place, others), np.maximum(np.hypot(east, north), 1e-9), 0.0)
 
+    def holds(self, en_m: FloatArray) -> bool:
+        """Whether a place (2,) lies in the free space."""
+        return bool(self._loose.covers(Point(*en_m)))
+
     def nearest(self, en_m: FloatArray) -> FloatArray:
         """Return the point of the free space closest to ``en_m`` (2,)."""
         point = Point(*en_m)

@@ -32,6 +32,9 @@ MOST_TRIES = 3
 MOST_LOST = 6
 """So often legs of an order are given up before the order is."""
 
+NO_ORDER = 0
+"""In place of an order's number, of a way round what barred a vehicle's legs."""
+
 
 @dataclass
 class OrderedWay:
@@ -83,7 +86,8 @@ class OrderedPlanner:
         self.refused: dict[str, tuple[int, str]] = {}
         self._since: dict[str, int] = {}
         """How many legs the planner has decided for vehicles since their last ordered one."""
-        self._space: tuple[Constraints, FreeSpace] | None = None
+        self._spaces: list[tuple[Constraints, FreeSpace]] = []
+        """Of plans' limits and of checks'."""
 
     @property
     def decides_apart(self) -> bool:
@@ -97,7 +101,7 @@ class OrderedPlanner:
 
         The planner goes on from ``resume_at_m`` (2,) when the way was flown.
         """
-        before = self.ways.get(vehicle)
+        before = self._leave_way_round(vehicle)
         going_on = before is not None and len(before.corners_m) > 0
         self.ways[vehicle] = OrderedWay(order, np.asarray(corners_m, dtype=np.float64).reshape(-1, 2))
         self.taken[vehicle] = order
@@ -115,6 +119,7 @@ class OrderedPlanner:
         begin_m, here_m : (2,)
             Where the line began, and where the vehicle is.
         """
+        self._leave_way_round(vehicle)
         self.taken[vehicle] = order
         self._since[vehicle] = 0
         self.planner.put_back(vehicle, ends_m, None)
@@ -135,6 +140,38 @@ class OrderedPlanner:
         way.lost += 1
         if way.lost > MOST_LOST:
             self._refuse(vehicle, way, "its legs there came to nothing again and again")
+
+    def go_round(self, vehicle: str, ends_m: FloatArray) -> None:
+        """Lead a vehicle to where its planned legs were to end, (n, 2), round what barred them from where it was.
+
+        Its planner takes them as flown.
+        """
+        way = self.ways.get(vehicle)
+        if way is None:
+            self.ways[vehicle] = OrderedWay(NO_ORDER, np.asarray(ends_m, dtype=np.float64).reshape(-1, 2))
+            self._since[vehicle] = 0
+            return
+        # Only ends that it was led to are to be seen again, not the corners on the way there.
+        given = way.passed_m
+        again = [end for end in ends_m if len(given) and np.hypot(*(given - end).T).min() <= NEAR_M]
+        way.corners_m = np.vstack([*again, way.corners_m])
+        way.lost += 1
+        if way.lost > MOST_LOST:
+            del self.ways[vehicle]
+
+    def is_ordered(self, vehicle: str) -> bool:
+        """Whether a vehicle is on a way that somebody ordered."""
+        way = self.ways.get(vehicle)
+        return way is not None and way.order != NO_ORDER
+
+    def _leave_way_round(self, vehicle: str) -> OrderedWay | None:
+        """End a vehicle's way round something; its planner gets what is left of it. Returns a way that was ordered."""
+        way = self.ways.get(vehicle)
+        if way is None or way.order != NO_ORDER:
+            return way
+        del self.ways[vehicle]
+        self.planner.put_back(vehicle, way.corners_m, None)
+        return None
 
     def drop(self, vehicle: str) -> None:
         """End a vehicle's ordered way."""
@@ -172,17 +209,24 @@ class OrderedPlanner:
         if way.tries >= MOST_TRIES:
             self._refuse(vehicle, way, self.refused.get(vehicle, (0, "no leg there is allowed"))[1])
             return False
+        if not len(way.corners_m) and way.order == NO_ORDER:
+            del self.ways[vehicle]
         return len(way.corners_m) > 0
 
     def _refuse(self, vehicle: str, way: OrderedWay, why: str) -> None:
-        self.refused[vehicle] = (way.order, why)
+        if way.order != NO_ORDER:
+            self.refused[vehicle] = (way.order, why)
         del self.ways[vehicle]
 
     def _leg(self, situation: Situation, row: int, positions: FloatArray, bottom: Bottom) -> FloatArray:
         """Return the end (3,) of a vehicle's next leg along its way."""
         way, origin, constraints = self.ways[situation.vehicles[row]], situation.positions, situation.constraints
-        space = self._free(constraints)
         here_m = origin[row, :2]
+        space = self._free(constraints)
+        if not space.holds(way.corners_m[0]):
+            # It was ordered nearer to a zone than plans go, and may be there.
+            constraints = constraints.for_checks
+            space = self._free(constraints)
         corner_m = space.way(here_m, space.nearest(way.corners_m[0]))[0]
         away_m = float(np.hypot(*(corner_m - here_m)))
         whole_m = min(away_m, constraints.max_step_m * (1.0 - 1e-9))
@@ -201,9 +245,11 @@ class OrderedPlanner:
         return np.asarray(origin[row])
 
     def _free(self, constraints: Constraints) -> FreeSpace:
-        if self._space is None or self._space[0] is not constraints:
-            self._space = constraints, FreeSpace(constraints, 0.0)
-        return self._space[1]
+        known = next((space for of, space in self._spaces if of is constraints), None)
+        if known is None:
+            known = FreeSpace(constraints, 0.0)
+            self._spaces = [*self._spaces[-1:], (constraints, known)]
+        return known
 
     def take_back(self, legs: Mapping[str, int]) -> bool:
         """See :meth:`.PlannerBase.take_back`; ordered legs are not taken back."""
@@ -219,7 +265,7 @@ class OrderedPlanner:
     def snapshot(self) -> bytes:
         """Return the planner's memory, and the ordered ways."""
         memory = self.planner.snapshot()
-        if not self.taken:
+        if not self.taken and not self.ways:
             return memory
         ways = {name: way.remember() for name, way in self.ways.items()}
         state: dict[str, Any] = {"ways": ways, "taken": self.taken, "refused": self.refused, "since": self._since}

@@ -20,10 +20,14 @@ from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions import safety
+from app.missions.flight.corner_room import room_around
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec import mission
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec
 from app.missions.spec.sonar import SwathSonarSpec
+
+REACTS_WITHIN_M = 0.5
+"""So far a vehicle goes on past the radius in which it arrives until its next leg is sent."""
 
 NEARBY_OUTSIDE_M = 10.0
 """A vehicle that drifted or overshot this little is planned for as if it were at the border."""
@@ -150,10 +154,14 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     limits = spec.limits
     zones = [spec.to_local(zone) for zone in spec.keep_out]
     margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
+    area = spec.local_inner_area()
+    # A search keeps off everything by more than a vehicle's arrival radius.
+    room_m = spec.arrival_radius_m + REACTS_WITHIN_M if spec.search is None else 0.0
     return Constraints(
-        area=spec.local_inner_area(),
+        area=area,
         # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
         keep_out=(*zones, *margins),
+        around=room_around(area, margins or zones, room_m),
         max_step_m=limits.max_step_m,
         # Depths are chosen here and may be shallower than asked where the water is; see safety.travel_depth_m.
         min_depth_m=0.0,
@@ -350,7 +358,7 @@ def _situation(
         headings_rad=np.array([p.heading_rad for p in team]),
         belief=knowledge.belief,
         soundings_en_m=knowledge.soundings_en_m,
-        constraints=constraints,
+        constraints=constraints.for_plans,
         doubtful_en_m=np.zeros((0, 2)) if doubtful_en_m is None else doubtful_en_m,
         targets=knowledge.targets,
         search=knowledge.search,

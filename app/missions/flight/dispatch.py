@@ -58,6 +58,8 @@ class Dispatch:
         """Since when vehicles have had nothing to fly, the event loop's time; inf once they hold."""
         self.given_up: dict[str, list[FloatArray]] = {}
         """Where legs were to end that vehicles did not fly, each (2,), until somebody takes note of it."""
+        self.dropped: dict[str, list[FloatArray]] = {}
+        """Where legs were to end that something barred, each (2,), until the planner is told to lead round that."""
         self.turned_down: dict[str, int] = {}
         """How often vehicles refused the order that they have."""
 
@@ -193,7 +195,10 @@ class Dispatch:
     async def drop_ahead(self, member: Member, reason: str) -> None:
         """Give up the legs that a vehicle has not begun."""
         legs, member.ahead[:] = list(member.ahead), []
-        self._note_given_up(member, [leg.target_m for leg in legs])
+        ends_m = [leg.target_m for leg in legs]
+        if self._persistent and member.asked is None and member.withdrawal is None:
+            self.dropped.setdefault(member.name, []).extend(ends_m)
+        self._note_given_up(member, ends_m)
         for leg in legs:
             report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
             self._live.journal.waypoint(report)

@@ -247,7 +247,8 @@ class OrderBook:
             return False
         return any(
             m.name in flight.dispatch.given_up
-            or (m.asked is None and m.name in flight.planner.ways)
+            or m.name in flight.dispatch.dropped
+            or (m.asked is None and flight.planner.is_ordered(m.name))
             or (m.asked is not None and m.asked.state is OrderState.ACCEPTED and m.surveys)
             for m in self._live.team
         )
@@ -263,10 +264,13 @@ class OrderBook:
         planner, given_up = flight.planner, flight.dispatch.given_up
         for name in list(given_up):
             planner.lose(name, np.array(given_up.pop(name)).reshape(-1, 2))
+        for name in list(flight.dispatch.dropped):
+            planner.go_round(name, np.array(flight.dispatch.dropped.pop(name)).reshape(-1, 2))
+            taken.append(name)
         for member in [*self._live.team, *self._live.team.left.values()]:
             order = member.asked
             if order is None:
-                if member.name in planner.ways:
+                if planner.is_ordered(member.name):
                     planner.drop(member.name)
                     flight.dispatch.give_up_legs(member, "its order was ended")
             elif member.left_at is not None or (

@@ -197,13 +197,18 @@ class OwnLegs:
             and member.present
             and member.legs < numbers[leg.vehicle]
             and self._wants_legs(member)
+            and leg.vehicle not in self._dispatch.dropped
             and self._begins_at(member, starts_m[leg.vehicle])
             and self._comes_home_after(member, leg)
         ]
-        decision = self._apart(replace(decision, legs=begun))
+        wished, decision = decision.legs, self._apart(replace(decision, legs=begun))
         self._look_later({leg.vehicle for leg in decision.legs if leg.refusal})
         legs = [leg for leg in decision.legs if not leg.refusal]
         if legs:
+            for leg in wished:
+                if not leg.refusal and leg.vehicle in numbers and leg.vehicle in self._dispatch.dropped:
+                    # The planner takes it as flown, and it goes on from legs that are not.
+                    self._dispatch.dropped[leg.vehicle].append(leg.target_m[:2])
             await self._committing.commit(replace(decision, legs=legs), numbers)
             live.changed.set()
         elif any(self._refusals.get(leg.vehicle) == 1 for leg in decision.legs):
@@ -265,7 +270,7 @@ class OwnLegs:
         [planned] = [leg for leg in decision.legs if leg.vehicle == name]
         start = np.append(decision.origin_m[name], planned.target_m[2])
         others = [leg for leg in decision.legs if leg.vehicle != name and not leg.refusal]
-        for target in ways_aside(start, planned.target_m, self._constraints, decision.bottom):
+        for target in ways_aside(start, planned.target_m, self._constraints.for_plans, decision.bottom):
             legs = [*others, replace(planned, target_m=target)]
             tried = replace(decision, legs=legs)
             close = too_close(tried, self._live, self._spec)
