@@ -156,7 +156,7 @@ class OrderedPlanner:
         again = [end for end in ends_m if len(given) and np.hypot(*(given - end).T).min() <= NEAR_M]
         way.corners_m = np.vstack([*again, way.corners_m])
         way.lost += 1
-        if way.lost > MOST_LOST:
+        if way.lost > MOST_LOST or not len(way.corners_m):
             del self.ways[vehicle]
 
     def is_ordered(self, vehicle: str) -> bool:

@@ -154,3 +154,69 @@ def test_legs_that_are_given_up_are_decided_again() -> None:
         planner.lose("a", goal[None])
     assert planner.refused["a"][0] == 1
     assert "a" not in planner.ways
+
+
+@pytest.mark.parametrize("name", ["cao", "lawnmower"])
+def test_legs_that_something_barred_are_flown_round_it(name: str) -> None:
+    constraints = Constraints(SQUARE, (ZONE,), max_step_m=12.0, max_depth_m=20.0, min_separation_m=2.0)
+    planner, situation = planner_of(name), make_situation(constraints=constraints, belief=make_belief(known=False))
+    here = fly(planner, situation, 3)[-1]
+    here[0, :2] = 60.0, 50.0
+    ends_m = np.array([[95.0, 50.0], [95.0, 70.0]])
+    planner.go_round("a", ends_m)
+    again = planner_of(name)
+    again.restore(planner.snapshot())
+    assert not planner.is_ordered("a")
+    for leading in (planner, again):
+        places = fly(leading, replace(situation, positions=here), 14)
+        nearest = [int(np.argmin([np.hypot(*(place[0, :2] - end)) for place in places])) for end in ends_m]
+        assert nearest[0] < nearest[1]
+        for k, end in zip(nearest, ends_m, strict=True):
+            assert np.hypot(*(places[k][0, :2] - end)) <= 0.5
+        assert "a" not in leading.ways, "then its planner goes on"
+        assert not leading.refused
+
+
+def test_ends_that_were_reached_on_a_way_round_are_seen_again_where_their_legs_were_barred() -> None:
+    planner, situation = planner_of("lawnmower"), make_situation(constraints=Constraints(SQUARE, max_step_m=12.0))
+    here = fly(planner, situation, 1)[-1]
+    here[0, :2] = 30.0, 50.0
+    ends_m = np.array([[40.0, 50.0], [80.0, 50.0]])
+    planner.go_round("a", ends_m)
+    places = fly(planner, replace(situation, positions=here), 3)
+    np.testing.assert_allclose(planner.ways["a"].corners_m, ends_m[1:])
+    planner.go_round("a", np.array([place[0, :2] for place in places[1:]]))
+    np.testing.assert_allclose(planner.ways["a"].corners_m, ends_m)
+    for _ in range(6):
+        assert "a" in planner.ways
+        planner.go_round("a", ends_m[:0])
+    assert "a" not in planner.ways, "it is not tried for ever"
+
+
+def test_an_order_takes_the_place_of_a_way_round() -> None:
+    planner, situation = planner_of("lawnmower"), make_situation(constraints=Constraints(SQUARE, max_step_m=12.0))
+    here = fly(planner, situation, 2)[-1]
+    ends_m = np.array([[40.0, 50.0], [80.0, 50.0]])
+    planner.go_round("a", ends_m)
+    planner.lead("a", 3, np.array([[20.0, 20.0]]), np.zeros((0, 2)), None)
+    assert planner.is_ordered("a")
+    flown = [place[0, :2] for place in fly(planner, replace(situation, positions=here), 40)]
+    for end in (np.array([20.0, 20.0]), *ends_m):
+        assert min(np.hypot(*(place - end)) for place in flown) <= 6.0
+
+
+def test_a_vehicle_gets_where_it_is_ordered_nearer_to_a_zone_than_plans_go() -> None:
+    around = (np.array([[66.0, 36.0], [89.0, 36.0], [89.0, 64.0], [66.0, 64.0]]),)
+    constraints = Constraints(SQUARE, (ZONE,), max_step_m=12.0, max_depth_m=20.0, around=around)
+    planner = planner_of("lawnmower")
+    situation = make_situation(constraints=constraints.for_plans, belief=make_belief(known=False))
+    goal = np.array([87.0, 50.0])
+    planner.lead("a", 1, goal[None], np.zeros((0, 2)), None)
+    places = [np.array(situation.positions)]
+    for step in range(1, 30):
+        here = replace(situation, step=step, positions=places[-1])
+        places.append(np.array(planner.propose(here, np.random.default_rng([7, step])).positions))
+        assert not constraints.violations(("a",), places[-2][:1], places[-1][:1])
+        if not len(planner.ways["a"].corners_m):
+            break
+    assert min(np.hypot(*(place[0, :2] - goal)) for place in places) <= 0.5

@@ -92,25 +92,24 @@ def test_what_plans_keep_to_is_worked_out_once_and_knows_what_is_checked() -> No
     assert constraints.for_plans.for_checks is constraints
 
 
-def zoned(planner: str, **changes: object) -> MissionSpec:
+def zoned(planner: str) -> MissionSpec:
     return make_spec(
         SIDE_M,
         keep_out=[rectangle(45, 45, 60, 60)],
         limits={"max_step_m": 12.0, "max_depth_m": 20.0, "keep_out_margin_m": 5.0},
-        planner={"name": planner},
-        **changes,
+        planner={"name": planner, "options": {"candidates": 20, "search": 100}},
     )
 
 
-@pytest.mark.parametrize("planner", ["cao", "lawnmower", "rollout"])
+@pytest.mark.parametrize("planner", ["cao", "lawnmower"])
 def test_no_leg_of_a_survey_is_barred_from_where_a_vehicle_may_begin_it(planner: str) -> None:
     spec = zoned(planner)
     constraints, chooser = make_constraints(spec), make_planner(spec)
     rng, here_m, barred, past = np.random.default_rng(0), np.array([2.0, 2.0]), 0, 0
     heading = math.nan
     around = Polygon(constraints.keep_out[-1]).buffer(12.0)
-    for number in range(1, 70):
-        at = Place("a", here_m, heading, 2.0, left_m=(70 - number) * 12.0)
+    for number in range(1, 41):
+        at = Place("a", here_m, heading, 2.0, left_m=(41 - number) * 12.0)
         decision = decide(number, spec, constraints, chooser, [at], Knowledge(belief_of(), np.zeros((0, 2))))
         [leg] = decision.legs
         end_m = leg.target_m[:2]

@@ -23,6 +23,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.states import MissionState
+from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_state
@@ -239,3 +240,34 @@ def test_the_leg_that_goes_on_from_a_place_on_it_is_found(seed: int) -> None:
     assert nearest_leg(place, ends) == which
     before = ends[0] - rng.uniform(1.0, 20.0, 2)
     assert nearest_leg(before, ends) == 0
+
+
+async def test_legs_that_are_barred_are_flown_another_way_and_none_goes_on_from_where_they_were_to_end(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[int] = []
+    """Numbers of the legs that were looked at before they were begun."""
+    dropped: list[np.ndarray] = []
+    barred = LegCommit.barred
+
+    def barred_once(committing: LegCommit, member: Member) -> str:
+        begun.append(member.ahead[0].number)
+        if not dropped and len(member.ahead) > 1 and member.ahead[0].number > 2:
+            dropped.extend(leg.target_m for leg in member.ahead)
+            return "something lies there"
+        return barred(committing, member)
+
+    monkeypatch.setattr(LegCommit, "barred", barred_once)
+    service = await harbour_closed.open(time_scale=5.0)
+    mission = (await service.create(sim_spec("a", steps=9, side_m=60.0, planner={"name": "lawnmower"}, **APART))).id
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    async with harbour_closed.database.reading() as session:
+        rows = (await session.scalars(select(WaypointRow).order_by(WaypointRow.step))).all()
+    reached = np.array([[row.east_m, row.north_m] for row in rows if row.status == WaypointStatus.REACHED])
+    assert len(dropped) > 1
+    assert sum(row.status == WaypointStatus.MISSED for row in rows) == len(dropped)
+    for end in dropped:
+        assert np.hypot(*(reached - end).T).min() <= 0.5
+    steps = np.hypot(*np.diff(np.vstack([reached]), axis=0).T)
+    assert steps.max() <= 2 * 5.0 + 1e-6, "each leg goes on from where its vehicle is"
