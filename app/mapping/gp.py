@@ -67,6 +67,7 @@ NEIGHBOURS_OF_LARGE_GRIDS = (32, 24)
 SOUNDINGS_PER_TILE_OF_SMALL_GRIDS, SOUNDINGS_PER_TILE_OF_LARGE_GRIDS = 6, 10
 TILE_RANGE = (4, 16)
 
+MORE_IN_NOISE = 2  # times as many points to learn from, where the relief is smaller than the soundings' noise
 REFINEMENT_GAIN = 5.0  # of log likelihood, to consider the nonstationary process
 FULL_TRUST_GAIN = 0.04  # by which part it must predict better to be trusted alone
 
@@ -92,8 +93,8 @@ class GaussianProcessMap:
 
     The sea floor is a plane plus a process with correlation ``kernel`` (by default as smooth as the soundings
     suggest; where they do not surround a place, Matern 3/2). Length,
-    amplitude and the factor on the stated noise variances are learned by restricted maximum likelihood on at
-    most ``learning_points`` soundings. Then the process becomes nonstationary (Paciorek and Schervish 2006)
+    amplitude and the factor on the stated noise variances are learned by restricted maximum likelihood on some
+    of the soundings. Then the process becomes nonstationary (Paciorek and Schervish 2006)
     in two ways. Every sounding is predicted across a hole of ``hole_m``; how far these predictions miss,
     place by place, is the local roughness: correlation gets shorter where the bottom is rough, longer where
     it is smooth. And a first, stationary map shows along which direction the sea floor varies least;
@@ -112,7 +113,8 @@ class GaussianProcessMap:
     neighbours
         How many soundings, and how many merged ones farther away, each tile of the grid is predicted from.
     learning_points
-        Bound on the soundings used to learn the hyperparameters.
+        Bound on the soundings used to learn the hyperparameters; twice as many where the relief is smaller than
+        their noise.
     hole_points
         Bound on the soundings predicted across holes.
     merge_m
@@ -203,7 +205,8 @@ class GaussianProcessMap:
         self._unit_m = self.merge_m or extent / max(LEAST_RESOLUTION, resolution)
         self._levels = two_levels(soundings, self._unit_m, COARSE_FACTOR * self._unit_m)
         learn = learn or not hasattr(self, "hyperparameters_")
-        subset = spread_subset(self._levels.fine_tree, self.learning_points)
+        points = self.learning_points if learn else getattr(self, "_learned_from", self.learning_points)
+        subset = spread_subset(self._levels.fine_tree, points)
         uniform = uniform_scales(len(self._levels.soundings))
         if learn:
             if self.kernel == "auto":
@@ -213,6 +216,13 @@ class GaussianProcessMap:
         likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
         if learn:
             self.stationary_hyperparameters_, least = likelihood.maximise(start)
+            if self.stationary_hyperparameters_.amplitude_m < float(np.median(self._levels.fine.sd_m)):
+                # The relief drowns in noise: few points tell too little of its length.
+                points *= MORE_IN_NOISE
+                subset = spread_subset(self._levels.fine_tree, points)
+                likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
+                self.stationary_hyperparameters_, least = likelihood.maximise(self.stationary_hyperparameters_)
+            self._learned_from = points
             self.refinement_ = 0.0
         self._plain = conditioned(self._levels, self.kernel_, self.stationary_hyperparameters_, likelihood, uniform)
         self._refined: Conditioned | None = None

@@ -179,12 +179,15 @@ class OrderBook:
 
     async def lines(self, member: Member) -> list[FloatArray]:
         """Return the lines that a vehicle has flown, each (k, 2), the one that it is on to where it is now."""
+        flight = self._flight
         upto = member.order.step if member.ordered and member.order is not None else member.legs
         async with self._live.database.reading() as session:
             ends = await order_queries.last_legs(session, self._live.id, member.name, upto, LEGS_SEEN)
         places = np.array([place for number, *place in ends]).reshape(-1, 2)
         if member.ordered and ends and ends[-1][0] == upto:
-            places[-1] = member.place_m(self._live.frame)
+            here_m = member.place_m(self._live.frame)
+            # It may have swung out of the area, where nobody can be ordered.
+            places[-1] = here_m if flight is None else FreeSpace(flight.constraints, 0.0).nearest(here_m)
         if len(ends) == 1 and member.leg_start_m is not None:
             places = np.vstack([member.leg_start_m, places])
         return flown_lines(places)

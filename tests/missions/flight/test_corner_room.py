@@ -1,6 +1,7 @@
 """Plans keep off zones by so much that a leg is free from wherever its vehicle begins it, and close no way by that."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -53,9 +54,9 @@ def test_a_planned_leg_is_free_from_anywhere_within_the_room_of_where_it_begins(
 ) -> None:
     constraints = limits(*given_zones)
     assume(len(constraints.around) == len(given_zones))
-    wide = room_around(AREA_M, given_zones, ROOM_M)
     # Where all of the room would close a way there is less of it.
-    assume(all(Polygon(zone).buffer(0.999 * ROOM_M).within(Polygon(w)) for zone, w in zip(given_zones, wide, strict=True)))
+    both = zip(given_zones, constraints.around, strict=True)
+    assume(all(Polygon(zone).buffer(0.999 * ROOM_M).within(Polygon(wide)) for zone, wide in both))
     begin_m, end_m = np.array(begin), np.array(end)
     here_m = begin_m + part * ROOM_M * np.array([math.cos(course), math.sin(course)])
     outside = shapely.union_all([Polygon(zone) for zone in constraints.around])
@@ -77,7 +78,7 @@ def test_a_gap_that_is_narrower_than_the_room_stays_open() -> None:
     constraints = limits(box(0.0, 45.0, 48.0, 55.0), box(50.0, 45.0, SIDE_M, 55.0))
     way = FreeSpace(constraints.for_plans, 0.0).way(np.array([49.0, 20.0]), np.array([49.0, 80.0]))
     corners = np.vstack([[49.0, 20.0], way])
-    assert not any(enters_zone(constraints, a, b) for a, b in zip(corners, corners[1:], strict=False))
+    assert not any(enters_zone(constraints, a, b) for a, b in pairwise(corners))
 
 
 def test_limits_without_zones_are_the_same_for_plans() -> None:

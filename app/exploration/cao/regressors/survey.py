@@ -65,6 +65,8 @@ MOST_GIVEN = 24
 """How many of a vehicle's last legs can be taken back."""
 CORNER_LOSS = 0.4
 """Part of a step that a corner costs where steps are counted: the leg to it ends early."""
+LEAST_EXTRA = 0.5
+"""Whose lines are all flown gets more to fly where at least this part of a step is left."""
 TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])
 
 
@@ -117,7 +119,8 @@ class SurveyRegressors:
         begins = not self._plan.keys() & set(team.vehicles)
         changed = not begins and self._plan.keys() != set(team.vehicles)
         explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)
-        self._replans = changed or (explores and self._flown_m - self._planned_m >= self._whole_m / REPLANS)
+        renews = explores and self._flown_m - self._planned_m >= self._whole_m / REPLANS
+        self._replans = changed or renews or (not begins and self._runs_out())
         self._looks = begins or self._replans or self._every_step
         if not self._looks:
             self._followed = self._packed(self._plan if self._free else self._backbone)
@@ -133,6 +136,9 @@ class SurveyRegressors:
         before, self._expected = self._expected, expected
         if self._replans:
             plan, values = self._improve_plan(plan, lattice, values)
+            if not self._free:
+                lattice, extended = self._extended(lattice, values[1])
+                values = values[0], extended
         self._followed = plan if self._free else lattice
         self._expected_value = values[0] if self._free else values[1]
         return np.nan if before is None else before - expected
@@ -377,6 +383,34 @@ class SurveyRegressors:
         self._free = knows and fine and value + self._noise < leave * (values[1] + self._noise)
         self._planned_m = self._flown_m
         return (vias, counts), (value, values[1])
+
+    def _runs_out(self) -> bool:
+        """Whether a vehicle that gets a leg has flown all that was planned for it, and may fly on."""
+        routes = self._plan if self._free else self._backbone
+        none = np.zeros((0, 2))
+        able = self._team.moves & (self._left_m > LEAST_EXTRA * self._team.constraints.max_step_m)
+        return any(goes and not len(routes.get(v, none)) for v, goes in zip(self._team.vehicles, able, strict=True))
+
+    def _extended(
+        self, lattice: tuple[FloatArray, IntArray], value: float
+    ) -> tuple[tuple[FloatArray, IntArray], float]:
+        """Let vehicles that have flown all their lines use what way they have left where it promises most.
+
+        Returns the lattice with that, and its value; the lines of the others stay as they are.
+        """
+        before = lattice[1]
+        through = (before == 0) & self._team.moves
+        if not through.any():
+            return lattice, value
+        vias, counts, _ = self._improved(*lattice, before, 2)
+        counts = np.where(through, counts, before)
+        extended = self._value(vias, counts)
+        if not extended < value * (1 - 1e-9):
+            return lattice, value
+        for i, name in enumerate(self._team.vehicles):
+            if through[i]:
+                self._backbone[name] = vias[i, : counts[i]].copy()
+        return (vias, counts), extended
 
     def _improved(
         self, vias: FloatArray, counts: IntArray, locked: IntArray, which: int
