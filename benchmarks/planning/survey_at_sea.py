@@ -11,6 +11,7 @@ better of two maps, and choosing the best of three afterwards has luck in it. *l
 pattern that is best on average.
 """
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -95,7 +96,9 @@ def main() -> None:
             bar.advance(task)
     found = figures(runs)
     print("\n".join(f"{name}: {value}" for name, value in found.items()))
-    write_section(given.write, FLIGHT, "Surveys at sea", found, seeds=given.seeds, hidden={given.terrains: "FOLDER"})
+    title = f"Surveys at sea: {given.sets.replace(',', ', ')}"
+    found["load_of_the_machine"] = f"{os.getloadavg()[2]:.1f}"
+    write_section(given.write, FLIGHT, title, found, seeds=given.seeds, hidden={given.terrains: "FOLDER"})
 
 
 if __name__ == "__main__":
