@@ -333,3 +333,16 @@ def test_warm_up_leaves_nothing_to_compile() -> None:
     # A process of its own: the tests before this one have compiled everything.
     found = subprocess.run([sys.executable, "-c", COMPILED], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_a_relief_below_the_noise_is_mapped_as_well_as_its_soundings_allow() -> None:
+    def floor(east: FloatArray, north: FloatArray) -> FloatArray:
+        return 50.0 + 0.1 * np.sin(east / 9.0) * np.cos(north / 11.0) + 0.08 * np.sin((east + north) / 15.0)
+
+    north, east = np.tile(np.arange(0.0, 100.0, 0.25), 10), np.repeat(np.arange(5.0, 100.0, 10.0), 400)
+    grid = Grid(0.0, 0.0, 2.0, 50, 50)
+    for seed in (3, 4):
+        depth = floor(east, north) + 0.5 * np.random.default_rng(seed).standard_normal(len(east))
+        soundings = Soundings(east, north, depth, np.full(len(east), 0.5))
+        error = GaussianProcessMap(claims=False).fit(soundings).predict(grid).depth_m.ravel() - floor(*grid.centres_m.T)
+        assert np.sqrt(np.mean(error**2)) < 0.052
