@@ -10,6 +10,7 @@ zone. ``--write`` puts it into a page.
 import argparse
 import asyncio
 import json
+import os
 import tempfile
 from collections import Counter
 from pathlib import Path
@@ -137,6 +138,7 @@ def main() -> None:
                     runs.append(asyncio.run(fly(spec, layout, options.time_scale, Path(folder))))
             found[f"{layout}, {planner}"] = {key: sum(run[key] for run in runs) for key in runs[0]}
             print(layout, planner, json.dumps(found[f"{layout}, {planner}"]), flush=True)
+    found["load_of_the_machine"] = f"{os.getloadavg()[2]:.1f}"
     write_section(options.write, FLIGHT, "Legs at the corners of zones", found, seeds=options.seeds)
 
 

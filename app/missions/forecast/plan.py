@@ -202,7 +202,7 @@ def _swath_lines(
     sounding = [(i, member) for i, member in enumerate(members) if member.name in flying]
     found = lines_flown_ahead(
         survey,
-        FreeSpace(constraints, 0.0),
+        FreeSpace(constraints.for_plans, 0.0),
         coverage,
         {member.name: begin_m[i] for i, member in sounding},
         flying,

@@ -21,7 +21,8 @@ def test_who_has_flown_all_lines_goes_where_nothing_was_sounded_and_leaves_the_o
     others = planner.ways_ahead_m()[second]
     # The second one waits. Turns cost the first one less than was planned: it has more way left than its lines take.
     left_m, sounded = np.array([LEFT_M + MORE_M, LEFT_M]), [here[:, :2]]
-    legs_m, away_m = [], []
+    legs_m: list[float] = []
+    away_m: list[float] = []
     while len(legs_m) < 4:
         through = not len(planner.ways_ahead_m()[first]) or bool(legs_m)
         now = replace(
