@@ -1,14 +1,63 @@
-"""Landmarks with fixed (x, y): weighted least squares of their depth, and the sets A, B, V, B_hat (AURO15 sec. 3.4)."""
+"""Landmarks with fixed (x, y): the posterior of their depth, and the sets A, B, V, B_hat (AURO15 sec. 3.4)."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.estimation.depth_posterior import CELLS, estimate, from_neighbours, lay_out, take_range
 from app.estimation.sensors import RangeSensor, Ranging
 
 ITERATIONS = 3
+
+NEIGHBOURS = 8
+"""Landmarks round about that tell which of its possible depths a landmark has."""
+
+SURE = 3.0
+"""Deviations, in those that are asked for, below which neighbours tell; so far apart they are taken to be alike."""
+
+
+@dataclass(frozen=True)
+class DepthGrids:
+    """What the ranges say of each landmark's depth, on grids of its own; see :mod:`app.estimation.depth_posterior`.
+
+    Attributes
+    ----------
+    lowest_m, spacing_m : (n,)
+        First depth of each grid and the spacing; a spacing of 0 where the landmark was never seen.
+    fit : (n, CELLS)
+        Logarithm of the likelihood, 0 at the best depth.
+    steepness : (n, CELLS)
+        Slope by which the floor must rise from where a vehicle was to reach that depth.
+    neighbours, apart_m : (n, NEIGHBOURS)
+        The landmarks round about and their distances; infinite where there are fewer.
+    """
+
+    lowest_m: FloatArray
+    spacing_m: FloatArray
+    fit: NDArray[np.float32]
+    steepness: NDArray[np.float32]
+    neighbours: IntArray
+    apart_m: FloatArray
+
+    @classmethod
+    def unknown(cls, xy_m: FloatArray) -> "DepthGrids":
+        """Return grids of landmarks at ``xy_m`` (n, 2) that are still unseen."""
+        n = len(xy_m)
+        blank = np.zeros((n, CELLS), dtype=np.float32)
+        apart, neighbours = np.full((n, NEIGHBOURS), np.inf), np.zeros((n, NEIGHBOURS), dtype=np.int64)
+        count = min(NEIGHBOURS, n - 1)
+        if count > 0:
+            # Of landmarks at one place, any may come first: the row's own number is left out, not the first column.
+            distance, index = cKDTree(xy_m).query(xy_m, k=count + 1)
+            others = index != np.arange(n)[:, None]
+            others[others.all(axis=1), -1] = False
+            apart[:, :count] = distance[others].reshape(n, count)
+            neighbours[:, :count] = index[others].reshape(n, count)
+        return cls(np.zeros(n), np.zeros(n), blank, blank.copy(), neighbours, apart)
 
 
 @dataclass(frozen=True)
@@ -20,15 +69,17 @@ class Landmarks:
     xy_m : (n, 2)
         Fixed positions.
     depth_m : (n,)
-        Estimates; NaN where never seen.
+        Estimates, the likeliest where several are possible; NaN where never seen.
     variance_m2 : (n,)
-        The confidence ``c_L``: posterior variance of the depth; inf where never seen.
+        The confidence ``c_L``: posterior variance of the depth, other possibilities included; inf where never seen.
     looks : (n,)
         How often each landmark was measured.
     accurate : (n,)
         The set ``A``; only grows.
     credited : (n,)
         Number of the vehicle that brought the landmark into ``A`` (``A_j``); -1 where none did.
+    grids : DepthGrids
+        The posteriors that depths and variances are taken from.
     """
 
     xy_m: FloatArray
@@ -37,6 +88,7 @@ class Landmarks:
     looks: IntArray
     accurate: BoolArray
     credited: IntArray
+    grids: DepthGrids
 
     @classmethod
     def unknown(cls, xy_m: FloatArray) -> "Landmarks":
@@ -49,6 +101,7 @@ class Landmarks:
             np.zeros(n, dtype=np.int64),
             np.zeros(n, dtype=np.bool_),
             np.full(n, -1, dtype=np.int64),
+            DepthGrids.unknown(xy_m),
         )
 
     @property
@@ -59,11 +112,11 @@ class Landmarks:
 
 @dataclass(frozen=True)
 class LandmarkEstimator:
-    """Weighted least squares for the depths of landmarks whose (x, y) are known, from noisy ranges.
+    """The exact posterior of the depths of landmarks whose (x, y) are known, from noisy ranges.
 
     The measurement is ``y = r (1 + noise xi)`` with ``r^2 = h^2 + (z - z_vehicle)^2``, ``h`` the horizontal distance.
-    The weight of a range is ``1 / (noise r)^2``; normal equations are kept per landmark and every new range is
-    linearised at the current estimate (Gauss-Newton). Landmarks lie below the vehicles.
+    A sensor that sees all round may have seen a landmark above the vehicle; beams look down. Near its best depth the
+    posterior is the papers' weighted least squares with weights ``1 / (noise r)^2``.
 
     Attributes
     ----------
@@ -95,14 +148,22 @@ class LandmarkEstimator:
         ranges : (k,)
             The noisy ranges.
         """
-        depth, variance = _fit(
-            landmarks.xy_m,
-            landmarks.depth_m,
-            landmarks.variance_m2,
+        grids = landmarks.grids
+        grids = replace(
+            grids,
+            lowest_m=grids.lowest_m.copy(),
+            spacing_m=grids.spacing_m.copy(),
+            fit=grids.fit.copy(),
+            steepness=grids.steepness.copy(),
+        )
+        depth, variance = _look(
+            landmarks,
+            grids,
             np.asarray(position, dtype=np.float64),
             index,
             ranges,
-            self.sensor.relative_noise,
+            self.sensor,
+            SURE * self.accuracy_sd_m,
         )
         depth_m, variance_m2 = landmarks.depth_m.copy(), landmarks.variance_m2.copy()
         looks, accurate, credited = (
@@ -123,7 +184,79 @@ class LandmarkEstimator:
             looks=looks,
             accurate=accurate,
             credited=credited,
+            grids=grids,
         )
+
+
+def _look(
+    landmarks: Landmarks,
+    grids: DepthGrids,
+    position: FloatArray,
+    index: IntArray,
+    ranges: FloatArray,
+    sensor: Ranging,
+    sure_m: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Take ranges (k,) into ``grids`` in place; return depths and variances (k,) of the landmarks ``index``.
+
+    Neighbours count as they were known before the look, in whatever order the landmarks stand.
+    """
+    h2 = ((landmarks.xy_m[index] - position[:2]) ** 2).sum(axis=1)
+    below = not isinstance(sensor, RangeSensor)
+    _take(
+        grids.lowest_m, grids.spacing_m, grids.fit, grids.steepness, index, h2, position[2], ranges,
+        sensor.relative_noise, below,
+    )  # fmt: skip
+    return _estimates(
+        grids.lowest_m, grids.spacing_m, grids.fit, grids.steepness, index, grids.neighbours, grids.apart_m,
+        landmarks.depth_m, landmarks.variance_m2, sure_m,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take(
+    lowest: FloatArray,
+    spacing: FloatArray,
+    fit: NDArray[np.float32],
+    steepness: NDArray[np.float32],
+    index: IntArray,
+    h2: FloatArray,
+    vehicle_depth: float,
+    ranges: FloatArray,
+    noise: float,
+    below: bool,
+) -> None:
+    """Take one range each into the grids of the landmarks ``index`` (k,), in place."""
+    for k in range(len(index)):
+        m = index[k]
+        grid = (lowest[m], spacing[m])
+        if spacing[m] == 0.0:
+            grid = lay_out(vehicle_depth, ranges[k], noise, below)
+        lowest[m], spacing[m] = take_range(
+            fit[m], steepness[m], grid, h2[k], vehicle_depth, ranges[k], noise, below
+        )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _estimates(
+    lowest: FloatArray,
+    spacing: FloatArray,
+    fit: NDArray[np.float32],
+    steepness: NDArray[np.float32],
+    index: IntArray,
+    neighbours: IntArray,
+    apart: FloatArray,
+    depth: FloatArray,
+    variance: FloatArray,
+    sure: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return depths and variances (k,) of the landmarks ``index`` beside neighbours of such depths and variances."""
+    depths, variances = np.empty(len(index)), np.empty(len(index))
+    for k in range(len(index)):
+        m = index[k]
+        around = from_neighbours(depth[neighbours[m]], variance[neighbours[m]], apart[m], sure)
+        depths[k], variances[k] = estimate(fit[m], steepness[m], (lowest[m], spacing[m]), around, sure)
+    return depths, variances
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -150,25 +283,6 @@ def fit_depth(
         pseudo = depth + (measured - r) / slope
         depth = max((information * anchor + gained * pseudo) / (information + gained), vehicle_depth + least)
     return depth, 1.0 / (information + gained)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _fit(
-    xy: FloatArray,
-    prior: FloatArray,
-    prior_variance: FloatArray,
-    position: FloatArray,
-    index: IntArray,
-    ranges: FloatArray,
-    noise: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Return depths and variances (k,) of the landmarks ``index`` after one range to each, by Gauss-Newton."""
-    depths, variances = np.empty(len(index)), np.empty(len(index))
-    for k in range(len(index)):
-        m = index[k]
-        h2 = (xy[m, 0] - position[0]) ** 2 + (xy[m, 1] - position[1]) ** 2
-        depths[k], variances[k] = fit_depth(prior[m], prior_variance[m], h2, position[2], ranges[k], noise)
-    return depths, variances
 
 
 @dataclass(frozen=True)

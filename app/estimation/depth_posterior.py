@@ -1,0 +1,205 @@
+"""What ranges say of the depth of one landmark, exactly: the posterior on a grid of depths that narrows as it settles.
+
+A range ``y = r (1 + noise xi)``, ``r^2 = h^2 + (z - z_vehicle)^2``, fits two depths, one below the vehicle and its
+mirror image above. Beside a wall the upper one is the true one, so neither may be presumed: an estimate that is held
+below every vehicle that looks is pressed away from the truth and gets surer at every look. Ranges from other depths
+tell the two apart, and until they do the variance says so. Two things known of sea floors help, both with heavy tails:
+a landmark above a vehicle must be reached from the vehicle's own water by a slope, and steep ones are rare; and a
+landmark lies near the depths of its neighbours, the nearer the closer.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from app.arrays import FloatArray
+
+CELLS = 96
+"""Depths at which a posterior is held."""
+
+REACH_SD = 5.0
+"""How many deviations a range may be short of the truth when the first look lays out the depths."""
+
+LOST = 20.0
+"""Depths whose logarithm of likelihood lies this far below the best are given up when a grid narrows."""
+
+NEVER = -1e4
+"""Logarithm of the likelihood of what cannot be."""
+
+TYPICAL_SLOPE = 0.5
+"""Rise over run of sea floors: what it takes to rise above a vehicle, and what lies between neighbours."""
+
+FREEDOM = 4.0
+"""Degrees of freedom of Student's distribution of what lies between neighbours: steps and walls are not rare."""
+
+RAISED = 1e-3
+"""Density, of the greatest, down to which depths belong to the estimate and not to another possibility."""
+
+NEAREST_M = 1e-9
+
+Cells = NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lay_out(vehicle_depth: float, measured: float, noise: float, below: bool) -> tuple[float, float]:
+    """Return the first depth and the spacing of a grid that holds whatever a first range may mean."""
+    reach = max(measured, NEAREST_M) / max(1.0 - REACH_SD * noise, 0.25)
+    lowest = vehicle_depth if below else vehicle_depth - reach
+    return lowest, (vehicle_depth + reach - lowest) / (CELLS - 1)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fit(z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float) -> float:
+    """Return the logarithm of the likelihood of a range at depth ``z``, blurred by half a ``spacing``."""
+    drop = z - vehicle_depth
+    r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
+    sd = np.sqrt((noise * r) ** 2 + (0.5 * spacing * drop / r) ** 2)
+    return float(-0.5 * ((measured - r) / sd) ** 2 - np.log(sd))
+
+
+@njit(cache=True, nogil=True)
+def _between(row: Cells, at: float) -> float:
+    """Return a row's value between cells: a parabola, which a logarithm of a density nearly is."""
+    k = min(max(int(np.round(at)), 1), CELLS - 2)
+    u = at - k
+    a, b, c = float(row[k - 1]), float(row[k]), float(row[k + 1])
+    if min(a, b, c) < 0.1 * NEVER:
+        return b
+    return b + 0.5 * u * (c - a) + 0.5 * u * u * (a - 2.0 * b + c)
+
+
+@njit(cache=True, nogil=True)
+def _narrow(fit: Cells, steepness: Cells, lowest: float, spacing: float, middle: float) -> tuple[float, float]:
+    """Halve the spacing in place round the cell ``middle``; return first depth and spacing."""
+    start = min(max(middle - 0.25 * (CELLS - 1), 0.0), 0.5 * (CELLS - 1))
+    finer, slopes = np.empty(CELLS, dtype=np.float32), np.empty(CELLS, dtype=np.float32)
+    for c in range(CELLS):
+        at = start + 0.5 * c
+        k = min(int(at), CELLS - 2)
+        finer[c] = _between(fit, at)
+        slopes[c] = steepness[k] + (at - k) * (steepness[k + 1] - steepness[k])
+    fit[:] = finer
+    steepness[:] = slopes
+    return lowest + start * spacing, 0.5 * spacing
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def take_range(
+    fit: Cells,
+    steepness: Cells,
+    grid: tuple[float, float],
+    h2: float,
+    vehicle_depth: float,
+    measured: float,
+    noise: float,
+    below: bool,
+) -> tuple[float, float]:
+    """Take one range into a landmark's posterior, in place.
+
+    Parameters
+    ----------
+    fit : (CELLS,)
+        Logarithm of the likelihood of all ranges so far, 0 at the best depth.
+    steepness : (CELLS,)
+        Slope (rise over run) by which the floor must rise from a vehicle's place to reach that depth; the most.
+    grid : first depth and spacing
+        The new ones are returned.
+    h2 : float
+        Squared horizontal distance from the vehicle to the landmark.
+    below : bool
+        The sensor looks down only.
+    """
+    lowest, spacing = grid
+    noise = max(noise, NEAREST_M)
+    for _ in range(40):
+        best = -np.inf
+        for c in range(CELLS):
+            z = lowest + c * spacing
+            best = max(best, fit[c] + _fit(z, h2, vehicle_depth, measured, noise, spacing))
+        first, last = CELLS, -1
+        for c in range(CELLS):
+            z = lowest + c * spacing
+            if fit[c] + _fit(z, h2, vehicle_depth, measured, noise, spacing) > best - LOST:
+                first, last = min(first, c), c
+        if 3 * (last - first) > CELLS:
+            break
+        lowest, spacing = _narrow(fit, steepness, lowest, spacing, 0.5 * (first + last))
+    best = -np.inf
+    h = max(np.sqrt(h2), NEAREST_M)
+    for c in range(CELLS):
+        rise = vehicle_depth - (lowest + c * spacing)
+        value = fit[c] + _fit(lowest + c * spacing, h2, vehicle_depth, measured, noise, 0.0)
+        if rise > 0.0:
+            steepness[c] = max(steepness[c], rise / h)
+            value = NEVER if below else value
+        fit[c] = max(value, NEVER)
+        best = max(best, fit[c])
+    for c in range(CELLS):
+        fit[c] = max(fit[c] - best, NEVER)
+    return lowest, spacing
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def estimate(
+    fit: Cells, steepness: Cells, grid: tuple[float, float], around: tuple[float, float], alike: float
+) -> tuple[float, float]:
+    """Return a landmark's likeliest depth and its variance about it, other possibilities included.
+
+    Parameters
+    ----------
+    fit, steepness, grid
+        As for :func:`take_range`.
+    around : depth and scale
+        Of the landmarks round about; an infinite scale where none is known.
+    alike : float
+        Differences from them that are no less likely than none: neighbours say which possibility is the true one, not
+        how deep the landmark is to a hair, or errors would go round among them and be counted again and again.
+    """
+    lowest, spacing = grid
+    density = np.empty(CELLS)
+    best, mode = -np.inf, 0
+    for c in range(CELLS):
+        off = max(abs(lowest + c * spacing - around[0]) - alike, 0.0) / around[1]
+        density[c] = fit[c] - steepness[c] / TYPICAL_SLOPE
+        density[c] -= 0.5 * (FREEDOM + 1.0) * np.log1p(off * off / FREEDOM)
+        if density[c] > best:
+            best, mode = density[c], c
+    total = 0.0
+    for c in range(CELLS):
+        density[c] = np.exp(density[c] - best)
+        total += density[c]
+    first, last = mode, mode
+    while first > 0 and density[first - 1] > RAISED:
+        first -= 1
+    while last < CELLS - 1 and density[last + 1] > RAISED:
+        last += 1
+    mass, moment = 0.0, 0.0
+    for c in range(first, last + 1):
+        mass += density[c]
+        moment += density[c] * c
+    middle = moment / mass
+    spread = 0.0
+    for c in range(CELLS):
+        spread += density[c] * (c - middle) ** 2
+    # A depth between two cells is not known better than that.
+    return lowest + middle * spacing, (spread / total + 1.0 / 12.0) * spacing * spacing
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def from_neighbours(
+    depth: FloatArray, variance: FloatArray, apart: FloatArray, sure_m: float
+) -> tuple[float, float]:
+    """Return the depth that neighbours (k,) suggest and the scale by which it may differ; infinite where none does.
+
+    ``apart`` (k,) are their horizontal distances; neighbours whose deviation is ``sure_m`` or more say nothing.
+    """
+    weights, depths, count = 0.0, 0.0, 0
+    for k in range(len(depth)):
+        if variance[k] < sure_m * sure_m and np.isfinite(apart[k]):
+            weight = 1.0 / max((TYPICAL_SLOPE * apart[k]) ** 2 + variance[k], NEAREST_M**2)
+            weights += weight
+            depths += weight * depth[k]
+            count += 1
+    if count == 0:
+        return 0.0, np.inf
+    return depths / weights, np.sqrt(count / weights)
