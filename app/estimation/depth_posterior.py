@@ -29,6 +29,9 @@ NEVER = -1e4
 TYPICAL_SLOPE = 0.5
 """Rise over run of sea floors: what it takes to rise above a vehicle, and what lies between neighbours."""
 
+STEEP = 1e-4
+"""Chance of a wall of whatever steepness: what is measured of it decides."""
+
 FREEDOM = 4.0
 """Degrees of freedom of Student's distribution of what lies between neighbours: steps and walls are not rare."""
 
@@ -160,7 +163,7 @@ def estimate(
     best, mode = -np.inf, 0
     for c in range(CELLS):
         off = max(abs(lowest + c * spacing - around[0]) - alike, 0.0) / around[1]
-        density[c] = fit[c] - steepness[c] / TYPICAL_SLOPE
+        density[c] = fit[c] + np.log(np.exp(-steepness[c] / TYPICAL_SLOPE) + STEEP)
         density[c] -= 0.5 * (FREEDOM + 1.0) * np.log1p(off * off / FREEDOM)
         if density[c] > best:
             best, mode = density[c], c
@@ -181,8 +184,8 @@ def estimate(
     spread = 0.0
     for c in range(CELLS):
         spread += density[c] * (c - middle) ** 2
-    # A depth between two cells is not known better than that.
-    return lowest + middle * spacing, (spread / total + 1.0 / 12.0) * spacing * spacing
+    # Where a depth lies between two cells is not known.
+    return lowest + middle * spacing, max(spread / total, 1.0 / 12.0) * spacing * spacing
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -77,6 +77,14 @@ floors monterey_canyon, fortbragg_gully, fortbragg_plateau, jd211_pit and leixoe
 the adjustment was made, and a generated flat one that is not listed.
 """,
 )
+LANDMARKS = Page(
+    "landmarks.md",
+    """# Landmarks of the papers' scenario: whether what is claimed of them holds
+
+Every section is written by the command that stands in it (`--write`); what is measured stands at the head of
+`benchmarks/planning/landmarks.py`. Even seeds were looked at while the estimator was made.
+""",
+)
 SITES = Page(
     "sites.md",
     """# Sites: changes between surveys, what was measured

@@ -55,7 +55,7 @@ def test_matches_a_batch_least_squares_solution() -> None:
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=25, deadline=None)
-def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed: int) -> None:
+def test_accurate_landmarks_stay_accurate_whatever_comes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth = np.column_stack([rng.uniform(-0.3, 0.3, (20, 2)), rng.uniform(0.4, 0.8, 20)])
     state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR, visit_cap=30)
@@ -63,8 +63,9 @@ def test_accurate_landmarks_stay_accurate_and_variance_never_grows(seed: int) ->
         position = np.array([*rng.uniform(-0.3, 0.3, 2), 0.2])
         after = look(state, truth, position[None], rng, estimator, vehicle=k % 2)
         assert (after.accurate | ~state.accurate).all()
-        assert (after.variance_m2 <= state.variance_m2).all()
+        assert (after.variance_m2 > 0.0).all()
         assert np.isfinite(after.depth_m).all()
+        assert np.isfinite(after.variance_m2).all()
         state = after
 
 
@@ -106,38 +107,6 @@ def test_noise_grows_with_range() -> None:
     assert depth[:2000].std() == pytest.approx(0.02, rel=0.1)
     assert depth[2000:].std() == pytest.approx(0.2, rel=0.1)
     assert beam.sd_m(vehicle, bottom)[[0, -1]].tolist() == pytest.approx([0.02, 0.2])
-
-
-def kalman(
-    prior: float, variance: float, position: FloatArray, xy: FloatArray, y: float, noise: float
-) -> tuple[float, float]:
-    """One range, one landmark, written out: an iterated extended Kalman filter with a scalar state."""
-    h2 = float(((xy - position[:2]) ** 2).sum())
-    z = prior
-    for _ in range(3):
-        drop = z - position[2]
-        r = np.sqrt(h2 + drop * drop)
-        slope = drop / r
-        gain = variance * slope / (slope * variance * slope + (noise * r) ** 2)
-        z = prior + gain * (y - r - slope * (prior - z))
-    return z, 1.0 / (1.0 / variance + (slope / (noise * r)) ** 2)
-
-
-@given(seed=st.integers(0, 10_000))
-@settings(max_examples=30, deadline=None)
-def test_agrees_with_an_iterated_kalman_filter_landmark_by_landmark(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    truth = np.column_stack([rng.uniform(-0.15, 0.15, (8, 2)), rng.uniform(0.55, 0.7, 8)])
-    state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR)
-    for _ in range(6):
-        position = np.array([*rng.uniform(-0.1, 0.1, 2), 0.3])
-        y = SENSOR.measure(position, truth, rng)
-        after = estimator.update(state, 0, position, np.arange(8), y)
-        for m in np.flatnonzero(state.seen):
-            z, variance = kalman(state.depth_m[m], state.variance_m2[m], position, truth[m, :2], y[m], 0.1)
-            assert after.depth_m[m] == pytest.approx(z, abs=1e-3)
-            assert after.variance_m2[m] == pytest.approx(variance, rel=0.02)
-        state = after
 
 
 def test_measuring_nothing_changes_nothing() -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
+from app.estimation import Landmarks
 from app.evaluation.explore.osarses import Osarses
 from app.evaluation.explore.teams import LimitedTeam, UnlimitedTeam
 from app.evaluation.explore.tries import GradientTrier, Trier
@@ -30,7 +31,9 @@ class ExploreRun:
 
     ``robots`` is the team at the start; ``broken_constraints`` counts the steps of single vehicles that broke a limit;
     ``sum_of_error`` is AURO15 eq. (25): over all steps, the norm of the error of all landmarks; ``message_bytes`` is
-    what vehicles and station sent under limited communication.
+    what vehicles and station sent under limited communication. Of the landmarks that are accurate at the end,
+    ``done_nees`` is the mean squared error over its variance (1 where claims hold) and ``done_within_pct`` the share
+    whose depth is within the deviation that was asked for; None where there are none.
     """
 
     planner: str
@@ -51,6 +54,8 @@ class ExploreRun:
     broken_constraints: int
     capacity: int | None
     message_bytes: int
+    done_nees: float | None
+    done_within_pct: float | None
 
 
 def run_explore(
@@ -104,6 +109,7 @@ def run_explore(
         error += float(np.linalg.norm(np.nan_to_num(team.landmarks.depth_m, nan=UNSEEN_DEPTH) - world.truth[:, 2]))
         observe(world.positions, team.landmarks.accurate, world.truth)
         progress(step)
+    nees, within = _claims_of_done(team.landmarks, world.truth, world.estimator.accuracy_sd_m)
     return ExploreRun(
         planner=planner,
         terrain=scenario.terrain.name,
@@ -123,7 +129,18 @@ def run_explore(
         broken_constraints=broken,
         capacity=scenario.capacity,
         message_bytes=team.sent_bytes,
+        done_nees=nees,
+        done_within_pct=within,
     )
+
+
+def _claims_of_done(landmarks: Landmarks, truth: FloatArray, accuracy_sd: float) -> tuple[float | None, float | None]:
+    """Return the NEES of accurate landmarks, and how many lie within the accuracy asked for, in %."""
+    done = landmarks.accurate & landmarks.seen
+    if not done.any():
+        return None, None
+    error = landmarks.depth_m[done] - truth[done, 2]
+    return float((error**2 / landmarks.variance_m2[done]).mean()), 100.0 * float((abs(error) <= accuracy_sd).mean())
 
 
 def _chooser(planner: str, options: PlannerOptions, world: World, noise: np.random.Generator) -> PlannerBase | Trier:

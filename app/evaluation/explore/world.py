@@ -110,6 +110,8 @@ class ExploreScenario:
         Most landmark entries in a message between a vehicle and the station; None: all knowledge is shared.
     message_loss : float
         Probability that a message is lost; only with a capacity.
+    estimator : LandmarkEstimator or None
+        What makes depths of ranges; None: the default, with the scenario's sensor.
     """
 
     terrain: Terrain
@@ -124,6 +126,7 @@ class ExploreScenario:
     line_of_sight: bool = False
     capacity: int | None = None
     message_loss: float = 0.0
+    estimator: LandmarkEstimator | None = None
 
     def __post_init__(self) -> None:
         self.changes.check(self.robots, self.steps)
@@ -173,7 +176,7 @@ class World:
         rng = np.random.default_rng([scenario.seed, 0])
         self.truth = self._scatter(rng)
         self.landmarks = Landmarks.unknown(self.truth[:, :2])
-        self.estimator = LandmarkEstimator(scenario.sensor)
+        self.estimator = scenario.estimator or LandmarkEstimator(scenario.sensor)
         start = START_CORNER * self.cube.half + rng.uniform(-START_SPREAD, START_SPREAD, (scenario.robots, 2))
         floor = np.nan_to_num(self.cube.depth_at(start), nan=DEEPEST)
         self.positions = np.column_stack([start, floor - START_HEIGHT])

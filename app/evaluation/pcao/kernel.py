@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.estimation.landmarks import fit_depth
+from app.estimation.depth_least_squares import fit_depth
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.state import reduced_state
 from app.exploration.pcao.visits import no_visits, visiting_move, watch

@@ -81,7 +81,7 @@ def test_the_tries_are_judged_by_the_objective(floor: SeaFloor) -> None:
     positions = np.column_stack([rng.uniform(-1, 1, (n, 2)), np.full(n, 0.2)])
     known = KnownLandmarks(depth, np.where(looks > 0, 0.01, np.inf), looks, accurate, credited)
     progress, J3 = _progress(positions, points, known, visible, _credits(known, n))
-    landmarks = Landmarks(points[:, :2], depth, known.variance, looks, accurate, credited)
+    landmarks = replace(Landmarks.unknown(points[:, :2]), looks=looks, accurate=accurate, credited=credited)
     expected = objective(
         positions, np.column_stack([points[:, :2], depth]), landmark_sets(landmarks, visible), int(accurate.sum())
     )

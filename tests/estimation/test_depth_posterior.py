@@ -1,0 +1,149 @@
+"""The posterior of a landmark's depth: against all ranges at once on a fine grid, and against the truth."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from app.arrays import FloatArray
+from app.estimation import LandmarkEstimator, Landmarks, Multibeam, RangeSensor
+from app.estimation.depth_posterior import FREEDOM, STEEP, TYPICAL_SLOPE, from_neighbours
+from app.estimation.sensors import Ranging
+
+SENSOR = RangeSensor(visibility_m=0.4, relative_noise=0.1)
+FINE = np.arange(-2.0, 3.0, 0.0005)
+
+
+def taken(xy: FloatArray, looks: list[tuple[FloatArray, FloatArray]], sensor: Ranging = SENSOR) -> Landmarks:
+    """What is known after all landmarks were ranged to from each position."""
+    state, estimator = Landmarks.unknown(xy), LandmarkEstimator(sensor)
+    for position, ranges in looks:
+        state = estimator.update(state, 0, position, np.arange(len(xy)), ranges)
+    return state
+
+
+def all_at_once(xy: FloatArray, looks: list[tuple[FloatArray, float]], noise: float) -> FloatArray:
+    """Density of one landmark's depth at ``FINE``, written out: no grid that narrows, nothing taken in one by one."""
+    density, steepest = np.zeros(len(FINE)), np.zeros(len(FINE))
+    for position, y in looks:
+        h = float(np.hypot(*(xy - position[:2])))
+        r = np.hypot(h, FINE - position[2])
+        density += stats.norm.logpdf(y, r, noise * r)
+        steepest = np.maximum(steepest, (position[2] - FINE) / h)
+    density += np.log(stats.expon.sf(steepest, scale=TYPICAL_SLOPE) + STEEP)
+    weights = np.exp(density - density.max())
+    return np.asarray(weights / weights.sum())
+
+
+def judged(weights: FloatArray, depth: float) -> tuple[float, float]:
+    """The mean of the possibility round the mode, and the variance of everything about a ``depth``."""
+    off = np.flatnonzero(weights < 1e-3 * weights.max())
+    mode = int(weights.argmax())
+    first = off[off < mode].max(initial=-1) + 1
+    last = off[off > mode].min(initial=len(FINE)) - 1
+    own = slice(first, last + 1)
+    return float(np.average(FINE[own], weights=weights[own])), float((weights * (FINE - depth) ** 2).sum())
+
+
+def sight(truth: FloatArray, positions: FloatArray, rng: np.random.Generator) -> list[tuple[FloatArray, FloatArray]]:
+    return [(position, SENSOR.measure(position, truth, rng)) for position in positions]
+
+
+@given(seed=st.integers(0, 10_000), looks=st.integers(1, 40), level=st.booleans())
+@settings(max_examples=25, deadline=None)
+def test_agrees_with_all_ranges_at_once(seed: int, looks: int, level: bool) -> None:
+    rng = np.random.default_rng(seed)
+    truth = np.array([[0.0, 0.0, rng.uniform(0.2, 0.7)]])
+    heights = 0.4 if level else rng.uniform(0.3, 0.55, looks)
+    positions = np.column_stack([rng.uniform(-0.25, 0.25, (looks, 2)), np.full(looks, heights)])
+    seen = sight(truth, positions, rng)
+    state = taken(truth[:, :2], seen)
+    depth, variance = judged(
+        all_at_once(truth[0, :2], [(p, float(y[0])) for p, y in seen], SENSOR.relative_noise), state.depth_m[0]
+    )
+    # A possibility that is hardly joined to the other belongs to the estimate or not, by a hair: the variance tells.
+    if variance < 0.05**2:
+        assert state.depth_m[0] == pytest.approx(depth, abs=0.1 * np.sqrt(variance))
+    assert state.variance_m2[0] == pytest.approx(variance, rel=0.1, abs=2e-5)
+
+
+@pytest.mark.parametrize("rise", [-0.15, 0.15])
+def test_a_landmark_above_the_vehicle_is_found_there_once_looks_from_other_depths_tell(rise: float) -> None:
+    rng = np.random.default_rng(3)
+    n = 200
+    truth = np.column_stack([np.linspace(0.0, 400.0, n), np.zeros(n), np.full(n, 0.5 - rise)])
+    state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR)
+    for k in range(40):
+        for m in range(n):
+            position = np.array([truth[m, 0] + 0.2, 0.05, 0.5 + 0.03 * np.sin(k)])
+            state = estimator.update(
+                state, 0, position, np.array([m]), SENSOR.measure(position, truth[m : m + 1], rng)
+            )
+    error = state.depth_m - truth[:, 2]
+    assert 0.8 < np.mean(error**2 / state.variance_m2) < 1.3
+    assert np.median(np.abs(error)) < 0.02
+
+
+def test_ranges_from_one_depth_alone_do_not_make_a_landmark_done() -> None:
+    rng = np.random.default_rng(5)
+    truth = np.array([[0.0, 0.0, 0.35]])
+    state = taken(truth[:, :2], sight(truth, np.tile([0.25, 0.0, 0.5], (100, 1)), rng))
+    assert not state.accurate[0]
+    assert np.sqrt(state.variance_m2[0]) > 0.05
+
+
+def test_beams_that_look_down_know_that_the_landmark_is_below() -> None:
+    rng = np.random.default_rng(6)
+    truth, sonar = np.array([[0.02, 0.0, 0.7]]), Multibeam(0.02, 1.0)
+    looks = [(np.array([0.0, 0.0, 0.5]), sonar.measure(np.array([0.0, 0.0, 0.5]), truth, rng)) for _ in range(10)]
+    state = taken(truth[:, :2], looks, sonar)
+    assert state.depth_m[0] == pytest.approx(0.7, abs=0.005)
+    assert np.sqrt(state.variance_m2[0]) == pytest.approx(0.02 * 0.2 / np.sqrt(10), rel=0.1)
+
+
+def test_neighbours_tell_which_of_two_depths_it_is_and_do_not_move_it() -> None:
+    """One landmark ranged to from one depth alone, beside one that is known: below, above, or not at all."""
+    rng = np.random.default_rng(7)
+    xy = np.array([[0.0, 0.0], [0.05, 0.0]])
+    level = sight(np.array([[0.0, 0.0, 0.65]]), np.tile([0.2, 0.0, 0.5], (60, 1)), rng)
+    found: dict[float, Any] = {}
+    for known in (0.65, 0.35):
+        truth = np.array([[0.05, 0.0, known]])
+        state, estimator = Landmarks.unknown(xy), LandmarkEstimator(SENSOR)
+        for position in np.column_stack([rng.uniform(0.0, 0.1, (60, 2)), rng.uniform(0.1, 0.2, 60)]):
+            y = SENSOR.measure(position, truth, rng)
+            state = estimator.update(state, 0, position, np.array([1]), y)
+        for position, ranges in level:
+            state = estimator.update(state, 0, position, np.array([0]), ranges)
+        found[known] = state
+    alone = taken(xy[:1], level)
+    assert found[0.65].variance_m2[0] < 0.5 * alone.variance_m2[0]
+    assert found[0.65].depth_m[0] == pytest.approx(alone.depth_m[0], abs=2e-3)
+    assert found[0.35].depth_m[0] == pytest.approx(1.0 - alone.depth_m[0], abs=2e-3)
+
+
+@given(seed=st.integers(0, 1000), n=st.integers(1, 8))
+@settings(max_examples=30, deadline=None)
+def test_neighbours_count_by_distance_and_deviation(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    depth, sd, apart = rng.uniform(0.2, 1.0, n), rng.uniform(0.001, 0.1, n), rng.uniform(0.01, 0.3, n)
+    told, scale = from_neighbours(depth, sd**2, apart, 0.06)
+    sure = sd < 0.06
+    if not sure.any():
+        assert np.isinf(scale)
+        return
+    variance = (TYPICAL_SLOPE * apart[sure]) ** 2 + sd[sure] ** 2
+    assert told == pytest.approx(np.average(depth[sure], weights=1.0 / variance))
+    assert scale == pytest.approx(np.sqrt(stats.hmean(variance)))
+    assert FREEDOM < 10.0  # heavy tails, or a step beside a landmark would move it
+
+
+def test_landmarks_at_one_place_and_a_landmark_alone_have_neighbours_as_far_as_there_are() -> None:
+    grids = Landmarks.unknown(np.zeros((4, 2))).grids
+    for m in range(4):
+        others = grids.neighbours[m][np.isfinite(grids.apart_m[m])]
+        assert sorted(others) == [k for k in range(4) if k != m]
+    assert np.isinf(Landmarks.unknown(np.zeros((1, 2))).grids.apart_m).all()
