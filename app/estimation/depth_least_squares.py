@@ -1,4 +1,4 @@
-"""The depth of a landmark below the vehicles by the papers' weighted least squares (AURO15 sec. 3.4), a range at a time.
+"""The depth of a landmark below the vehicles by the papers' weighted least squares, range by range (AURO15 sec. 3.4).
 
 Right for sonars that look down, such as PCAO18's. For one that sees all round it presses landmarks that lie above a
 vehicle below it and gets surer all the same: see :mod:`app.estimation.depth_posterior`.

@@ -189,9 +189,7 @@ def estimate(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def from_neighbours(
-    depth: FloatArray, variance: FloatArray, apart: FloatArray, sure_m: float
-) -> tuple[float, float]:
+def from_neighbours(depth: FloatArray, variance: FloatArray, apart: FloatArray, sure_m: float) -> tuple[float, float]:
     """Return the depth that neighbours (k,) suggest and the scale by which it may differ; infinite where none does.
 
     ``apart`` (k,) are their horizontal distances; neighbours whose deviation is ``sure_m`` or more say nothing.

@@ -57,6 +57,38 @@ class DepthGrids:
             neighbours[:, :count] = index[others].reshape(n, count)
         return cls(np.zeros(n), np.zeros(n), blank, blank.copy(), neighbours, apart)
 
+    def with_ranges(
+        self, xy_m: FloatArray, position: FloatArray, index: IntArray, ranges: FloatArray, sensor: Ranging
+    ) -> "DepthGrids":
+        """Return grids that have taken in ranges (k,) from ``position`` (3,) to the landmarks ``index`` (k,)."""
+        lowest, spacing, fit, steepness = (
+            rows.copy() for rows in (self.lowest_m, self.spacing_m, self.fit, self.steepness)
+        )
+        h2 = ((xy_m[index] - position[:2]) ** 2).sum(axis=1)
+        below = not isinstance(sensor, RangeSensor)
+        _take(lowest, spacing, fit, steepness, index, h2, float(position[2]), ranges, sensor.relative_noise, below)
+        return replace(self, lowest_m=lowest, spacing_m=spacing, fit=fit, steepness=steepness)
+
+    def beside(self, index: IntArray, wanted: BoolArray) -> IntArray:
+        """Return which of the ``wanted`` landmarks (n,) have neighbours among ``index`` (k,) but are not among them."""
+        looked_at = np.zeros(len(wanted), dtype=np.bool_)
+        looked_at[index] = True
+        candidates = np.flatnonzero(wanted & ~looked_at)
+        near = looked_at[self.neighbours[candidates]] & np.isfinite(self.apart_m[candidates])
+        return candidates[near.any(axis=1)]
+
+    def estimates(
+        self, index: IntArray, depth_m: FloatArray, variance_m2: FloatArray, sure_m: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return depths and variances (k,) of the landmarks ``index`` (k,).
+
+        ``depth_m`` and ``variance_m2`` (n,) is what is known of neighbours, which tell when surer than ``sure_m``.
+        """
+        return _estimates(
+            self.lowest_m, self.spacing_m, self.fit, self.steepness, index, self.neighbours, self.apart_m,
+            depth_m, variance_m2, sure_m,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Landmarks:
@@ -146,33 +178,18 @@ class LandmarkEstimator:
         ranges : (k,)
             The noisy ranges.
         """
-        grids = landmarks.grids
-        grids = replace(
-            grids,
-            lowest_m=grids.lowest_m.copy(),
-            spacing_m=grids.spacing_m.copy(),
-            fit=grids.fit.copy(),
-            steepness=grids.steepness.copy(),
-        )
-        depth, variance = _look(
-            landmarks,
-            grids,
-            np.asarray(position, dtype=np.float64),
-            index,
-            ranges,
-            self.sensor,
-            SURE * self.accuracy_sd_m,
-        )
+        sure_m = SURE * self.accuracy_sd_m
+        grids = landmarks.grids.with_ranges(landmarks.xy_m, np.asarray(position), index, ranges, self.sensor)
         depth_m, variance_m2 = landmarks.depth_m.copy(), landmarks.variance_m2.copy()
-        looks, accurate, credited = (
-            landmarks.looks.copy(),
-            landmarks.accurate.copy(),
-            landmarks.credited.copy(),
-        )
-        depth_m[index], variance_m2[index] = depth, variance
+        looks, accurate, credited = landmarks.looks.copy(), landmarks.accurate.copy(), landmarks.credited.copy()
         looks[index] += 1
-        done = (variance < self.accuracy_sd_m**2) | (looks[index] > self.visit_cap)
-        fresh = index[done & ~accurate[index]]
+        # Neighbours count as they were known before the look, in whatever order the landmarks stand.
+        depth_m[index], variance_m2[index] = grids.estimates(index, landmarks.depth_m, landmarks.variance_m2, sure_m)
+        beside = grids.beside(index, (looks > 0) & ~accurate)
+        depth_m[beside], variance_m2[beside] = grids.estimates(beside, depth_m, variance_m2, sure_m)
+        judged = np.concatenate([index, beside])
+        done = (variance_m2[judged] < self.accuracy_sd_m**2) | (looks[judged] > self.visit_cap)
+        fresh = judged[done & ~accurate[judged]]
         accurate[fresh] = True
         credited[fresh] = vehicle
         return replace(
@@ -184,31 +201,6 @@ class LandmarkEstimator:
             credited=credited,
             grids=grids,
         )
-
-
-def _look(
-    landmarks: Landmarks,
-    grids: DepthGrids,
-    position: FloatArray,
-    index: IntArray,
-    ranges: FloatArray,
-    sensor: Ranging,
-    sure_m: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Take ranges (k,) into ``grids`` in place; return depths and variances (k,) of the landmarks ``index``.
-
-    Neighbours count as they were known before the look, in whatever order the landmarks stand.
-    """
-    h2 = ((landmarks.xy_m[index] - position[:2]) ** 2).sum(axis=1)
-    below = not isinstance(sensor, RangeSensor)
-    _take(
-        grids.lowest_m, grids.spacing_m, grids.fit, grids.steepness, index, h2, position[2], ranges,
-        sensor.relative_noise, below,
-    )  # fmt: skip
-    return _estimates(
-        grids.lowest_m, grids.spacing_m, grids.fit, grids.steepness, index, grids.neighbours, grids.apart_m,
-        landmarks.depth_m, landmarks.variance_m2, sure_m,
-    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -230,9 +222,7 @@ def _take(
         grid = (lowest[m], spacing[m])
         if spacing[m] == 0.0:
             grid = lay_out(vehicle_depth, ranges[k], noise, below)
-        lowest[m], spacing[m] = take_range(
-            fit[m], steepness[m], grid, h2[k], vehicle_depth, ranges[k], noise, below
-        )
+        lowest[m], spacing[m] = take_range(fit[m], steepness[m], grid, h2[k], vehicle_depth, ranges[k], noise, below)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -98,7 +98,9 @@ def landmark_jobs(
     for seed in seeds:
         floors = [] if folder is None else [replace(load_terrain(folder / f"{name}.npz"), name=name) for name in REAL]
         floors += [_generated(family, seed) for family in GENERATED]
-        scenarios = [ExploreScenario(floor, steps=steps, seed=seed) for floor in floors if floor.name in only or not only]
+        scenarios = [
+            ExploreScenario(floor, steps=steps, seed=seed) for floor in floors if floor.name in only or not only
+        ]
         jobs += [
             LandmarkJob(scenario, planner, estimator)
             for scenario in scenarios

@@ -79,9 +79,7 @@ def test_a_landmark_above_the_vehicle_is_found_there_once_looks_from_other_depth
     for k in range(40):
         for m in range(n):
             position = np.array([truth[m, 0] + 0.2, 0.05, 0.5 + 0.03 * np.sin(k)])
-            state = estimator.update(
-                state, 0, position, np.array([m]), SENSOR.measure(position, truth[m : m + 1], rng)
-            )
+            state = estimator.update(state, 0, position, np.array([m]), SENSOR.measure(position, truth[m : m + 1], rng))
     error = state.depth_m - truth[:, 2]
     assert 0.8 < np.mean(error**2 / state.variance_m2) < 1.3
     assert np.median(np.abs(error)) < 0.02
