@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 
 CELLS = 96
 """Depths at which a posterior is held."""
@@ -27,7 +27,10 @@ NEVER = -1e4
 """Logarithm of the likelihood of what cannot be."""
 
 TYPICAL_SLOPE = 0.5
-"""Rise over run of sea floors: what it takes to rise above a vehicle, and what lies between neighbours."""
+"""Rise over run of sea floors, where they rise above a vehicle."""
+
+TYPICAL_STEP = 0.35
+"""Difference between a landmark and those round about it, over their distance."""
 
 STEEP = 1e-4
 """Chance of a wall of whatever steepness: what is measured of it decides."""
@@ -144,9 +147,13 @@ def take_range(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def estimate(
-    fit: Cells, steepness: Cells, grid: tuple[float, float], around: tuple[float, float], alike: float
-) -> tuple[float, float]:
-    """Return a landmark's likeliest depth and its variance about it, other possibilities included.
+    fit: Cells, steepness: Cells, grid: tuple[float, float], around: tuple[float, float]
+) -> tuple[float, float, float, float]:
+    """Return a landmark's likeliest depth and its variance about it, and both by its own ranges alone.
+
+    The variance includes what other depths are possible. By its own ranges alone, the landmark is taken to have the
+    likeliest of these: that is what neighbours are told, or errors would go round among them and be counted again and
+    again.
 
     Parameters
     ----------
@@ -154,50 +161,65 @@ def estimate(
         As for :func:`take_range`.
     around : depth and scale
         Of the landmarks round about; an infinite scale where none is known.
-    alike : float
-        Differences from them that are no less likely than none: neighbours say which possibility is the true one, not
-        how deep the landmark is to a hair, or errors would go round among them and be counted again and again.
     """
     lowest, spacing = grid
-    density = np.empty(CELLS)
+    own, density = np.empty(CELLS), np.empty(CELLS)
     best, mode = -np.inf, 0
     for c in range(CELLS):
-        off = max(abs(lowest + c * spacing - around[0]) - alike, 0.0) / around[1]
-        density[c] = fit[c] + np.log(np.exp(-steepness[c] / TYPICAL_SLOPE) + STEEP)
-        density[c] -= 0.5 * (FREEDOM + 1.0) * np.log1p(off * off / FREEDOM)
+        off = (lowest + c * spacing - around[0]) / around[1]
+        own[c] = fit[c] + np.log(np.exp(-steepness[c] / TYPICAL_SLOPE) + STEEP)
+        density[c] = own[c] - 0.5 * (FREEDOM + 1.0) * np.log1p(off * off / FREEDOM)
         if density[c] > best:
             best, mode = density[c], c
-    total = 0.0
     for c in range(CELLS):
         density[c] = np.exp(density[c] - best)
-        total += density[c]
     first, last = mode, mode
     while first > 0 and density[first - 1] > RAISED:
         first -= 1
     while last < CELLS - 1 and density[last + 1] > RAISED:
         last += 1
-    mass, moment = 0.0, 0.0
-    for c in range(first, last + 1):
-        mass += density[c]
-        moment += density[c] * c
-    middle = moment / mass
-    spread = 0.0
+    middle, _ = _moments(density[first : last + 1])
+    middle += first
+    total, spread = 0.0, 0.0
     for c in range(CELLS):
+        total += density[c]
         spread += density[c] * (c - middle) ** 2
+    alone = own[first : last + 1]
+    own_middle, own_spread = _moments(np.exp(alone - alone.max()))
     # Where a depth lies between two cells is not known.
-    return lowest + middle * spacing, max(spread / total, 1.0 / 12.0) * spacing * spacing
+    return (
+        lowest + middle * spacing,
+        max(spread / total, 1.0 / 12.0) * spacing * spacing,
+        lowest + (first + own_middle) * spacing,
+        max(own_spread, 1.0 / 12.0) * spacing * spacing,
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def from_neighbours(depth: FloatArray, variance: FloatArray, apart: FloatArray, sure_m: float) -> tuple[float, float]:
+def _moments(density: FloatArray) -> tuple[float, float]:
+    """Return mean and variance of the number of a cell, of densities (k,)."""
+    total, first, second = 0.0, 0.0, 0.0
+    for c in range(len(density)):
+        total += density[c]
+        first += density[c] * c
+        second += density[c] * c * c
+    mean = first / total
+    return mean, max(second / total - mean * mean, 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def from_neighbours(
+    depth: FloatArray, variance: FloatArray, apart: FloatArray, known: BoolArray
+) -> tuple[float, float]:
     """Return the depth that neighbours (k,) suggest and the scale by which it may differ; infinite where none does.
 
-    ``apart`` (k,) are their horizontal distances; neighbours whose deviation is ``sure_m`` or more say nothing.
+    Together they count as one: what lies between them and the landmark is much the same for all. Those count that are
+    ``known`` (k,); ``depth`` and ``variance`` are by their own ranges alone, ``apart`` (k,) their horizontal distances.
     """
     weights, depths, count = 0.0, 0.0, 0
     for k in range(len(depth)):
-        if variance[k] < sure_m * sure_m and np.isfinite(apart[k]):
-            weight = 1.0 / max((TYPICAL_SLOPE * apart[k]) ** 2 + variance[k], NEAREST_M**2)
+        if known[k]:
+            weight = 1.0 / max((TYPICAL_STEP * apart[k]) ** 2 + variance[k], NEAREST_M**2)
             weights += weight
             depths += weight * depth[k]
             count += 1

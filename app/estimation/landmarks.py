@@ -15,7 +15,7 @@ NEIGHBOURS = 8
 """Landmarks round about that tell which of its possible depths a landmark has."""
 
 SURE = 3.0
-"""Deviations, in those that are asked for, below which neighbours tell; so far apart they are taken to be alike."""
+"""Deviations, in those that are asked for, below which a landmark is known well enough to tell of its neighbours."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class DepthGrids:
         Logarithm of the likelihood, 0 at the best depth.
     steepness : (n, CELLS)
         Slope by which the floor must rise from where a vehicle was to reach that depth.
+    own_depth_m, own_variance_m2 : (n,)
+        Depth and variance by the landmark's own ranges alone.
     neighbours, apart_m : (n, NEIGHBOURS)
         The landmarks round about and their distances; infinite where there are fewer.
     """
@@ -38,6 +40,8 @@ class DepthGrids:
     spacing_m: FloatArray
     fit: NDArray[np.float32]
     steepness: NDArray[np.float32]
+    own_depth_m: FloatArray
+    own_variance_m2: FloatArray
     neighbours: IntArray
     apart_m: FloatArray
 
@@ -55,19 +59,24 @@ class DepthGrids:
             others[others.all(axis=1), -1] = False
             apart[:, :count] = distance[others].reshape(n, count)
             neighbours[:, :count] = index[others].reshape(n, count)
-        return cls(np.zeros(n), np.zeros(n), blank, blank.copy(), neighbours, apart)
+        return cls(np.zeros(n), np.zeros(n), blank, blank.copy(), np.zeros(n), np.zeros(n), neighbours, apart)
 
-    def with_ranges(
+    def copy(self) -> "DepthGrids":
+        """Return grids that can be changed; neighbours stay what they are."""
+        return DepthGrids(
+            self.lowest_m.copy(), self.spacing_m.copy(), self.fit.copy(), self.steepness.copy(),
+            self.own_depth_m.copy(), self.own_variance_m2.copy(), self.neighbours, self.apart_m,
+        )  # fmt: skip
+
+    def take(
         self, xy_m: FloatArray, position: FloatArray, index: IntArray, ranges: FloatArray, sensor: Ranging
-    ) -> "DepthGrids":
-        """Return grids that have taken in ranges (k,) from ``position`` (3,) to the landmarks ``index`` (k,)."""
-        lowest, spacing, fit, steepness = (
-            rows.copy() for rows in (self.lowest_m, self.spacing_m, self.fit, self.steepness)
-        )
-        h2 = ((xy_m[index] - position[:2]) ** 2).sum(axis=1)
-        below = not isinstance(sensor, RangeSensor)
-        _take(lowest, spacing, fit, steepness, index, h2, float(position[2]), ranges, sensor.relative_noise, below)
-        return replace(self, lowest_m=lowest, spacing_m=spacing, fit=fit, steepness=steepness)
+    ) -> None:
+        """Take in, in place, ranges (k,) from ``position`` (3,) to the landmarks ``index`` (k,)."""
+        _take(
+            self.lowest_m, self.spacing_m, self.fit, self.steepness, index,
+            ((xy_m[index] - position[:2]) ** 2).sum(axis=1), float(position[2]), ranges, sensor.relative_noise,
+            not isinstance(sensor, RangeSensor),
+        )  # fmt: skip
 
     def beside(self, index: IntArray, wanted: BoolArray) -> IntArray:
         """Return which of the ``wanted`` landmarks (n,) have neighbours among ``index`` (k,) but are not among them."""
@@ -77,17 +86,18 @@ class DepthGrids:
         near = looked_at[self.neighbours[candidates]] & np.isfinite(self.apart_m[candidates])
         return candidates[near.any(axis=1)]
 
-    def estimates(
-        self, index: IntArray, depth_m: FloatArray, variance_m2: FloatArray, sure_m: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return depths and variances (k,) of the landmarks ``index`` (k,).
+    def estimates(self, index: IntArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Return depths and variances (k,) of the landmarks ``index`` (k,) beside neighbours that are ``known`` (n,).
 
-        ``depth_m`` and ``variance_m2`` (n,) is what is known of neighbours, which tell when surer than ``sure_m``.
+        What these are by their own ranges alone is noted in place, after all neighbours were asked.
         """
-        return _estimates(
+        around = known[self.neighbours[index]] & np.isfinite(self.apart_m[index])
+        depth, variance, own_depth, own_variance = _estimates(
             self.lowest_m, self.spacing_m, self.fit, self.steepness, index, self.neighbours, self.apart_m,
-            depth_m, variance_m2, sure_m,
+            self.own_depth_m, self.own_variance_m2, around,
         )  # fmt: skip
+        self.own_depth_m[index], self.own_variance_m2[index] = own_depth, own_variance
+        return depth, variance
 
 
 @dataclass(frozen=True)
@@ -178,15 +188,16 @@ class LandmarkEstimator:
         ranges : (k,)
             The noisy ranges.
         """
-        sure_m = SURE * self.accuracy_sd_m
-        grids = landmarks.grids.with_ranges(landmarks.xy_m, np.asarray(position), index, ranges, self.sensor)
+        sure = (SURE * self.accuracy_sd_m) ** 2
+        grids = landmarks.grids.copy()
+        grids.take(landmarks.xy_m, np.asarray(position), index, ranges, self.sensor)
         depth_m, variance_m2 = landmarks.depth_m.copy(), landmarks.variance_m2.copy()
         looks, accurate, credited = landmarks.looks.copy(), landmarks.accurate.copy(), landmarks.credited.copy()
         looks[index] += 1
         # Neighbours count as they were known before the look, in whatever order the landmarks stand.
-        depth_m[index], variance_m2[index] = grids.estimates(index, landmarks.depth_m, landmarks.variance_m2, sure_m)
+        depth_m[index], variance_m2[index] = grids.estimates(index, landmarks.variance_m2 < sure)
         beside = grids.beside(index, (looks > 0) & ~accurate)
-        depth_m[beside], variance_m2[beside] = grids.estimates(beside, depth_m, variance_m2, sure_m)
+        depth_m[beside], variance_m2[beside] = grids.estimates(beside, variance_m2 < sure)
         judged = np.concatenate([index, beside])
         done = (variance_m2[judged] < self.accuracy_sd_m**2) | (looks[judged] > self.visit_cap)
         fresh = judged[done & ~accurate[judged]]
@@ -234,17 +245,23 @@ def _estimates(
     index: IntArray,
     neighbours: IntArray,
     apart: FloatArray,
-    depth: FloatArray,
-    variance: FloatArray,
-    sure: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Return depths and variances (k,) of the landmarks ``index`` beside neighbours of such depths and variances."""
+    own_depth: FloatArray,
+    own_variance: FloatArray,
+    known: BoolArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return depths and variances (k,) of the landmarks ``index``, and both by their own ranges alone.
+
+    ``known`` (k, NEIGHBOURS) are the neighbours that count.
+    """
     depths, variances = np.empty(len(index)), np.empty(len(index))
+    own_depths, own_variances = np.empty(len(index)), np.empty(len(index))
     for k in range(len(index)):
-        m = index[k]
-        around = from_neighbours(depth[neighbours[m]], variance[neighbours[m]], apart[m], sure)
-        depths[k], variances[k] = estimate(fit[m], steepness[m], (lowest[m], spacing[m]), around, sure)
-    return depths, variances
+        m, near = index[k], neighbours[index[k]]
+        around = from_neighbours(own_depth[near], own_variance[near], apart[m], known[k])
+        depths[k], variances[k], own_depths[k], own_variances[k] = estimate(
+            fit[m], steepness[m], (lowest[m], spacing[m]), around
+        )
+    return depths, variances, own_depths, own_variances
 
 
 @dataclass(frozen=True)
