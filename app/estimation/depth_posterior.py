@@ -38,8 +38,8 @@ STEEP = 1e-4
 FREEDOM = 4.0
 """Degrees of freedom of Student's distribution of what lies between neighbours: steps and walls are not rare."""
 
-RAISED = 1e-3
-"""Density, of the greatest, down to which depths belong to the estimate and not to another possibility."""
+LEAST = -7.0
+"""Logarithm of the density, of the greatest, down to which depths belong to the estimate and not to another one."""
 
 NEAREST_M = 1e-9
 
@@ -168,43 +168,44 @@ def estimate(
     for c in range(CELLS):
         off = (lowest + c * spacing - around[0]) / around[1]
         own[c] = fit[c] + np.log(np.exp(-steepness[c] / TYPICAL_SLOPE) + STEEP)
-        density[c] = own[c] - 0.5 * (FREEDOM + 1.0) * np.log1p(off * off / FREEDOM)
+        # Scaled so that close by it says as much as a normal distribution of that scale, no more.
+        density[c] = own[c] - 0.5 * (FREEDOM + 1.0) * np.log1p(off * off / (FREEDOM + 1.0))
         if density[c] > best:
             best, mode = density[c], c
-    for c in range(CELLS):
-        density[c] = np.exp(density[c] - best)
-    first, last = mode, mode
-    while first > 0 and density[first - 1] > RAISED:
-        first -= 1
-    while last < CELLS - 1 and density[last + 1] > RAISED:
-        last += 1
-    middle, _ = _moments(density[first : last + 1])
-    middle += first
+    middle, _ = _moments(density, mode)
+    own_middle, own_spread = _moments(own, mode)
     total, spread = 0.0, 0.0
     for c in range(CELLS):
-        total += density[c]
-        spread += density[c] * (c - middle) ** 2
-    alone = own[first : last + 1]
-    own_middle, own_spread = _moments(np.exp(alone - alone.max()))
+        weight = np.exp(density[c] - best)
+        total += weight
+        spread += weight * (c - middle) ** 2
     # Where a depth lies between two cells is not known.
     return (
         lowest + middle * spacing,
         max(spread / total, 1.0 / 12.0) * spacing * spacing,
-        lowest + (first + own_middle) * spacing,
+        lowest + own_middle * spacing,
         max(own_spread, 1.0 / 12.0) * spacing * spacing,
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _moments(density: FloatArray) -> tuple[float, float]:
-    """Return mean and variance of the number of a cell, of densities (k,)."""
-    total, first, second = 0.0, 0.0, 0.0
-    for c in range(len(density)):
-        total += density[c]
-        first += density[c] * c
-        second += density[c] * c * c
-    mean = first / total
-    return mean, max(second / total - mean * mean, 0.0)
+def _moments(density: FloatArray, mode: int) -> tuple[float, float]:
+    """Return mean and variance of the number of a cell, of the logarithms of densities (CELLS,) joined to ``mode``."""
+    first, last, best = mode, mode, density[mode]
+    while first > 0 and density[first - 1] > best + LEAST:
+        first -= 1
+        best = max(best, density[first])
+    while last < CELLS - 1 and density[last + 1] > best + LEAST:
+        last += 1
+        best = max(best, density[last])
+    total, once, twice = 0.0, 0.0, 0.0
+    for c in range(first, last + 1):
+        weight = np.exp(density[c] - best)
+        total += weight
+        once += weight * (c - mode)
+        twice += weight * (c - mode) ** 2
+    mean = once / total
+    return mode + mean, max(twice / total - mean * mean, 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -213,16 +214,18 @@ def from_neighbours(
 ) -> tuple[float, float]:
     """Return the depth that neighbours (k,) suggest and the scale by which it may differ; infinite where none does.
 
-    Together they count as one: what lies between them and the landmark is much the same for all. Those count that are
-    ``known`` (k,); ``depth`` and ``variance`` are by their own ranges alone, ``apart`` (k,) their horizontal distances.
+    Those count that are ``known`` (k,); ``depth`` and ``variance`` are by their own ranges alone, so these errors even
+    out; what lies between them and the landmark does not, it is much the same for all. ``apart`` (k,) are distances.
     """
-    weights, depths, count = 0.0, 0.0, 0
+    weights, depths, noise, ground = 0.0, 0.0, 0.0, 0.0
     for k in range(len(depth)):
         if known[k]:
-            weight = 1.0 / max((TYPICAL_STEP * apart[k]) ** 2 + variance[k], NEAREST_M**2)
+            step = (TYPICAL_STEP * apart[k]) ** 2
+            weight = 1.0 / max(step + variance[k], NEAREST_M**2)
             weights += weight
             depths += weight * depth[k]
-            count += 1
-    if count == 0:
+            noise += weight * weight * variance[k]
+            ground += weight * step
+    if weights == 0.0:
         return 0.0, np.inf
-    return depths / weights, np.sqrt(count / weights)
+    return depths / weights, np.sqrt(noise / (weights * weights) + ground / weights)

@@ -135,7 +135,8 @@ def _compared(runs: Sequence[dict[str, Any]], steps: int) -> str:
     return (
         f"NEES {nees[0].mean():.2f}, {nees[0].min():.2f} to {nees[0].max():.2f} (least squares {nees[1].mean():.1f});"
         f" within 0.02 {within[0].mean():.1f} % ({within[1].mean():.1f});"
-        f" t99 {t99[0].mean():.1f} ({t99[1].mean():.1f}), ratio {t99[0].sum() / t99[1].sum():.3f} +- {se:.3f}, {n} runs;"
+        f" t99 {t99[0].mean():.1f} ({t99[1].mean():.1f}), ratio {t99[0].sum() / t99[1].sum():.3f} +- {se:.3f},"
+        f" {n} runs;"
         f" left {left[0].mean():.2f} % ({left[1].mean():.2f})"
     )
 

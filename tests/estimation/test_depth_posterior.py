@@ -1,7 +1,5 @@
 """The posterior of a landmark's depth: against all ranges at once on a fine grid, and against the truth."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +8,7 @@ from scipy import stats
 
 from app.arrays import FloatArray
 from app.estimation import LandmarkEstimator, Landmarks, Multibeam, RangeSensor
-from app.estimation.depth_posterior import FREEDOM, STEEP, TYPICAL_SLOPE, from_neighbours
+from app.estimation.depth_posterior import STEEP, TYPICAL_SLOPE, TYPICAL_STEP, from_neighbours
 from app.estimation.sensors import Ranging
 
 SENSOR = RangeSensor(visibility_m=0.4, relative_noise=0.1)
@@ -102,25 +100,52 @@ def test_beams_that_look_down_know_that_the_landmark_is_below() -> None:
     assert np.sqrt(state.variance_m2[0]) == pytest.approx(0.02 * 0.2 / np.sqrt(10), rel=0.1)
 
 
-def test_neighbours_tell_which_of_two_depths_it_is_and_do_not_move_it() -> None:
-    """One landmark ranged to from one depth alone, beside one that is known: below, above, or not at all."""
+def test_neighbours_tell_which_of_two_depths_it_is() -> None:
+    """One landmark ranged to from one depth alone, beside one that is known: below the vehicle, or above."""
     rng = np.random.default_rng(7)
     xy = np.array([[0.0, 0.0], [0.05, 0.0]])
     level = sight(np.array([[0.0, 0.0, 0.65]]), np.tile([0.2, 0.0, 0.5], (60, 1)), rng)
-    found: dict[float, Any] = {}
+    alone = taken(xy[:1], level)
     for known in (0.65, 0.35):
         truth = np.array([[0.05, 0.0, known]])
         state, estimator = Landmarks.unknown(xy), LandmarkEstimator(SENSOR)
         for position in np.column_stack([rng.uniform(0.0, 0.1, (60, 2)), rng.uniform(0.1, 0.2, 60)]):
-            y = SENSOR.measure(position, truth, rng)
-            state = estimator.update(state, 0, position, np.array([1]), y)
+            state = estimator.update(state, 0, position, np.array([1]), SENSOR.measure(position, truth, rng))
         for position, ranges in level:
             state = estimator.update(state, 0, position, np.array([0]), ranges)
-        found[known] = state
-    alone = taken(xy[:1], level)
-    assert found[0.65].variance_m2[0] < 0.5 * alone.variance_m2[0]
-    assert found[0.65].depth_m[0] == pytest.approx(alone.depth_m[0], abs=2e-3)
-    assert found[0.35].depth_m[0] == pytest.approx(1.0 - alone.depth_m[0], abs=2e-3)
+        assert state.variance_m2[0] < 0.5 * alone.variance_m2[0]
+        assert abs(state.depth_m[0] - known) < 0.03
+
+
+def test_what_is_found_out_beside_a_landmark_settles_it_without_another_look() -> None:
+    rng = np.random.default_rng(8)
+    truth = np.array([[0.0, 0.0, 0.65], [0.05, 0.0, 0.65]])
+    state, estimator = Landmarks.unknown(truth[:, :2]), LandmarkEstimator(SENSOR)
+    for position, ranges in sight(truth[:1], np.tile([0.2, 0.0, 0.5], (200, 1)), rng):
+        state = estimator.update(state, 0, position, np.array([0]), ranges)
+    before = state
+    for position in np.column_stack([rng.uniform(0.0, 0.1, (200, 2)), rng.uniform(0.35, 0.45, 200)]):
+        state = estimator.update(state, 1, position, np.array([1]), SENSOR.measure(position, truth[1:], rng))
+    assert state.variance_m2[0] < 0.5 * before.variance_m2[0]
+    assert state.looks[0] == before.looks[0]
+    assert abs(state.depth_m[0] - 0.65) < 3.0 * np.sqrt(state.variance_m2[0])
+
+
+def test_landmarks_that_tell_each_other_do_not_talk_themselves_into_certainty() -> None:
+    """Many landmarks at nearly one place: each other's news may be worth as much as their own ranges, and no more."""
+    rng = np.random.default_rng(9)
+    n = 9
+    truth = np.column_stack([rng.uniform(-1e-4, 1e-4, (n, 2)), np.full(n, 0.65)])
+    state = taken(truth[:, :2], sight(truth, np.column_stack([np.zeros((4, 2)), np.full(4, 0.45)]), rng))
+    own = 1.0 / state.grids.own_variance_m2
+    for _ in range(30):  # nothing new is measured, but everybody asks everybody
+        state = LandmarkEstimator(SENSOR).update(
+            state, 0, np.array([0.0, 0.0, 0.4]), np.zeros(0, dtype=np.int64), np.zeros(0)
+        )
+        depth, variance = state.grids.estimates(np.arange(n), np.ones(n, dtype=np.bool_))
+    assert (1.0 / variance <= 1.3 * own.sum()).all()
+    np.testing.assert_allclose(1.0 / state.grids.own_variance_m2, own, rtol=0.1)
+    assert np.isfinite(depth).all()
 
 
 @given(seed=st.integers(0, 1000), n=st.integers(1, 8))
@@ -128,15 +153,16 @@ def test_neighbours_tell_which_of_two_depths_it_is_and_do_not_move_it() -> None:
 def test_neighbours_count_by_distance_and_deviation(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     depth, sd, apart = rng.uniform(0.2, 1.0, n), rng.uniform(0.001, 0.1, n), rng.uniform(0.01, 0.3, n)
-    told, scale = from_neighbours(depth, sd**2, apart, 0.06)
-    sure = sd < 0.06
-    if not sure.any():
+    known = rng.random(n) < 0.7
+    told, scale = from_neighbours(depth, sd**2, apart, known)
+    if not known.any():
         assert np.isinf(scale)
         return
-    variance = (TYPICAL_SLOPE * apart[sure]) ** 2 + sd[sure] ** 2
-    assert told == pytest.approx(np.average(depth[sure], weights=1.0 / variance))
-    assert scale == pytest.approx(np.sqrt(stats.hmean(variance)))
-    assert FREEDOM < 10.0  # heavy tails, or a step beside a landmark would move it
+    ground, noise = np.diag((TYPICAL_STEP * apart[known]) ** 2), np.diag(sd[known] ** 2)
+    weights = 1.0 / np.diag(ground + noise)
+    weights /= weights.sum()
+    assert told == pytest.approx(weights @ depth[known])
+    assert scale == pytest.approx(np.sqrt(weights @ noise @ weights + np.trace(ground * weights)))
 
 
 def test_landmarks_at_one_place_and_a_landmark_alone_have_neighbours_as_far_as_there_are() -> None:

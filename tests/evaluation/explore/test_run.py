@@ -3,6 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.estimation import RangeSensor
 from app.evaluation.explore.run import ExploreRun, run_explore
 from app.evaluation.explore.team_changes import TeamSchedule
 from app.evaluation.explore.world import CubeTerrain, ExploreScenario, World
@@ -121,6 +122,17 @@ def test_who_has_a_plan_finishes_whatever_happens_and_hardly_breaks_a_limit(
     result = run_explore(scenario, planner, PlannerOptions(rollouts=100))
     assert result.t99 is not None
     assert result.broken_constraints <= 0.04 * scenario.robots * scenario.steps
+
+
+def test_what_is_claimed_of_done_landmarks_holds_beside_walls_too() -> None:
+    walls = generate("canyon", 2, width_m=80.0, height_m=80.0)
+    flown = run(walls, "lawnmower", steps=150)
+    assert flown.done_nees is not None
+    assert flown.done_within_pct is not None
+    assert 0.6 < flown.done_nees < 1.5
+    assert flown.done_within_pct > 90.0
+    blind = ExploreScenario(walls, landmarks=30, steps=1, sensor=RangeSensor(visibility_m=1e-6))
+    assert run_explore(blind, "random", PlannerOptions()).done_nees is None
 
 
 def test_rollouts_finish_before_the_lawnmower(smooth: Terrain) -> None:
