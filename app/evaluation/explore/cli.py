@@ -150,7 +150,7 @@ def explore(
                 raise typer.BadParameter(str(error)) from None
             runs.append(ExploreJob(scenario, name, options))
 
-    columns = ("planner", "seed", "remaining_pct", "t99", "done_nees", "broken_constraints", "plan_ms_median")
+    columns = ("planner", "seed", "remaining_pct", "t99", "broken_constraints", "plan_ms_median")
     compare(runs, columns, jobs, scheduler, as_json=as_json)
 
 
