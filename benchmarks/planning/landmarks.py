@@ -161,6 +161,7 @@ def main() -> None:
         task = bar.add_task("landmarks", total=len(jobs))
         for run in run_jobs(jobs, given.jobs, lambda job, step: bar.update(task, description=job.title)):
             runs.append(run)
+            bar.console.print_json(data=run, indent=None)
             bar.advance(task)
     found = figures(runs, given.steps)
     print("\n".join(f"{name}: {value}" for name, value in found.items()))
