@@ -54,7 +54,7 @@ class DepthGrids:
         count = min(NEIGHBOURS, n - 1)
         if count > 0:
             # Of landmarks at one place, any may come first: the row's own number is left out, not the first column.
-            distance, index = cKDTree(xy_m).query(xy_m, k=count + 1)
+            distance, index = (np.asarray(found) for found in cKDTree(xy_m).query(xy_m, k=count + 1))
             others = index != np.arange(n)[:, None]
             others[others.all(axis=1), -1] = False
             apart[:, :count] = distance[others].reshape(n, count)
