@@ -12,7 +12,7 @@ from app.estimation.depth_posterior import CELLS, estimate, from_neighbours, lay
 from app.estimation.sensors import RangeSensor, Ranging
 
 NEIGHBOURS = 8
-"""Landmarks round about that tell which of its possible depths a landmark has."""
+"""Landmarks round about that tell of a landmark's depth, the closest ones."""
 
 SURE = 3.0
 """Deviations, in those that are asked for, below which a landmark is known well enough to tell of its neighbours."""
