@@ -1,13 +1,13 @@
 """Whether what is claimed of landmarks holds in the papers' scenario, and what holding it costs the planner's finish.
 
     python -m benchmarks.planning.landmarks [--terrains FOLDER] [--seeds 0 2 4] [--only NAME,...] [--planners NAME,...]
-        [--steps 300] [--jobs 1] [--write]
+        [--steps 300] [--jobs 1] [--runs FILE] [--write]
 
 Each run is flown twice: with our estimator, and with the papers' weighted least squares, which presumes landmarks below
 the vehicles. NEES is the mean squared error over its variance of landmarks that count as done at the end, 1 where
 claims hold; *within 0.02* is the share of them whose depth is within the deviation that counts as done (68 % at that
 very deviation, more as looks go on). t99 is the step at which 99 % are done. Generated floors are drawn by the run's
-seed.
+seed. Runs that ``--runs`` holds are not flown again, and others are added to it.
 """
 
 from collections.abc import Sequence
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import orjson
 from rich.progress import Progress as ProgressBar
 
 from app.arrays import FloatArray, IntArray
@@ -69,6 +70,11 @@ class LandmarkJob:
     def title(self) -> str:
         """What it is, for the progress bar."""
         return f"{self.scenario.terrain.name}, seed {self.scenario.seed}, {self.planner}, {self.estimator}"
+
+    @property
+    def key(self) -> tuple[str, int, str, str]:
+        """What tells it from others."""
+        return self.scenario.terrain.name, self.scenario.seed, self.planner, self.estimator
 
     @property
     def steps(self) -> int:
@@ -131,11 +137,11 @@ def _compared(runs: Sequence[dict[str, Any]], steps: int) -> str:
         for name in ("nees", "within", "left")
     )
     n = len(t99[0])
-    se = float((t99[0] - t99[1]).std(ddof=1) / np.sqrt(n) / t99[1].mean()) if n > 1 else np.nan
+    se = f" +- {(t99[0] - t99[1]).std(ddof=1) / np.sqrt(n) / t99[1].mean():.3f}" if n > 1 else ""
     return (
         f"NEES {nees[0].mean():.2f}, {nees[0].min():.2f} to {nees[0].max():.2f} (least squares {nees[1].mean():.1f});"
         f" within 0.02 {within[0].mean():.1f} % ({within[1].mean():.1f});"
-        f" t99 {t99[0].mean():.1f} ({t99[1].mean():.1f}), ratio {t99[0].sum() / t99[1].sum():.3f} +- {se:.3f},"
+        f" t99 {t99[0].mean():.1f} ({t99[1].mean():.1f}), ratio {t99[0].sum() / t99[1].sum():.3f}{se},"
         f" {n} runs;"
         f" left {left[0].mean():.2f} % ({left[1].mean():.2f})"
     )
@@ -153,20 +159,28 @@ def main() -> None:
     parser.add_argument("--planners", default="rollout", help="planners, separated by commas")
     parser.add_argument("--steps", type=int, default=300)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--runs", type=Path, help="file of runs that were flown before, a JSON object a line")
     given = parser.parse_args()
     only = [name for name in given.only.split(",") if name]
     jobs = landmark_jobs(given.terrains, given.seeds, given.planners.split(","), given.steps, only)
-    runs = []
+    flown = given.runs.read_bytes().splitlines() if given.runs is not None and given.runs.exists() else []
+    before = {(run["terrain"], run["seed"], run["planner"], run["estimator"]): run for run in map(orjson.loads, flown)}
+    open_ = [job for job in jobs if job.key not in before]
+    runs = [before[job.key] for job in jobs if job.key in before]
     with ProgressBar() as bar:
-        task = bar.add_task("landmarks", total=len(jobs))
-        for run in run_jobs(jobs, given.jobs, lambda job, step: bar.update(task, description=job.title)):
+        task = bar.add_task("landmarks", total=len(open_))
+        for run in run_jobs(open_, given.jobs, lambda job, step: bar.update(task, description=job.title)):
             runs.append(run)
-            bar.console.print_json(data=run, indent=None)
+            if given.runs is not None:
+                with given.runs.open("ab") as file:
+                    file.write(orjson.dumps(run) + b"\n")
             bar.advance(task)
     found = figures(runs, given.steps)
     print("\n".join(f"{name}: {value}" for name, value in found.items()))
     title = f"Landmarks that count as done: {given.planners}"
-    write_section(given.write, LANDMARKS, title, found, seeds=given.seeds, hidden={given.terrains: "FOLDER"})
+    write_section(
+        given.write, LANDMARKS, title, found, seeds=given.seeds, hidden={given.terrains: "FOLDER", given.runs: "FILE"}
+    )
 
 
 if __name__ == "__main__":
