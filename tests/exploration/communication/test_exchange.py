@@ -237,8 +237,8 @@ def test_a_vehicle_out_of_reach_is_no_neighbour() -> None:
 
 
 def test_what_must_have_been_measured_is_presumed_until_told_or_too_long_ago() -> None:
-    fleet = Fleet(7, vehicles=1, capacity=2)
-    for k in range(30):
+    fleet = Fleet(7, vehicles=1, capacity=2, n=240)
+    for k in range(15):
         fleet.positions[0][2] = 0.3 + 0.06 * np.sin(k)  # from one depth alone, nobody knows what lies above it
         fleet.sense()
         fleet.exchange()
