@@ -31,7 +31,8 @@ from app.compute.compute import Compute
 from app.compute.settings import ComputeSettings
 from app.missions.fleet.interface import LinkCapabilities
 from app.missions.forecast.request import starts_of
-from app.missions.forecast.simulate import Flown, floors_under, fly_over
+from app.missions.forecast.simulate import floors_under, fly_over
+from app.missions.forecast.swarm import Flown
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.work_processes import WorkProcesses
 from app.missions.spec.mission import MissionSpec

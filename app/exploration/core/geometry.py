@@ -90,9 +90,47 @@ def crosses_boundary(polygon: FloatArray, ax: float, ay: float, bx: float, by: f
 
 
 @njit(cache=True, nogil=True)
+def _apart(polygon: FloatArray, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether the segment a-b lies beside the rectangle round the polygon."""
+    return bool(
+        max(ax, bx) < polygon[:, 0].min()
+        or min(ax, bx) > polygon[:, 0].max()
+        or max(ay, by) < polygon[:, 1].min()
+        or min(ay, by) > polygon[:, 1].max()
+    )
+
+
+@njit(cache=True, nogil=True)
+def _deep_between_crossings(polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> bool:
+    """Whether the segment a-b, parted by the edges that it crosses, has a piece deeper inside than ``tolerance``.
+
+    Who is on the boundary by all but a rounding error crosses it where it leaves, and is inside of nothing.
+    """
+    n = polygon.shape[0]
+    at = np.empty(n + 2)
+    at[0], at[1], count = 0.0, 1.0, 2
+    j = n - 1
+    for i in range(n):
+        cx, cy, dx, dy = polygon[j, 0], polygon[j, 1], polygon[i, 0], polygon[i, 1]
+        if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+            before, after = _side(cx, cy, dx, dy, ax, ay), _side(cx, cy, dx, dy, bx, by)
+            at[count] = before / (before - after)
+            count += 1
+        j = i
+    found = np.sort(at[:count])
+    for k in range(1, count):
+        t = 0.5 * (found[k - 1] + found[k])
+        if signed_distance(polygon, ax + t * (bx - ax), ay + t * (by - ay)) < -tolerance:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def enters(polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> bool:
     """Whether the segment a-b runs through the polygon's inside, deeper than ``tolerance``."""
-    if crosses_boundary(polygon, ax, ay, bx, by):
+    if _apart(polygon, ax, ay, bx, by):
+        return False
+    if crosses_boundary(polygon, ax, ay, bx, by) and _deep_between_crossings(polygon, ax, ay, bx, by, tolerance):
         return True
     # A segment through two vertices, or with an end on the boundary, crosses no edge properly: look at its middle.
     for k in range(1, 8):

@@ -197,6 +197,11 @@ class FreeSpace:
         self._corners = np.zeros((0, 2)) if self._open else _corners(self.region)
         self._links = self._visibility(self._corners)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether every place of it is seen from every other one."""
+        return self._open
+
     def _sees(self, place: FloatArray, others: FloatArray) -> BoolArray:
         """Return which of ``others`` (n, 2) a straight leg from ``place`` (2,) reaches."""
         if self._open:

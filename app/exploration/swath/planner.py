@@ -7,11 +7,12 @@ import numpy as np
 from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.coverage import SwathTask
+from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import FreeSpace
 from app.exploration.lines.lattice import longer_axis_rad
 from app.exploration.planner.base import PlannerBase, settle
+from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 
@@ -20,6 +21,9 @@ LEG_WIDTHS = 1.0
 
 SHORTEST_LEG = 0.5
 """Legs along a line are at least this part of the longest that a vehicle may be given."""
+
+STILL_M, MOST_BARRED = 0.05, 5
+"""Shorter legs lead nowhere; after so many lines that begin with one there is none for now."""
 
 GUESSED_ALTITUDE_M = 5.0
 """How high above the bottom vehicles are taken to be as long as no depth is known."""
@@ -39,12 +43,15 @@ class SwathPlanner(PlannerBase):
         self._survey: SwathSurvey | None = None
         self._kept: dict[str, Any] | None = None
         self._free: FreeSpace | None = None
+        self._barred: BarredGround | None = None
+        self._sighted: tuple[Coverage, Flying, Coverage] | None = None
+        """What was to be seen, how, and what of it can be: the same for the same question."""
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         task = team.swath
         if task is None:
             return Proposal(team.positions.copy(), 0.0, done=frozenset(team.vehicles))
-        survey = self._begun(team, task)
+        self._begin(team, task)
         wish = team.positions[:, :2].copy()
         poses = {
             name: np.array([*team.positions[i, :2], team.headings_rad[i]])
@@ -57,23 +64,39 @@ class SwathPlanner(PlannerBase):
             if not team.moves[i] or name in done:
                 continue
             flying = self._flying(team, name, task)
-            end = survey.next_leg(
-                name,
-                poses[name],
-                flying,
-                task.coverage,
-                poses,
-                self._leg_m(team, i, bottom, flying),
-                team.constraints.max_step_m,
-            )
+            coverage = self._within_sight(team, task, flying)
+            end = self._next_end(name, poses, flying, coverage, self._leg_m(team, i, bottom, flying), team)
             if end is None:
                 done.add(name)
                 continue
-            space = self._space(team)
-            wish[i] = space.way(team.positions[i, :2], space.nearest(end))[0]
+            wish[i] = end
         positions, _ = settle(team, bottom, self._at_cruise(team, bottom, wish)[None])
         left_pct = 100.0 * float(task.coverage.left.sum()) / max(int(task.coverage.wanted.sum()), 1)
         return Proposal(positions, 0.0, {"left_pct": left_pct}, done=frozenset(done))
+
+    def _next_end(
+        self,
+        name: str,
+        poses: dict[str, FloatArray],
+        flying: Flying,
+        coverage: Coverage,
+        leg_m: float,
+        team: Situation,
+    ) -> FloatArray | None:
+        """Return where a vehicle goes next, (2,); None when nothing is left for it."""
+        survey, space, here = self._survey, self._space(team), poses[name][:2]
+        if survey is None:
+            raise ValueError("the survey has not begun")
+        for _ in range(MOST_BARRED):
+            end = survey.next_leg(name, poses[name], flying, coverage, poses, leg_m, team.constraints.max_step_m)
+            if end is None:
+                return None
+            way = space.way(here, space.nearest(end))[0]
+            if np.hypot(*(way - here)) > STILL_M:
+                return np.asarray(way)
+            # It would stay where it is for ever: it gets another line.
+            survey.skip_line(name, here)
+        return None
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`; lines are found anew in what is left."""
@@ -84,16 +107,25 @@ class SwathPlanner(PlannerBase):
         """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
         return self._survey is not None and self._survey.skip_line(vehicle, here_m)
 
-    def _begun(self, team: Situation, task: SwathTask) -> SwathSurvey:
+    def _begin(self, team: Situation, task: SwathTask) -> None:
         if self._survey is None:
             altitude_m = max(GUESSED_ALTITUDE_M, team.constraints.min_altitude_m)
             guess_m = float(np.median(list(self._cruise.values()))) + altitude_m
             along_rad = longer_axis_rad(team.constraints.area)
-            self._survey = SwathSurvey(along_rad, task.coverage.cell_m, guess_m, task.crosslines)
+            self._survey = SwathSurvey(along_rad, task.coverage.cell_m, guess_m, task.crosslines, self._space(team))
             if self._kept is not None:
                 self._survey.recall(self._kept)
                 self._kept = None
-        return self._survey
+
+    def _within_sight(self, team: Situation, task: SwathTask, flying: Flying) -> Coverage:
+        """Return what is to be ensonified and can be from outside of keep-out zones."""
+        if not team.constraints.keep_out:
+            return task.coverage
+        if self._barred is None or not self._barred.is_of(task.coverage):
+            self._barred = BarredGround(team.constraints, task.coverage)
+        if self._sighted is None or self._sighted[0] is not task.coverage or self._sighted[1] != flying:
+            self._sighted = task.coverage, flying, self._barred.within_sight(task.coverage, flying)
+        return self._sighted[2]
 
     def _flying(self, team: Situation, name: str, task: SwathTask) -> Flying:
         sonar: SwathSonar = task.sonars[name]

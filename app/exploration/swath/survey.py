@@ -13,8 +13,10 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
+from app.exploration.core.routes import FreeSpace
 from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
 from app.exploration.swath.lines_ahead import best_direction, nearest_entry, path_m
+from app.exploration.swath.near_zones import led_round
 from app.exploration.swath.passes import passes
 from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
@@ -122,10 +124,20 @@ class SwathSurvey:
         Depth that is taken as long as none is known.
     crosslines
         Length of the lines across all others that are flown in the end, as a share of those.
+    space
+        Where vehicles may go; None: wherever lines lie.
     """
 
-    def __init__(self, preferred_rad: float, raster_m: float, guess_m: float, crosslines: float = 0.0) -> None:
+    def __init__(
+        self,
+        preferred_rad: float,
+        raster_m: float,
+        guess_m: float,
+        crosslines: float = 0.0,
+        space: FreeSpace | None = None,
+    ) -> None:
         self._crosslines = crosslines
+        self._space = None if space is None or space.is_open else space
         self._across: list[FloatArray] | None = None
         """Crosslines that nobody has begun; None: they are not laid yet."""
         self._direction_rad = preferred_rad
@@ -268,10 +280,13 @@ class SwathSurvey:
         if course is None:
             raise ValueError("there is no line to fly along")
         if not course.begun:
-            away = course.path[0] - pose[:2]
+            corner = course.path[0] if self._space is None else self._space.way(pose[:2], course.path[0])[0]
+            away = corner - pose[:2]
             away_m = float(np.hypot(*away))
             if away_m > reach_m:
                 return np.asarray(pose[:2] + reach_m / away_m * away)
+            if float(np.hypot(*(course.path[0] - corner))) > NEAR_M:
+                return np.asarray(corner)
             course.begun = True
             self._count(course.path, flying, coverage)
             if away_m > NEAR_M:
@@ -334,7 +349,7 @@ class SwathSurvey:
         path = Line(whole, across).path(raster)
         path = path if forwards else path[::-1]
         passed = (raster.axes.turned(path)[:, 0] - here[0]) * (1 if forwards else -1) <= 0.5 * raster.cell_m
-        course.path = _simple(path[~passed], 0.1 * raster.cell_m)
+        course.path = self._led(_simple(path[~passed], 0.1 * raster.cell_m), flying, coverage)
 
     def _take_line(
         self, vehicle: str, pose: FloatArray, flying: Flying, coverage: Coverage, team: dict[str, FloatArray]
@@ -359,19 +374,32 @@ class SwathSurvey:
             missed = again if again.any() else small
             short, wide = passes(left, missed, closer(flying, overlap), pose)
             for one in short:
-                if not self._closer(vehicle, pose, one.path, one.away_m, team):
-                    east, north = one.path[1] - one.path[0]
-                    sweep.course = FlownLine(float(np.arctan2(north, east)), 1, one.path, overlap)
+                path = self._led(one.path, flying, coverage)
+                if len(path) > 1 and not self._closer(vehicle, pose, path, one.away_m, team):
+                    east, north = path[1] - path[0]
+                    sweep.course = FlownLine(float(np.arctan2(north, east)), 1, path, overlap)
                     return True
             near_m = np.full(len(left.open), float(raster.axes.turned(pose[:2])[1]))
             choice = lines(left, wide, sign, closer(flying, overlap), near_m)
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
-            if own or not self._closer(vehicle, pose, path, away_m, team):
-                sweep.course = FlownLine(self._direction_rad, sign, _simple(path, 0.1 * raster.cell_m), overlap)
+            path = self._led(_simple(path, 0.1 * raster.cell_m), flying, coverage)
+            if len(path) > 1 and (own or not self._closer(vehicle, pose, path, away_m, team)):
+                sweep.course = FlownLine(self._direction_rad, sign, path, overlap)
                 return True
             choice = [other for other in choice if other is not line]
         return False
+
+    def _led(self, path: FloatArray, flying: Flying, coverage: Coverage) -> FloatArray:
+        """Return a line (k, 2) as vehicles may fly it; empty where they may not, and what it was to see is given up."""
+        if self._space is None or not len(path):
+            return path
+        led = led_round(path, self._space)
+        if len(led) > 1:
+            return led
+        if len(path) > 1:
+            self._count(path, flying, coverage, tries=MOST_TRIES)
+        return np.zeros((0, 2))
 
     def _closer(
         self, vehicle: str, here: FloatArray, path: FloatArray, away_m: float, team: dict[str, FloatArray]
@@ -408,7 +436,9 @@ class SwathSurvey:
         both = [(k, path) for k, line in enumerate(self._across) for path in (line, line[::-1])]
         k, path = min(both, key=lambda one: float(np.hypot(*(one[1][0] - pose[:2]))))
         del self._across[k]
-        sweep.course = FlownLine(self._direction_rad, 0, path, flying.overlap)
+        path = path if self._space is None else led_round(path, self._space)
+        if len(path) > 1:
+            sweep.course = FlownLine(self._direction_rad, 0, path, flying.overlap)
 
     def _lay_crosslines(self, flying: Flying, coverage: Coverage) -> list[FloatArray]:
         raster = self._raster(coverage, self._direction_rad)

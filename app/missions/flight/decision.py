@@ -3,11 +3,13 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
+import shapely
 from shapely.geometry import Polygon
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.estimation import Sensor, SingleBeam
 from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
@@ -188,12 +190,31 @@ def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase
 
 
 def swath_task(spec: MissionSpec, vehicles: Iterable[VehicleSpec], coverage: Coverage) -> SwathTask:
-    """Return what the swath sonars of a mission's vehicles have to ensonify."""
+    """Return what the swath sonars of a mission's vehicles have to ensonify: the area but for its keep-out zones."""
     team = list(vehicles)
+    if spec.keep_out:
+        zones = tuple(spec.to_local(zone).tobytes() for zone in spec.keep_out)
+        coverage = replace(coverage, wanted=coverage.wanted & ~_in_zones(zones, coverage))
     sonars = {vehicle.name: sonar for vehicle in team if (sonar := swath_sonar(vehicle)) is not None}
     altitudes_m = {vehicle.name: vehicle.altitude_m for vehicle in team if vehicle.altitude_m is not None}
     asked = spec.coverage
     return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0, altitudes_m)
+
+
+def _in_zones(zones: tuple[bytes, ...], coverage: Coverage) -> BoolArray:
+    """Return which cells have their centre in a zone, (rows, cols); zones: corners (n, 2) as bytes."""
+    return _cells_in(zones, coverage.west_m, coverage.south_m, coverage.cell_m, *coverage.wanted.shape)
+
+
+@lru_cache(maxsize=32)
+def _cells_in(
+    zones: tuple[bytes, ...], west_m: float, south_m: float, cell_m: float, rows: int, cols: int
+) -> BoolArray:
+    east_m, north_m = np.meshgrid(west_m + (np.arange(cols) + 0.5) * cell_m, south_m + (np.arange(rows) + 0.5) * cell_m)
+    inside = np.zeros((rows, cols), dtype=bool)
+    for corners in zones:
+        inside |= shapely.contains_xy(Polygon(np.frombuffer(corners).reshape(-1, 2)), east_m, north_m)
+    return inside
 
 
 def swath_sonar(vehicle: VehicleSpec) -> SwathSonar | None:

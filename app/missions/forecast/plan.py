@@ -29,7 +29,8 @@ from app.missions import safety
 from app.missions.flight.commit import home_of
 from app.missions.flight.decision import Knowledge, decide, make_constraints, make_planner, swath_sonar, turn_radius_m
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
-from app.missions.forecast.simulate import Swarm, fly
+from app.missions.forecast.simulate import fly
+from app.missions.forecast.swarm import Swarm
 from app.missions.maps.builder import MapBuilder, make_grid
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s

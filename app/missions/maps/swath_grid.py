@@ -79,6 +79,12 @@ class SwathGrid:
             )
             self.beams += len(at)
 
+    def add_placed(self, east_m: FloatArray, north_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray) -> None:
+        """Take in beams, (n,) each, whose place on the bottom is known."""
+        with self._lock:
+            self._density.add(east_m, north_m, depth_m, sd_m)
+            self.beams += len(depth_m)
+
     def begin_anew(self) -> None:
         """Forget all pings: they are read again."""
         with self._lock:

@@ -10,7 +10,8 @@ import pytest
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
-from app.missions.forecast.simulate import Flown, Forecast, forecast
+from app.missions.forecast.simulate import Forecast, forecast
+from app.missions.forecast.swarm import Flown
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec

@@ -1,0 +1,307 @@
+"""A survey with swath sonars flown ahead: its own planner, turning circles, and pings over a floor that is guessed.
+
+Lines follow from what was sounded on the lines before, so what a survey takes depends on how deep its floor is, and how
+rough. A vehicle turns in its circle until it heads for the end of its leg, sounds all the way, and the next leg is
+decided a little before it is there, as at sea.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from app.arrays import FloatArray
+from app.estimation.swath import SwathSonar
+from app.exploration.motion.dubins import TURN, Way, poses_along
+from app.exploration.planners import COVERERS
+from app.missions.flight.decision import Knowledge, decide, make_constraints, make_planner, swath_sonar, swath_task
+from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M
+from app.missions.forecast.floor import Floor
+from app.missions.forecast.swarm import Flown, Swarm, WholeSurvey
+from app.missions.maps.builder import MapBuilder
+from app.missions.spec.mission import MissionSpec
+from app.missions.team import Member
+from simulator.terrain import Terrain
+
+MOST_CELLS = 40_000
+"""Cells of such a forecast at most."""
+
+CELLS_OF_HALF = 8.0
+"""So many cells are half a swath over the shoaler parts of a floor."""
+
+SHOALER = 0.1
+"""Share of a floor that is shoaler than that."""
+
+BEAMS_A_CELL, REACHES = 2.0, 3
+"""Beams and pings lie so close together, and where a beam meets the bottom is found in so many steps."""
+
+LEAST_SD_M = 0.01
+IDLE_S = 20.0
+"""A vehicle without a line is looked at again after so long: others may have missed something."""
+
+MOST_IDLE = 3
+"""Who was so often in a row without a line, with all that was sounded known, is done."""
+
+
+def sweeps(spec: MissionSpec) -> bool:
+    """Return whether a mission is a survey with swath sonars, which ends when nothing is left to ensonify."""
+    return spec.planner.name in COVERERS and any(swath_sonar(vehicle) is not None for vehicle in spec.vehicles)
+
+
+def swath_cell_m(spec: MissionSpec, members: list[Member], terrain: Terrain) -> float:
+    """Return the side of the cells that what is ensonified is counted on."""
+    shoal_m = float(np.nanquantile(terrain.z_m, SHOALER))
+    narrowest_m = math.inf
+    for member in members:
+        sonar = swath_sonar(member.spec)
+        if sonar is not None:
+            above_m = max(shoal_m - member.cruise_depth_m(spec.limits), spec.limits.min_altitude_m)
+            if math.isfinite(member.altitude_m):
+                above_m = min(above_m, max(member.altitude_m, spec.limits.min_altitude_m))
+            narrowest_m = min(narrowest_m, float(sonar.half_width_m(np.array([above_m]))[0]))
+    fewest_m = math.sqrt(Polygon(spec.local_area()).area / MOST_CELLS)
+    wish_m = narrowest_m / CELLS_OF_HALF if math.isfinite(narrowest_m) else 0.0
+    return max(spec.cell_m, fewest_m, wish_m)
+
+
+@dataclass
+class Craft:
+    """What is known of one vehicle beside its place: its corners, and pings that are still to come in."""
+
+    sonar: SwathSonar | None
+    corners_m: list[FloatArray]
+    clock_s: list[float]
+    unseen: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    """Poses (n, 4): east, north, heading and depth."""
+    idle: int = 0
+
+
+class SwathFlight:
+    """Flies one mission ahead over one floor.
+
+    Parameters
+    ----------
+    starts_m : (vehicles, 2)
+    prior
+        Imported soundings, shape (n, 4).
+    first_step
+        The first one that is still to be flown.
+    """
+
+    def __init__(
+        self,
+        floor: Floor,
+        spec: MissionSpec,
+        members: list[Member],
+        starts_m: FloatArray,
+        prior: FloatArray,
+        first_step: int,
+    ) -> None:
+        self._terrain, self._spec, self._members = floor.terrain, spec, members
+        cell_m = swath_cell_m(spec, members, floor.terrain)
+        self.builder = MapBuilder(spec.local_area(), cell_m, spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth)
+        self.builder.arrivals.replace(np.zeros((0, 4)), prior)
+        self.builder.build()
+        self._cell_m = cell_m
+        self._constraints, self._planner = make_constraints(spec), make_planner(spec)
+        self.swarm = Swarm(spec, members, starts_m, first_step)
+        self._crafts = [
+            Craft(swath_sonar(member.spec), [start], [0.0])
+            for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
+        ]
+        self._rng = np.random.default_rng([spec.seed, 1])
+        self._specs = [member.spec for member in members]
+
+    @property
+    def ways_m(self) -> list[FloatArray]:
+        """The ends of everybody's legs, (k, 2) each, from where it began."""
+        return [np.array(craft.corners_m) for craft in self._crafts]
+
+    @property
+    def clocks_s(self) -> list[FloatArray]:
+        """When each was there, (k,) seconds each."""
+        return [np.array(craft.clock_s) for craft in self._crafts]
+
+    def fly(self, over: Callable[[], bool]) -> bool:
+        """Fly until nobody has way left or anything to do; return whether that was so before ``over`` was."""
+        for craft in self._crafts:
+            craft.idle = 0
+        while (able := self._able()) and not over():
+            i = min(able, key=lambda k: float(self.swarm.clock_s[k]))
+            self._next_leg(i)
+        self._take_all_in()
+        self.builder.build()
+        return not able
+
+    def _able(self) -> list[int]:
+        return [
+            i
+            for i, craft in enumerate(self._crafts)
+            if craft.sonar is not None and craft.idle < MOST_IDLE and self.swarm.left_m[i] > LEAST_WAY_M
+        ]
+
+    def _next_leg(self, i: int) -> None:
+        swarm, craft, spec = self.swarm, self._crafts[i], self._spec
+        due = np.zeros(len(self._members), dtype=bool)
+        due[i] = True
+        self.builder.build()
+        known = Knowledge(
+            self.builder.belief(),
+            np.zeros((0, 2)),
+            swath=swath_task(spec, self._specs, self.builder.coverage()),
+        )
+        number = int(swarm.legs[i]) + 1
+        decision = decide(number, spec, self._constraints, self._planner, swarm.places(due), known)
+        self._take_in(craft)
+        name = self._members[i].name
+        legs = [leg for leg in decision.legs if leg.vehicle == name and not leg.refusal]
+        if name in decision.done or not legs:
+            craft.idle += 1
+            swarm.clock_s[i] += IDLE_S
+            return
+        craft.idle = 0
+        self._fly_to(i, legs[0].target_m)
+
+    def _fly_to(self, i: int, end: FloatArray) -> None:
+        swarm, craft = self.swarm, self._crafts[i]
+        speed_mps = self._spec.speed_of(self._members[i].spec)
+        radius_m = max(swarm.radius_m(i), 0.5)
+        pose = np.array([*swarm.here[i, :2], swarm.heading_rad[i]])
+        way = turn_and_on(pose, end[:2], radius_m)
+        if math.isnan(pose[2]):
+            pose[2] = math.atan2(*(end[:2] - pose[:2]))
+        spacing_m = max(speed_mps / craft.sonar.rate_hz if craft.sonar else 0.0, self._cell_m / BEAMS_A_CELL)
+        at = np.append(np.arange(spacing_m, way.length_m, spacing_m), way.length_m)
+        poses = poses_along(pose, way, radius_m, at)
+        flown = np.column_stack([poses, np.full(len(poses), end[2])])
+        late = max(1, math.ceil(LEAD_S * speed_mps / spacing_m))
+        craft.unseen = flown[-late:]
+        self._ping(craft, flown[:-late])
+        swarm.flew(i, end, float(poses[-1, 2]), way.length_m)
+        craft.corners_m.append(np.array(end[:2]))
+        craft.clock_s.append(float(swarm.clock_s[i]))
+
+    def _take_in(self, craft: Craft) -> None:
+        poses, craft.unseen = craft.unseen, np.zeros((0, 4))
+        self._ping(craft, poses)
+
+    def _take_all_in(self) -> None:
+        for craft in self._crafts:
+            self._take_in(craft)
+
+    def _ping(self, craft: Craft, poses: FloatArray) -> None:
+        """Sound from poses (n, 4) and take that in."""
+        if craft.sonar is None or not len(poses):
+            return
+        east, north, depth, sd = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
+        sd = np.maximum(self._spec.sounding_noise * sd, LEAST_SD_M)
+        self.builder.swath.add_placed(east, north, depth + sd * self._rng.standard_normal(len(sd)), sd)
+
+
+def turn_and_on(pose: FloatArray, place_m: FloatArray, radius_m: float) -> Way:
+    """Return the shortest way from a pose (3,) to a place (2,): along a turning circle, then straight.
+
+    A pose without a heading (NaN) may begin in any.
+    """
+    away = place_m - pose[:2]
+    if math.isnan(pose[2]):
+        return Way("LSL", np.array([0.0, float(np.hypot(*away)), 0.0]))
+    best: Way | None = None
+    for word in ("LSL", "RSR"):
+        side = TURN[word[0]]
+        to_middle = side * radius_m * np.array([math.cos(pose[2]), -math.sin(pose[2])])
+        off = away - to_middle
+        off_m = float(np.hypot(*off))
+        if off_m < radius_m:
+            continue  # inside of this circle: the other one leads there
+        straight_m = math.sqrt(max(off_m**2 - radius_m**2, 0.0))
+        # Where the tangent from the place leaves the circle it heads for the place.
+        leaves_rad = math.atan2(off[0], off[1]) + side * math.asin(min(radius_m / off_m, 1.0))
+        turn_rad = (side * (leaves_rad - pose[2])) % math.tau
+        if turn_rad > math.tau - 1e-6:
+            turn_rad = 0.0
+        way = Way(word, np.array([radius_m * turn_rad, straight_m, 0.0]))
+        if best is None or way.length_m < best.length_m:
+            best = way
+    if best is None:
+        raise ValueError(f"no turn of {radius_m} m leads from {pose} to {place_m}")
+    return best
+
+
+def swath_of(
+    sonar: SwathSonar, poses: FloatArray, terrain: Terrain, apart_m: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what pings from poses (n, 4) meet, (m,) each: east, north, depth, and how long the way there is.
+
+    ``apart_m`` is how close beams lie on a flat bottom; closer ones are left out.
+    """
+    under = terrain.depth_at(poses[:, 0], poses[:, 1])
+    above_m = np.maximum(under - poses[:, 3], 0.0)
+    widest_m = 2.0 * sonar.reach * float(np.nanmax(above_m, initial=0.0))
+    beams = int(np.clip(math.ceil(widest_m / apart_m) + 1, 3, sonar.beams)) if widest_m > 0.0 else 1
+    slope = np.linspace(-sonar.reach, sonar.reach, beams) if beams > 1 else np.zeros(1)
+    starboard = np.column_stack([np.cos(poses[:, 2]), -np.sin(poses[:, 2])])
+    down_m = np.repeat(above_m[:, None], beams, axis=1)
+    for _ in range(REACHES):
+        places = poses[:, None, :2] + (slope * down_m)[..., None] * starboard[:, None]
+        depth = terrain.depth_at(places[..., 0], places[..., 1])
+        down_m = np.maximum(depth - poses[:, 3, None], 0.0)
+    slant_m = down_m * np.hypot(1.0, slope)
+    met = np.isfinite(depth) & (depth > 0.0) & (slant_m <= sonar.range_m) & (down_m > 0.0)
+    return places[..., 0][met], places[..., 1][met], depth[met], slant_m[met]
+
+
+def sweep_over(
+    floor: Floor,
+    spec: MissionSpec,
+    members: list[Member],
+    starts_m: FloatArray,
+    prior: FloatArray,
+    first_step: int,
+    budget_s: float,
+    stop: Callable[[], bool] = lambda: False,
+) -> Flown:
+    """Fly a survey with swath sonars ahead over one floor: for its budget, then on until nothing is left to ensonify.
+
+    After ``budget_s`` seconds of the processor the rest is drawn out from the share that was ensonified by then.
+    """
+    until = time.thread_time() + budget_s
+
+    def over() -> bool:
+        return stop() or time.thread_time() > until
+
+    flight = SwathFlight(floor, spec, members, starts_m, prior, first_step)
+    swarm, builder = flight.swarm, flight.builder
+    ended = flight.fly(over)
+    steps = max(spec.steps - first_step + 1, 0)
+    newest = builder.newest
+    done_pct = builder.coverage_pct()
+    left_m = swarm.left_m.copy()
+    whole = 1.0
+    if not ended:
+        # As far as it may go, unless all is seen before that.
+        goes = float(swarm.distance_m.sum())
+        whole = min(1.0 + float(left_m.sum()) / max(goes, 1.0), 100.0 / max(done_pct, 1.0))
+    flown = Flown(
+        duration_s=float(swarm.clock_s.max()) * whole,
+        distances_m={member.name: float(swarm.distance_m[i]) * whole for i, member in enumerate(members)},
+        coverage_pct=done_pct if ended else min(done_pct * whole, 100.0),
+        remaining_pct=builder.remaining_pct() if ended else max(100.0 - done_pct * whole, 0.0),
+        mean_sd_m=newest.mean_sd_m if newest is not None else None,
+        steps=steps if ended else max(int(swarm.legs.max()) - first_step + 1, 0),
+    )
+    swarm.left_m[:] = math.inf
+    all_seen = ended and flight.fly(over)
+    share = 1.0 if all_seen else 100.0 / max(builder.coverage_pct(), 1.0)
+    return flown.with_whole(
+        WholeSurvey(
+            ways_m={member.name: way for member, way in zip(members, flight.ways_m, strict=True)},
+            clocks_s={member.name: clock for member, clock in zip(members, flight.clocks_s, strict=True)},
+            distances_m={member.name: float(swarm.distance_m[i]) for i, member in enumerate(members)},
+            drawn_out=share,
+            coverage_pct=builder.coverage_pct() if all_seen else 100.0,
+        )
+    )
