@@ -196,6 +196,12 @@ class FreeSpace:
         self._open = not constraints.keep_out and bool(np.isclose(area.area, area.convex_hull.area))
         self._corners = np.zeros((0, 2)) if self._open else _corners(self.region)
         self._links = self._visibility(self._corners)
+        # Between corners ways are found once: only their ends differ.
+        self._away_m, self._before = (
+            dijkstra(csr_matrix(self._links), return_predecessors=True)
+            if len(self._corners)
+            else (np.zeros((0, 0)), np.zeros((0, 0), dtype=np.int32))
+        )
 
     @property
     def is_open(self) -> bool:
@@ -240,34 +246,57 @@ class FreeSpace:
         """
         if self._sees(start, np.asarray(goal)[None])[0]:
             return np.asarray(goal, dtype=np.float64)[None]
+        return self._round(start, goal)
+
+    def _round(self, start: FloatArray, goal: FloatArray) -> FloatArray:
+        """Return such a way where no straight leg leads to the goal."""
         start_inside, goal_inside = self.nearest(start), self.nearest(goal)
-        nodes = np.vstack([self._corners, start_inside, goal_inside])
-        n = len(nodes)
-        links = np.zeros((n, n))
-        links[: n - 2, : n - 2] = self._links
-        for k in (n - 2, n - 1):
-            links[:k, k] = links[k, :k] = self._links_to(nodes[k], nodes[:k])
-        distance, previous = dijkstra(csr_matrix(links), return_predecessors=True)
-        if not np.isfinite(distance[n - 2, n - 1]):
+        legs = np.stack(
+            [np.broadcast_to(self._corners, (2, *self._corners.shape)), np.empty((2, *self._corners.shape))], axis=2
+        )
+        legs[0, :, 1], legs[1, :, 1] = start_inside, goal_inside
+        lengths = np.maximum(np.hypot(*np.moveaxis(legs[:, :, 0] - legs[:, :, 1], -1, 0)), 1e-9)
+        sees = np.asarray(shapely.covers(self._loose, shapely.linestrings(legs)), dtype=np.bool_)
+        first_m, last_m = np.where(sees, lengths, np.inf)
+        by_corners = first_m[:, None] + self._away_m + last_m
+        straight_m = np.inf
+        if self._sees(start_inside, goal_inside[None])[0]:
+            straight_m = float(np.hypot(*(goal_inside - start_inside)))
+        first, last = np.unravel_index(int(np.argmin(by_corners)), by_corners.shape) if by_corners.size else (0, 0)
+        shortest_m = float(by_corners[first, last]) if by_corners.size else np.inf
+        if not np.isfinite(min(straight_m, shortest_m)):
             return np.asarray(goal, dtype=np.float64)[None]
-        chain = [n - 1]
-        while previous[n - 2, chain[-1]] >= 0:
-            chain.append(int(previous[n - 2, chain[-1]]))
-        way = nodes[chain[::-1]]
-        if np.allclose(start_inside, start):
-            way = way[1:]
-        return np.asarray(way if np.allclose(goal_inside, goal) else np.vstack([way, goal]))
+        way = [goal_inside]
+        if shortest_m < straight_m:
+            node = int(last)
+            while node != first:
+                way.append(self._corners[node])
+                node = int(self._before[first, node])
+            way.append(self._corners[first])
+        if not np.allclose(start_inside, start):
+            way.append(start_inside)
+        found = np.array(way[::-1])
+        return np.asarray(found if np.allclose(goal_inside, goal) else np.vstack([found, goal]))
 
     def connect(self, start: FloatArray, stops: FloatArray) -> FloatArray:
         """Return the route (m, 2) from ``start`` (left out) through all ``stops`` (k, 2), round obstacles."""
         if self._open or len(stops) == 0:
             return np.asarray(stops, dtype=np.float64).reshape(-1, 2)
-        begins = np.vstack([start, stops[:-1]])
+        return np.vstack(self.legs(np.vstack([start, stops])))
+
+    def legs(self, stops: FloatArray) -> list[FloatArray]:
+        """Return the routes (m, 2) from each of ``stops`` (k, 2) to the next, without where they begin."""
+        if len(stops) < 2:
+            return []
+        ends = np.asarray(stops[1:], dtype=np.float64)
+        if self._open:
+            return [stop[None] for stop in ends]
         # All at once: most legs are free, and asking one by one takes far longer.
-        free = np.asarray(shapely.covers(self._loose, shapely.linestrings(np.stack([begins, stops], axis=1))))
-        return np.vstack(
-            [stop[None] if clear else self.way(a, stop) for a, stop, clear in zip(begins, stops, free, strict=True)]
-        )
+        both = np.stack([stops[:-1], ends], axis=1)
+        free = np.asarray(shapely.covers(self._loose, shapely.linestrings(both)))
+        return [
+            stop[None] if clear else self._round(a, stop) for a, stop, clear in zip(stops, ends, free, strict=False)
+        ]
 
 
 def _corners(region: BaseGeometry) -> FloatArray:

@@ -87,19 +87,25 @@ def _path(sweep: Sweep, lines_u: FloatArray, inset_m: float, parts: int, *, upwa
     vertices: list[FloatArray] = []
     first: list[int] = []
     last: list[int] = []
+    lines: list[FloatArray] = []
     for pieces in sweep.lines(lines_u, inset_m):
         if not pieces:
             continue
         stops = np.vstack(pieces)
-        stops = stops if upwards else stops[::-1]
+        lines.append(stops if upwards else stops[::-1])
         upwards = not upwards
-        stops = np.vstack([stops[:1], sweep.free.connect(stops[0], stops[1:])])
+    # All legs at once, those along lines and those between them.
+    legs = sweep.free.legs(np.vstack(lines)) if lines else []
+    at = 0
+    for line in lines:
+        stops = np.vstack([line[:1], *legs[at : at + len(line) - 1]])
         if parts > 1:
             stops = _subdivided(stops, parts)
         if vertices:
-            vertices.extend(sweep.free.connect(vertices[-1], stops[:1]))
+            vertices.extend(legs[at - 1])
         else:
             vertices.append(stops[0])
+        at += len(line)
         begin, end = len(vertices) - 1, len(vertices) + len(stops) - 2
         vertices.extend(stops[1:])
         first.extend([begin] if parts == 1 else range(begin, end))
@@ -121,12 +127,20 @@ def _dealt(
     begin, end = 0, len(path.first)
     for i in order:
         best = 0, np.inf
+        approaches: dict[int, FloatArray] = {}
+
+        def approach(vertex: int) -> FloatArray:
+            if vertex not in approaches:  # noqa: B023 - called at once
+                way = free.connect(vehicles.en_m[i], path.vertices[vertex : vertex + 1])  # noqa: B023 - called at once
+                approaches[vertex] = way  # noqa: B023 - called at once
+            return approaches[vertex]  # noqa: B023 - called at once
+
         for back in (False, True):
 
             def route(k: int, back: bool = back) -> FloatArray:
-                stops = path.vertices[path.first[begin] : path.last[begin + k - 1] + 1]  # noqa: B023 - called at once
-                stops = stops[::-1] if back else stops
-                return np.vstack([free.connect(vehicles.en_m[i], stops[:1]), stops[1:]])  # noqa: B023 - called at once
+                first, last = path.first[begin], path.last[begin + k - 1]  # noqa: B023 - called at once
+                stops = path.vertices[first : last + 1]
+                return np.vstack([approach(last if back else first), (stops[::-1] if back else stops)[1:]])
 
             low, high = 0, end - begin + 1
             while high - low > 1:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from numba import njit
 from scipy.ndimage import find_objects, label, uniform_filter1d
 
 from app.arrays import BoolArray, FloatArray, IntArray
@@ -93,8 +93,9 @@ def lines(
         wish = np.full(len(whole), np.inf)
         wish[columns[part] - whole[0]] = sign * target_m[part]
         width = np.interp(whole, columns[part], width_m[part])
-        wish = _worth(wish, width, raster.cell_m, flying)
-        found.append(Line(whole, sign * gentle(wish, raster.cell_m, bend_radius_m(width, flying))))
+        radius_m = bend_radius_m(width, flying)
+        wish = _worth(wish, width, raster.cell_m, flying, radius_m)
+        found.append(Line(whole, sign * gentle(wish, raster.cell_m, radius_m)))
     return found
 
 
@@ -118,34 +119,49 @@ def gentle(wish: FloatArray, cell_m: float, radius_m: float) -> FloatArray:
 
     It is the largest one whose valleys have the radius; its tops are rounded by a mean over half of that.
     """
-    # What wishes farther away than a bend allow rises evenly, what nearer ones allow as the circle does.
-    bent_m = STEEPEST * radius_m
-    bent = int(np.ceil(bent_m / cell_m))
-    padded = np.pad(wish, bent, constant_values=np.inf)
-    away_m = cell_m * np.abs(np.arange(-bent, bent + 1))
-    rise_m = np.where(away_m < bent_m, away_m**2 / (2.0 * radius_m), STEEPEST * (away_m - 0.5 * bent_m))
-    level = (sliding_window_view(padded, 2 * bent + 1) + rise_m).min(axis=1)
-    if len(wish) > bent:
-        level[bent:] = np.minimum(level[bent:], _climbed(wish[: len(wish) - bent], cell_m) + rise_m[0])
-        level[: len(wish) - bent] = np.minimum(
-            level[: len(wish) - bent], _climbed(wish[: bent - 1 : -1] if bent else wish[::-1], cell_m)[::-1] + rise_m[0]
-        )
+    level = _valleys(np.ascontiguousarray(wish, dtype=np.float64), cell_m, radius_m)
     width = 2 * int(0.25 * radius_m / cell_m) + 1
     return np.asarray(uniform_filter1d(level, min(width, 2 * ((len(level) - 1) // 2) + 1), mode="nearest"))
 
 
-def _climbed(wish: FloatArray, cell_m: float) -> FloatArray:
-    """Return the largest line (n,) not above the wishes at and before each cell that climbs no steeper than allowed."""
-    climb_m = STEEPEST * cell_m * np.arange(len(wish))
-    return np.asarray(np.minimum.accumulate(wish - climb_m) + climb_m)
+@njit(cache=True, nogil=True)
+def _valleys(wish: FloatArray, cell_m: float, radius_m: float) -> FloatArray:
+    """Return the largest line (n,) not above the wishes whose valleys have the radius."""
+    # What wishes farther away than a bend allow rises evenly, what nearer ones allow as the circle does.
+    n = len(wish)
+    bent_m = STEEPEST * radius_m
+    bent = int(np.ceil(bent_m / cell_m))
+    level = np.full(n, np.inf)
+    for k in range(-bent, bent + 1):
+        away_m = cell_m * abs(k)
+        rise_m = away_m**2 / (2.0 * radius_m) if away_m < bent_m else STEEPEST * (away_m - 0.5 * bent_m)
+        for i in range(max(0, -k), min(n, n - k)):
+            level[i] = min(level[i], wish[i + k] + rise_m)
+    if n > bent:
+        away_m = cell_m * bent
+        rise_m = away_m**2 / (2.0 * radius_m) if away_m < bent_m else STEEPEST * (away_m - 0.5 * bent_m)
+        climb_m = STEEPEST * cell_m
+        lowest = np.inf
+        for i in range(n - bent):
+            lowest = min(lowest, wish[i] - climb_m * i)
+            level[i + bent] = min(level[i + bent], lowest + climb_m * i + rise_m)
+        lowest = np.inf
+        for i in range(n - bent):
+            lowest = min(lowest, wish[n - 1 - i] - climb_m * i)
+            level[n - 1 - bent - i] = min(level[n - 1 - bent - i], lowest + climb_m * i + rise_m)
+    return level
 
 
-def _worth(wish: FloatArray, width_m: FloatArray, cell_m: float, flying: Flying) -> FloatArray:
+def warm_up() -> None:
+    """Compile what lays lines, or load it from the cache of an earlier start."""
+    _valleys(np.zeros(2), 1.0, 1.0)
+
+
+def _worth(wish: FloatArray, width_m: FloatArray, cell_m: float, flying: Flying, radius_m: float) -> FloatArray:
     """Return the wishes (n,) without those that hold the whole line back more than it costs to come again for them.
 
-    ``width_m`` (n,) is how far a line sees to either side.
+    ``width_m`` (n,) is how far a line sees to either side, ``radius_m`` the radius in which it bends.
     """
-    radius_m = bend_radius_m(width_m, flying)
     level = gentle(wish, cell_m, radius_m)
     for _ in range(MOST_LEFT):
         binding = np.flatnonzero(wish <= level + 0.25 * cell_m)

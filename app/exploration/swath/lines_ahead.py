@@ -50,23 +50,21 @@ def nearest_entry(
 
     ``at``: None, or with a heading of NaN where that is not known.
     """
-    best: tuple[Line, FloatArray, float] | None = None
-    for line in choice:
-        there = line.path(raster)
-        for path in (there, there[::-1]):
-            away_m = 0.0 if at is None else approach_m(at, pose(path), radius_m)
-            if best is None or away_m < best[2]:
-                best = line, path, away_m
-    if best is None:
+    paths = [way for line in choice for there in (line.path(raster),) for way in (there, there[::-1])]
+    if not paths:
         raise ValueError("there is no line to choose from")
-    return best
+    away_m = (
+        np.zeros(len(paths)) if at is None else approaches_m(at, np.array([pose(path) for path in paths]), radius_m)
+    )
+    best = int(np.argmin(away_m))
+    return choice[best // 2], paths[best], float(away_m[best])
 
 
-def approach_m(at: FloatArray, to: FloatArray, radius_m: float) -> float:
-    """Return how long the way from one pose (3,) to another is; straight where the first has no heading."""
+def approaches_m(at: FloatArray, to: FloatArray, radius_m: float) -> FloatArray:
+    """Return how long the ways from a pose (3,) to others (n, 3) are; straight where the first has no heading."""
     if np.isnan(at[2]):
-        return float(np.hypot(*(to[:2] - at[:2])))
-    return float(lengths_m(at, to, radius_m))
+        return np.hypot(*(to[:, :2] - at[:2]).T)
+    return lengths_m(at, to, radius_m)
 
 
 def ahead(

@@ -111,6 +111,19 @@ class Assignment:
     """A line (k, 2) that its operator wants left out, until that is noted."""
 
 
+@dataclass(frozen=True)
+class Directed:
+    """What the direction of lines follows from; the same arrays hold the same."""
+
+    wanted: BoolArray
+    depth_m: FloatArray
+    flying: Flying
+
+    def is_as(self, coverage: Coverage, flying: Flying) -> bool:
+        """Return whether nothing of it is different."""
+        return coverage.wanted is self.wanted and coverage.depth_m is self.depth_m and flying == self.flying
+
+
 class SwathSurvey:
     """The lines of a team, decided one leg at a time.
 
@@ -144,6 +157,8 @@ class SwathSurvey:
         self._raster_m, self._guess_m = raster_m, guess_m
         self._sweeps: dict[str, Assignment] = {}
         self._looks = 0
+        self._directed: Directed | None = None
+        """What the direction was last chosen by."""
         self._steepest: tuple[FloatArray, float] | None = None
         """How much the bottom is presumed to rise, and the depths that this follows from."""
         self._tried = np.zeros((0, 0), dtype=np.int64)
@@ -463,6 +478,9 @@ class SwathSurvey:
         if not begins and (self._looks > len(LOOK_AGAIN_AT) or done < LOOK_AGAIN_AT[self._looks - 1]):
             return
         self._looks = 1 + sum(done >= share for share in LOOK_AGAIN_AT)
+        if self._directed is not None and self._directed.is_as(coverage, flying):
+            return  # Nothing is known that was not known when the direction was chosen.
+        self._directed = Directed(coverage.wanted, coverage.depth_m, flying)
         # What is left has some shape; what speaks for another direction is the bottom of the whole area.
         whole = replace(coverage, done=np.zeros_like(coverage.done))
         direction_rad, _ = best_direction(whole, flying, self._guess_m, self._direction_rad, TURNING_GAIN)

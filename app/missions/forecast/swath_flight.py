@@ -26,10 +26,10 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 from simulator.terrain import Terrain
 
-MOST_CELLS = 40_000
+MOST_CELLS = 20_000
 """Cells of such a forecast at most."""
 
-CELLS_OF_HALF = 8.0
+CELLS_OF_HALF = 5.0
 """So many cells are half a swath over the shoaler parts of a floor."""
 
 SHOALER = 0.1
