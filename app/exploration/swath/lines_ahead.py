@@ -101,11 +101,17 @@ def ahead(
 
 
 def best_direction(
-    coverage: Coverage, flying: Flying, guess_m: float, preferred_rad: float, gain: float
+    coverage: Coverage,
+    flying: Flying,
+    guess_m: float,
+    preferred_rad: float,
+    gain: float,
+    least_cell_m: float = 0.0,
 ) -> tuple[float, float]:
     """Return in which direction lines are shortest in all, anticlockwise from east, and how long they are.
 
-    ``preferred_rad`` stays unless another is shorter by more than the share ``gain``.
+    ``preferred_rad`` stays unless another is shorter by more than the share ``gain``. Cells are not finer than
+    ``least_cell_m``.
     """
     cells = np.argwhere(coverage.wanted)
     extent_m = float((np.ptp(cells, axis=0) + 1).max()) * coverage.cell_m
@@ -113,6 +119,7 @@ def best_direction(
     shoal_m = np.array([guess_m]) if known_m.size == 0 else np.quantile(known_m, [0.05])
     fine_m = 2.0 * float(flying.half_width_m(shoal_m)[0]) / CELLS_ACROSS
     cell_m = float(np.clip(fine_m, extent_m / CELLS_ALONG[1], extent_m / CELLS_ALONG[0]))
+    cell_m = max(cell_m, least_cell_m)
 
     careful = replace(flying, overlap=flying.overlap + DOUBT)
 

@@ -117,11 +117,10 @@ class Directed:
 
     wanted: BoolArray
     depth_m: FloatArray
-    flying: Flying
 
-    def is_as(self, coverage: Coverage, flying: Flying) -> bool:
+    def is_as(self, coverage: Coverage) -> bool:
         """Return whether nothing of it is different."""
-        return coverage.wanted is self.wanted and coverage.depth_m is self.depth_m and flying == self.flying
+        return coverage.wanted is self.wanted and coverage.depth_m is self.depth_m
 
 
 class SwathSurvey:
@@ -478,14 +477,18 @@ class SwathSurvey:
         if not begins and (self._looks > len(LOOK_AGAIN_AT) or done < LOOK_AGAIN_AT[self._looks - 1]):
             return
         self._looks = 1 + sum(done >= share for share in LOOK_AGAIN_AT)
-        if self._directed is not None and self._directed.is_as(coverage, flying):
+        if self._directed is not None and self._directed.is_as(coverage):
             return  # Nothing is known that was not known when the direction was chosen.
-        self._directed = Directed(coverage.wanted, coverage.depth_m, flying)
+        self._directed = Directed(coverage.wanted, coverage.depth_m)
         # What is left has some shape; what speaks for another direction is the bottom of the whole area.
         whole = replace(coverage, done=np.zeros_like(coverage.done))
-        direction_rad, _ = best_direction(whole, flying, self._guess_m, self._direction_rad, TURNING_GAIN)
+        direction_rad, _ = best_direction(
+            whole, flying, self._guess_m, self._direction_rad, TURNING_GAIN, self._raster_m
+        )
         if not begins and direction_rad != self._direction_rad:
-            direction_rad, _ = best_direction(coverage, flying, self._guess_m, self._direction_rad, TURNING_GAIN)
+            direction_rad, _ = best_direction(
+                coverage, flying, self._guess_m, self._direction_rad, TURNING_GAIN, self._raster_m
+            )
         if begins or direction_rad != self._direction_rad:
             self._direction_rad = direction_rad
             self._share_out(flying, coverage, team)

@@ -192,18 +192,20 @@ def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase
 def swath_task(spec: MissionSpec, vehicles: Iterable[VehicleSpec], coverage: Coverage) -> SwathTask:
     """Return what the swath sonars of a mission's vehicles have to ensonify: the area but for its keep-out zones."""
     team = list(vehicles)
-    if spec.keep_out:
-        zones = tuple(spec.to_local(zone).tobytes() for zone in spec.keep_out)
-        coverage = replace(coverage, wanted=coverage.wanted & ~_in_zones(zones, coverage))
+    coverage = without_zones(spec, coverage)
     sonars = {vehicle.name: sonar for vehicle in team if (sonar := swath_sonar(vehicle)) is not None}
     altitudes_m = {vehicle.name: vehicle.altitude_m for vehicle in team if vehicle.altitude_m is not None}
     asked = spec.coverage
     return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0, altitudes_m)
 
 
-def _in_zones(zones: tuple[bytes, ...], coverage: Coverage) -> BoolArray:
-    """Return which cells have their centre in a zone, (rows, cols); zones: corners (n, 2) as bytes."""
-    return _cells_in(zones, coverage.west_m, coverage.south_m, coverage.cell_m, *coverage.wanted.shape)
+def without_zones(spec: MissionSpec, coverage: Coverage) -> Coverage:
+    """Return what there is to ensonify without a mission's keep-out zones."""
+    if not spec.keep_out:
+        return coverage
+    zones = tuple(spec.to_local(zone).tobytes() for zone in spec.keep_out)
+    inside = _cells_in(zones, coverage.west_m, coverage.south_m, coverage.cell_m, *coverage.wanted.shape)
+    return replace(coverage, wanted=coverage.wanted & ~inside)
 
 
 @lru_cache(maxsize=32)
@@ -212,6 +214,7 @@ def _cells_in(
 ) -> BoolArray:
     east_m, north_m = np.meshgrid(west_m + (np.arange(cols) + 0.5) * cell_m, south_m + (np.arange(rows) + 0.5) * cell_m)
     inside = np.zeros((rows, cols), dtype=bool)
+    # Their corners are bytes, so that what was found for them is found again.
     for corners in zones:
         inside |= shapely.contains_xy(Polygon(np.frombuffer(corners).reshape(-1, 2)), east_m, north_m)
     return inside

@@ -22,12 +22,21 @@ from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.planners import COVERERS
 from app.exploration.rollout.planner import RolloutPlanner
 from app.exploration.swath.flown_ahead import lines_flown_ahead
+from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 from app.mapping.types import Grid
 from app.missions import safety
 from app.missions.flight.commit import home_of
-from app.missions.flight.decision import Knowledge, decide, make_constraints, make_planner, swath_sonar, turn_radius_m
+from app.missions.flight.decision import (
+    Knowledge,
+    decide,
+    make_constraints,
+    make_planner,
+    swath_sonar,
+    turn_radius_m,
+    without_zones,
+)
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
 from app.missions.forecast.simulate import fly
 from app.missions.forecast.swarm import Swarm
@@ -41,6 +50,12 @@ from simulator.terrain import Terrain
 
 WEIGHING = (CaoPlanner.name, RolloutPlanner.name)
 """Planners that compare many ways of laying lines before their first step."""
+
+MOST_CELLS, CELLS_OF_HALF = 10_000, 5.0
+"""Swaths are planned on so many cells at most, and on as many in half a swath."""
+
+TURNED = 1.5
+"""Cells of lines in any direction are so many times as large: smaller ones would miss some of the area's."""
 
 SAME_M = 0.01
 """Corners closer together are one."""
@@ -195,15 +210,22 @@ def _swath_lines(
     depth_m: float,
     over: Callable[[], bool],
 ) -> tuple[list[FloatArray], bool]:
-    grid, mask = make_grid(spec.local_area(), forecast_cell_m(spec))
-    coverage = _level(grid, depth_m, mask)
-    lines_m = coverage.cell_m
-    survey = SwathSurvey(longer_axis_rad(constraints.area), lines_m, depth_m, spec.coverage.crosslines_pct / 100.0)
     flying = {member.name: how for member in members if (how := _flying(spec, member)) is not None}
+    widths_m = [float(how.half_width_m(np.array([depth_m]))[0]) for how in flying.values()]
+    fewest_m = math.sqrt(Polygon(spec.local_area()).area / MOST_CELLS)
+    grid, mask = make_grid(spec.local_area(), max(spec.cell_m, fewest_m, min(widths_m, default=0.0) / CELLS_OF_HALF))
+    coverage = without_zones(spec, _level(grid, depth_m, mask))
+    if constraints.keep_out:
+        barred = BarredGround(constraints, coverage)
+        for how in flying.values():
+            coverage = barred.within_sight(coverage, how)
+    space = FreeSpace(constraints.for_plans, 0.0)
+    along_rad, crosslines = longer_axis_rad(constraints.area), spec.coverage.crosslines_pct / 100.0
+    survey = SwathSurvey(along_rad, TURNED * coverage.cell_m, depth_m, crosslines, space)
     sounding = [(i, member) for i, member in enumerate(members) if member.name in flying]
     found = lines_flown_ahead(
         survey,
-        FreeSpace(constraints.for_plans, 0.0),
+        space,
         coverage,
         {member.name: begin_m[i] for i, member in sounding},
         flying,

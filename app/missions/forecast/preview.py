@@ -23,7 +23,7 @@ from app.missions.views.base import View
 
 NO_PLAN = "a search has no plan before it: where it goes depends on what stands there"
 
-BUDGET_S = 0.5
+BUDGET_S = 0.8
 """Seconds of the processor for a plan that is found leg by leg."""
 
 DECIMALS = 7
