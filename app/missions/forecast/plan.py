@@ -40,6 +40,7 @@ from app.missions.flight.decision import (
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
 from app.missions.forecast.simulate import fly
 from app.missions.forecast.swarm import Swarm
+from app.missions.forecast.whole_survey import HALVINGS, WholeWay, whole_way
 from app.missions.maps.builder import MapBuilder, make_grid
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
@@ -63,9 +64,6 @@ SAME_M = 0.01
 MOST_OWN, ZONES_COUNT = 6, 3
 """The default planner weighs many ways of laying lines: for so many vehicles at most that is quick, where there are
 zones for so many times fewer. Even lines stand in for its own where there are more."""
-
-HALVINGS = 24
-"""How often the way is halved to find where a vehicle has to turn back."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +119,8 @@ class Plan:
     """Whether they are the planner's own; else even lines stand in for them."""
     depth_m: float
     """How deep the bottom is taken to be."""
+    whole_survey: dict[str, WholeWay] | None = None
+    """What each vehicle does until nothing is left to ensonify, whatever its budget; None: that was not planned."""
 
 
 def plan(
@@ -160,15 +160,28 @@ def plan(
     if not own:
         even = PlannerSpec(name=LawnmowerPlanner.name, options=spec.planner.options)
         spec = spec.model_copy(update={"planner": even})
+    all_swept = None
     if spec.planner.name in COVERERS:
-        routes, whole = _swath_lines(spec, members, constraints, begin_m, depth_m, over)
+        routes, done = _swath_lines(spec, members, constraints, begin_m, depth_m, over)
+        sweeps = {}
+        for i, (member, route) in enumerate(zip(members, routes, strict=True)):
+            way = _cut(np.vstack([starts_m[i], begin_m[i], route]), math.inf)
+            sweeps[member.name] = whole_way(
+                spec, constraints, member, way, _clock_s(spec, member, way), float(_along(way)[-1])
+            )
+        all_swept = sweeps if done else None
+        # Beyond what a vehicle may fly nothing is missing.
+        whole = done or all(
+            _along(np.vstack([begin_m[i], route]))[-1] >= member.way_left_m(spec)
+            for i, (member, route) in enumerate(zip(members, routes, strict=True))
+        )
     else:
         routes, whole = _planned(spec, members, constraints, begin_m, depth_m, over)
     ways = [
         _way(spec, constraints, member, _cut(np.vstack([starts_m[i], begin_m[i], route]), member.way_left_m(spec)))
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
-    return Plan(ways, whole, own, depth_m)
+    return Plan(ways, whole, own, depth_m, all_swept)
 
 
 def _planned(
@@ -229,7 +242,7 @@ def _swath_lines(
         coverage,
         {member.name: begin_m[i] for i, member in sounding},
         flying,
-        {member.name: member.way_left_m(spec) for _, member in sounding},
+        {member.name: math.inf for _, member in sounding},
         stop=over,
     )
     return [found.get(member.name, np.zeros((0, 2))) for member in members], not over()
@@ -271,20 +284,29 @@ def _place(corners_m: FloatArray, along_m: FloatArray, at_m: float) -> FloatArra
     return np.array([float(np.interp(at_m, along_m, corners_m[:, k])) for k in (0, 1)])
 
 
-def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: FloatArray) -> PlannedWay:
-    speed, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
-    along = _along(corners)
+def _turns_s(spec: MissionSpec, member: Member, corners: FloatArray) -> FloatArray:
+    """Return how long a vehicle turns at each corner between the ends of a way (k, 2), (k - 2,)."""
     steps = np.diff(corners, axis=0)
     course = np.arctan2(steps[:, 0], steps[:, 1]) if len(steps) else np.zeros(0)
     turns = np.abs((np.diff(course) + np.pi) % (2.0 * np.pi) - np.pi)
-    turn_s = turns * radius_m / speed
-    # How long a vehicle is under way at each corner, with the turns before it.
-    clock_s = along / speed
-    clock_s[2:] += np.cumsum(turn_s)
+    return np.asarray(turns * turn_radius_m(spec, member.spec) / spec.speed_of(member.spec))
+
+
+def _clock_s(spec: MissionSpec, member: Member, corners: FloatArray) -> FloatArray:
+    """Return how long a vehicle is under way at each corner (k, 2), with the turns before it and its fixes, (k,)."""
+    clock_s = _along(corners) / spec.speed_of(member.spec)
+    clock_s[2:] += np.cumsum(_turns_s(spec, member, corners))
     policy = spec.surface_policy
     if policy is not None and policy.every_min is not None:
         clock_s = clock_s + np.floor(clock_s / (60.0 * policy.every_min)) * policy.stay_s
-    circles_s = len(turns) * 2.0 * np.pi * radius_m / speed
+    return clock_s
+
+
+def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: FloatArray) -> PlannedWay:
+    speed, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
+    along = _along(corners)
+    turn_s, clock_s = _turns_s(spec, member, corners), _clock_s(spec, member, corners)
+    circles_s = len(turn_s) * 2.0 * np.pi * radius_m / speed
     home_m = home_of(member, spec)
     ways_home = None if home_m is None else WaysHome(constraints, home_m)
 

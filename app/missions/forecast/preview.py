@@ -15,8 +15,10 @@ from app.mapping.georeference import LocalFrame
 from app.missions.compilation import Compilation
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.hub import FleetHub
-from app.missions.forecast.plan import Plan, PlannedWay, plan
-from app.missions.forecast.request import ForecastRange, described_team, starts_of
+from app.missions.forecast.plan import SAME_M, Plan, PlannedWay, plan
+from app.missions.forecast.ranges import ForecastRange
+from app.missions.forecast.request import described_team, starts_of
+from app.missions.forecast.whole_survey import WholeSurveyView, whole_view
 from app.missions.running.admission import check_spec
 from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.views.base import View
@@ -66,6 +68,10 @@ class PlanView(View):
         description="Whether every vehicle's energy lasts; null: of one or more it is not known, the others' does"
     )
     whole: bool = Field(description="Whether this is all; else the ways end where the time for planning was up")
+    whole_survey: WholeSurveyView | None = Field(
+        description="What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath "
+        "sonars, or not all of it was planned in time"
+    )
     assumptions: list[str] = Field(description="What was taken to be so, in words")
 
 
@@ -148,8 +154,18 @@ def _view(spec: MissionSpec, found: Plan, where: str, *, guessed: bool) -> PlanV
         ),
         energy_suffices=False if False in enough else None if None in enough else True,
         whole=found.whole,
+        whole_survey=_whole(found),
         assumptions=assumptions,
     )
+
+
+def _whole(found: Plan) -> WholeSurveyView | None:
+    """Return what all of a survey takes, by its plan."""
+    if found.whole_survey is None:
+        return None
+    planned = {way.name: way.distance_m for way in found.ways}
+    within = all(way.distance_m <= planned[name] + SAME_M for name, way in found.whole_survey.items())
+    return whole_view([found.whole_survey], within_budget=within)
 
 
 def _vehicle(way: PlannedWay, frame: LocalFrame) -> PlannedVehicleView:

@@ -15,7 +15,11 @@ from app.compute.compute import Compute
 from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
+from app.missions.flight.decision import make_constraints
+from app.missions.forecast.ranges import ForecastRange
 from app.missions.forecast.simulate import Forecast, floors_under, fly_over, forecast
+from app.missions.forecast.swath_flight import sweeps
+from app.missions.forecast.whole_survey import WholeSurveyView, range_of, whole_view, whole_way
 from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_spec
 from app.missions.running.team_changes import refuse_ended
@@ -32,17 +36,9 @@ BUDGET_S = 10.0
 PATIENCE_S = 60.0
 """After so long by the clock no further floor is begun."""
 
-LOW, HIGH = 0.1, 0.9
 START_MARGIN_M, START_SPACING_M = 2.0, 5.0
 NEAR_M = 500.0
 """A vehicle farther away than this is taken to be brought to the area first."""
-
-
-class ForecastRange(View):
-    """From where to where a figure went, over floors of different roughness: 10 % were below, 10 % above."""
-
-    low: float
-    high: float
 
 
 class VehicleForecast(View):
@@ -60,7 +56,8 @@ class ForecastView(View):
     duration_s_range: ForecastRange
     vehicles: list[VehicleForecast]
     coverage_pct: float = Field(
-        description="Share of the area's cells that will be known to `accuracy_m`; median over the floors"
+        description="Share of the area's cells that will be known to `accuracy_m`, with swath sonars that will be "
+        "ensonified; median over the floors"
     )
     coverage_pct_range: ForecastRange
     remaining_pct: float = Field(description="Share of the landmarks that will not be; median over the floors")
@@ -70,6 +67,10 @@ class ForecastView(View):
     steps: int = Field(description="Steps that are still to be flown")
     steps_simulated: int = Field(
         description="Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many"
+    )
+    whole_survey: WholeSurveyView | None = Field(
+        description="What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath "
+        "sonars"
     )
     steps_flown: int = Field(description="The same as `steps_simulated`")
     floors: int = Field(description="Over how many floors of different roughness it was flown")
@@ -152,7 +153,9 @@ class Forecaster:
             found = Forecast(list(flights), floors)
         else:
             found = await self._here(spec, ours, starts, known, floor_depth_m, first_step)
-        return _view(spec, found, where, spec.steps - first_step + 1)
+        return _view(
+            spec, found, where, spec.steps - first_step + 1, await asyncio.to_thread(_whole, spec, ours, found)
+        )
 
     async def _here(
         self,
@@ -215,7 +218,34 @@ def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str
     return np.array(starts), words
 
 
-def _view(spec: MissionSpec, found: Forecast, where: str, steps: int) -> ForecastView:
+def _whole(spec: MissionSpec, members: list[Member], found: Forecast) -> WholeSurveyView | None:
+    """Return what all of a survey takes, with the batteries for it."""
+    constraints = make_constraints(spec)
+    flights = [
+        {
+            member.name: whole_way(
+                spec,
+                constraints,
+                member,
+                whole.ways_m[member.name],
+                whole.clocks_s[member.name],
+                whole.distances_m[member.name],
+                whole.drawn_out,
+            )
+            for member in members
+        }
+        for flight in found.flights
+        if (whole := flight.whole) is not None
+    ]
+    if not flights:
+        return None
+    within = all(flight.whole is not None and flight.whole.within_budget for flight in found.flights)
+    return whole_view(flights, within_budget=within)
+
+
+def _view(
+    spec: MissionSpec, found: Forecast, where: str, steps: int, whole: WholeSurveyView | None = None
+) -> ForecastView:
     first, flights = found.floors[0], found.flights
     kinds = ", ".join(floor.kind for floor in found.floors)
     assumptions = [
@@ -225,13 +255,17 @@ def _view(spec: MissionSpec, found: Forecast, where: str, steps: int) -> Forecas
         if len(flights) > 1
         else "Flown over one floor only, for want of time: on a rougher one it will be worse.",
         where,
-        f"Straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and none is lost.",
+        f"Turning circles and straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and "
+        "none is lost."
+        if sweeps(spec)
+        else f"Straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and none is lost.",
     ]
+    assumptions += _said_of_whole(spec, found)
     if spec.surface_policy is not None:
         assumptions.append("Coming up for fixes is not in it.")
     if spec.targets:
         assumptions.append("Going for moving targets is not in it.")
-    if found.steps_flown < steps:
+    if found.steps_flown < steps and not sweeps(spec):
         assumptions.append(
             f"Only {found.steps_flown} of {steps} steps were simulated on every floor, in {BUDGET_S:g} s of the "
             "processor each: duration and distances are drawn out to all of them; coverage and deviation are those "
@@ -244,19 +278,20 @@ def _view(spec: MissionSpec, found: Forecast, where: str, steps: int) -> Forecas
     ways = {name: [flight.distances_m[name] for flight in flights] for name in flights[0].distances_m}
     return ForecastView(
         duration_s=_median(durations),
-        duration_s_range=_range(durations),
+        duration_s_range=range_of(durations),
         vehicles=[
-            VehicleForecast(vehicle=name, distance_m=_median(way), distance_m_range=_range(way))
+            VehicleForecast(vehicle=name, distance_m=_median(way), distance_m_range=range_of(way))
             for name, way in ways.items()
         ],
         coverage_pct=_median(coverages),
-        coverage_pct_range=_range(coverages),
+        coverage_pct_range=range_of(coverages),
         remaining_pct=_median(remainders),
-        remaining_pct_range=_range(remainders),
+        remaining_pct_range=range_of(remainders),
         mean_sd_m=_median(sds) if sds else None,
-        mean_sd_m_range=_range(sds) if sds else None,
+        mean_sd_m_range=range_of(sds) if sds else None,
         steps=steps,
         steps_simulated=found.steps_flown,
+        whole_survey=whole,
         steps_flown=found.steps_flown,
         floors=len(flights),
         assumptions=assumptions,
@@ -267,6 +302,14 @@ def _median(values: list[float]) -> float:
     return float(np.median(values))
 
 
-def _range(values: list[float]) -> ForecastRange:
-    low, high = (float(x) for x in np.quantile(values, [LOW, HIGH]))
-    return ForecastRange(low=low, high=high)
+def _said_of_whole(spec: MissionSpec, found: Forecast) -> list[str]:
+    """Return what is to be said of a survey with swath sonars."""
+    if not sweeps(spec):
+        return []
+    drawn_out = max(flight.whole.drawn_out for flight in found.flights if flight.whole is not None)
+    if drawn_out <= 1.0:
+        return []
+    return [
+        f"Not all was flown in {BUDGET_S:g} s of the processor for each floor: what was left then, up to "
+        f"{100.0 * (1.0 - 1.0 / drawn_out):.0f} % of the survey, is drawn out from the rest."
+    ]

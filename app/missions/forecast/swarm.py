@@ -29,6 +29,8 @@ class WholeSurvey:
         How many times as much the whole is, where not all of it was flown for want of time; else 1.
     coverage_pct
         Share that is ensonified in the end.
+    within_budget
+        Whether all was done before anybody's way was used up.
     """
 
     ways_m: dict[str, FloatArray]
@@ -36,6 +38,7 @@ class WholeSurvey:
     distances_m: dict[str, float]
     drawn_out: float
     coverage_pct: float
+    within_budget: bool
 
 
 @dataclass(frozen=True)

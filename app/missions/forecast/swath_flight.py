@@ -286,7 +286,7 @@ def sweep_over(
         goes = float(swarm.distance_m.sum())
         whole = min(1.0 + float(left_m.sum()) / max(goes, 1.0), 100.0 / max(done_pct, 1.0))
     flown = Flown(
-        duration_s=float(swarm.clock_s.max()) * whole,
+        duration_s=max(float(clock[-1]) for clock in flight.clocks_s) * whole,
         distances_m={member.name: float(swarm.distance_m[i]) * whole for i, member in enumerate(members)},
         coverage_pct=done_pct if ended else min(done_pct * whole, 100.0),
         remaining_pct=builder.remaining_pct() if ended else max(100.0 - done_pct * whole, 0.0),
@@ -303,5 +303,6 @@ def sweep_over(
             distances_m={member.name: float(swarm.distance_m[i]) for i, member in enumerate(members)},
             drawn_out=share,
             coverage_pct=builder.coverage_pct() if all_seen else 100.0,
+            within_budget=ended and bool((left_m > LEAST_WAY_M).all()),
         )
     )
