@@ -695,7 +695,9 @@ class ForecastView(Model):
     duration_s_range: ForecastRange
     vehicles: list[VehicleForecast]
     coverage_pct: float
-    """Share of the area's cells that will be known to `accuracy_m`; median over the floors"""
+    """Share of the area's cells that will be known to `accuracy_m`, with swath sonars that will be ensonified;
+    median over the floors
+    """
     coverage_pct_range: ForecastRange
     remaining_pct: float
     """Share of the landmarks that will not be; median over the floors"""
@@ -707,6 +709,8 @@ class ForecastView(Model):
     """Steps that are still to be flown"""
     steps_simulated: int
     """Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many"""
+    whole_survey: WholeSurveyView | None
+    """What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath sonars"""
     steps_flown: int
     """The same as `steps_simulated`"""
     floors: int
@@ -1165,6 +1169,10 @@ class PlanView(Model):
     """Whether every vehicle's energy lasts; null: of one or more it is not known, the others' does"""
     whole: bool
     """Whether this is all; else the ways end where the time for planning was up"""
+    whole_survey: WholeSurveyView | None
+    """What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath sonars, or
+    not all of it was planned in time
+    """
     assumptions: list[str]
     """What was taken to be so, in words"""
 
@@ -2587,6 +2595,35 @@ class WaypointsMessage(Model):
 
     type: Literal["waypoints"]
     waypoints: list[WaypointView]
+
+
+class WholeSurveyView(Model):
+    """What it takes until swath sonars have nothing left to ensonify, whatever the budget is."""
+
+    duration_s: float
+    """Until the last vehicle is done, by the vehicles' time; median"""
+    duration_s_range: ForecastRange
+    distance_m: float
+    """Of all vehicles together; median"""
+    distance_m_range: ForecastRange
+    vehicles: list[WholeVehicleView]
+    within_budget: bool
+    """Whether the mission's budget lasts for it on every floor"""
+
+
+class WholeVehicleView(Model):
+    """What one vehicle does in all of a survey."""
+
+    vehicle: str
+    distance_m: float
+    """Its way, turns included where they were flown; median over the floors"""
+    distance_m_range: ForecastRange
+    duration_s: float
+    """Seconds of its time for that, ways to fetch batteries included; median"""
+    batteries: int | None
+    """How many full batteries that takes, on the floor that takes most: one more than it has to come back for
+    another; null: it is not known how long one lasts, or its way home and out is too long for one
+    """
 
 
 LiveMessage: TypeAlias = SnapshotMessage | VehiclesMessage | TargetsMessage | SearchMessage | WaypointsMessage | StateMessage | TrafficMessage | MapMessage | EventMessage | AlarmMessage

@@ -3153,7 +3153,7 @@ export interface components {
             vehicles: components["schemas"]["VehicleForecast"][];
             /**
              * Coverage Pct
-             * @description Share of the area's cells that will be known to `accuracy_m`; median over the floors
+             * @description Share of the area's cells that will be known to `accuracy_m`, with swath sonars that will be ensonified; median over the floors
              */
             coverage_pct: number;
             coverage_pct_range: components["schemas"]["ForecastRange"];
@@ -3179,6 +3179,8 @@ export interface components {
              * @description Of these were simulated in the time allowed; `coverage_pct` and what follows is after as many
              */
             steps_simulated: number;
+            /** @description What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath sonars */
+            whole_survey: components["schemas"]["WholeSurveyView"] | null;
             /**
              * Steps Flown
              * @description The same as `steps_simulated`
@@ -4424,6 +4426,8 @@ export interface components {
              * @description Whether this is all; else the ways end where the time for planning was up
              */
             whole: boolean;
+            /** @description What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath sonars, or not all of it was planned in time */
+            whole_survey: components["schemas"]["WholeSurveyView"] | null;
             /**
              * Assumptions
              * @description What was taken to be so, in words
@@ -7582,6 +7586,55 @@ export interface components {
             type: "waypoints";
             /** Waypoints */
             waypoints: components["schemas"]["WaypointView"][];
+        };
+        /**
+         * WholeSurveyView
+         * @description What it takes until swath sonars have nothing left to ensonify, whatever the budget is.
+         */
+        WholeSurveyView: {
+            /**
+             * Duration S
+             * @description Until the last vehicle is done, by the vehicles' time; median
+             */
+            duration_s: number;
+            duration_s_range: components["schemas"]["ForecastRange"];
+            /**
+             * Distance M
+             * @description Of all vehicles together; median
+             */
+            distance_m: number;
+            distance_m_range: components["schemas"]["ForecastRange"];
+            /** Vehicles */
+            vehicles: components["schemas"]["WholeVehicleView"][];
+            /**
+             * Within Budget
+             * @description Whether the mission's budget lasts for it on every floor
+             */
+            within_budget: boolean;
+        };
+        /**
+         * WholeVehicleView
+         * @description What one vehicle does in all of a survey.
+         */
+        WholeVehicleView: {
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Distance M
+             * @description Its way, turns included where they were flown; median over the floors
+             */
+            distance_m: number;
+            distance_m_range: components["schemas"]["ForecastRange"];
+            /**
+             * Duration S
+             * @description Seconds of its time for that, ways to fetch batteries included; median
+             */
+            duration_s: number;
+            /**
+             * Batteries
+             * @description How many full batteries that takes, on the floor that takes most: one more than it has to come back for another; null: it is not known how long one lasts, or its way home and out is too long for one
+             */
+            batteries: number | null;
         };
     };
     responses: never;

@@ -6,6 +6,7 @@ import { distance, duration, metres, percent } from "../state/format";
 import { said } from "../state/session";
 import { say } from "../words/say";
 import { Button } from "./Controls";
+import { WholeSurvey } from "./WholeSurvey";
 
 /**
  * What a quick simulation says of a mission. It is asked for by a button; `of` names what it was made of, so that it is
@@ -80,7 +81,7 @@ function between(range: { low: number; high: number } | null, shown: (value: num
 
 function Found({ view }: { view: ForecastView }) {
   const simulated =
-    view.steps_simulated < view.steps
+    view.steps_simulated < view.steps && !view.whole_survey
       ? say("forecast.afterSteps", { stepsSimulated: view.steps_simulated })
       : "";
   return (
@@ -92,13 +93,15 @@ function Found({ view }: { view: ForecastView }) {
           <dd data-testid="forecast-duration">{between(view.duration_s_range, duration)}</dd>
         </div>
         <div class="figure">
-          <dt>{say("forecast.wellKnown", { simulated })}</dt>
+          <dt>{view.whole_survey ? say("forecast.ensonified") : say("forecast.wellKnown", { simulated })}</dt>
           <dd data-testid="forecast-coverage">{between(view.coverage_pct_range, percent)}</dd>
         </div>
-        <div class="figure">
-          <dt>{say("forecast.landmarksLeft", { simulated })}</dt>
-          <dd>{between(view.remaining_pct_range, percent)}</dd>
-        </div>
+        {view.whole_survey ? null : (
+          <div class="figure">
+            <dt>{say("forecast.landmarksLeft", { simulated })}</dt>
+            <dd>{between(view.remaining_pct_range, percent)}</dd>
+          </div>
+        )}
         <div class="figure">
           <dt>{say("forecast.meanDeviation", { simulated })}</dt>
           <dd>{between(view.mean_sd_m_range, (sd) => metres(sd, 2))}</dd>
@@ -107,6 +110,7 @@ function Found({ view }: { view: ForecastView }) {
       <p class="hint">
         {view.vehicles.map((v) => `${v.vehicle} ${between(v.distance_m_range, distance)}`).join(" · ")}
       </p>
+      {view.whole_survey ? <WholeSurvey whole={view.whole_survey} /> : null}
       <ul class="hint assumptions">
         {view.assumptions.map((words) => (
           <li key={words}>{words}</li>

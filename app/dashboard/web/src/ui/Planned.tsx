@@ -9,6 +9,7 @@ import { LatestAsker } from "../state/planning";
 import { said } from "../state/session";
 import { fleet, planned } from "../state/store";
 import { say } from "../words/say";
+import { WholeSurvey } from "./WholeSurvey";
 
 const PERCENT = 100;
 const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
@@ -69,6 +70,7 @@ export function Planned({ of: { shares }, fault }: { of: Estimate; fault: string
           </b>
         </p>
       ) : null}
+      {plan?.whole_survey ? <WholeSurvey whole={plan.whole_survey} /> : null}
       <table class="shares" data-testid="shares">
         <thead>
           <tr>

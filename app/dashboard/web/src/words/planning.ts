@@ -118,6 +118,19 @@ export const PLANNING = {
     en: "Planned: {length} of tracks in {time}",
     pt: "Planeado: {length} de trajetos em {time}",
   },
+  "planned.whole": {
+    en: "All of the area: {length} in {time}",
+    pt: "Toda a área: {length} em {time}",
+  },
+  "planned.wholeBeyond": {
+    en: "▲ All of the area: {length} in {time}, more than the length of the mission allows",
+    pt: "▲ Toda a área: {length} em {time}, mais do que a duração da missão permite",
+  },
+  "planned.wholeOf": { en: "{vehicle} {way}, {time}", pt: "{vehicle} {way}, {time}" },
+  "planned.wholeOfBatteries": {
+    en: "{vehicle} {way}, {time}, {batteries} batteries",
+    pt: "{vehicle} {way}, {time}, {batteries} baterias",
+  },
   "planned.noPlan": { en: "No plan: {fault}", pt: "Sem plano: {fault}" },
   "planned.whatIsTakenToBeSo": { en: "What is taken to be so", pt: "O que se supõe" },
   "planned.wayHome": { en: "Way home", pt: "Regresso" },
@@ -420,6 +433,7 @@ export const PLANNING = {
   "forecast.forecastNotMeasured": { en: "Forecast, not measured", pt: "Previsão, não medição" },
   "forecast.duration": { en: "Duration", pt: "Duração" },
   "forecast.wellKnown": { en: "Well known{simulated}", pt: "Bem conhecido{simulated}" },
+  "forecast.ensonified": { en: "Ensonified", pt: "Ensonificado" },
   "forecast.landmarksLeft": { en: "Landmarks left{simulated}", pt: "Marcas por ver{simulated}" },
   "forecast.meanDeviation": { en: "Mean deviation{simulated}", pt: "Desvio médio{simulated}" },
 } as const;
