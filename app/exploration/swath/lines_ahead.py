@@ -63,7 +63,7 @@ def nearest_entry(
 def approaches_m(at: FloatArray, to: FloatArray, radius_m: float) -> FloatArray:
     """Return how long the ways from a pose (3,) to others (n, 3) are; straight where the first has no heading."""
     if np.isnan(at[2]):
-        return np.hypot(*(to[:, :2] - at[:2]).T)
+        return np.asarray(np.hypot(*(to[:, :2] - at[:2]).T))
     return lengths_m(at, to, radius_m)
 
 

@@ -39,7 +39,8 @@ class BarredGround:
         for zone in constraints.keep_out:
             barred |= shapely.contains_xy(Polygon(zone), east_m, north_m)
         away_m = np.asarray(distance_transform_edt(barred)) * coverage.cell_m
-        self._at: tuple[IntArray, IntArray] = np.nonzero(barred)
+        places: IntArray = np.argwhere(barred)
+        self._at = places[:, 0], places[:, 1]
         self._away_m: FloatArray = away_m[barred]
 
     def is_of(self, coverage: Coverage) -> bool:

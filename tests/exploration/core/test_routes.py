@@ -35,7 +35,7 @@ def shortest_m(start: np.ndarray, goal: np.ndarray) -> float:
         for k, b in enumerate(nodes[:i]):
             if FREE.covers(LineString([a, b])):
                 links[i, k] = links[k, i] = max(float(np.hypot(*(a - b))), 1e-9)
-    return float(dijkstra(csr_matrix(links), indices=len(nodes) - 2)[-1])
+    return float(dijkstra(csr_matrix(links))[-2, -1])
 
 
 @given(PLACES, PLACES)
