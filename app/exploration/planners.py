@@ -24,6 +24,7 @@ from app.exploration.site_search import SearchTask
 from app.exploration.site_search.cao import CaoSearch, SpsaSearch
 from app.exploration.site_search.frontier import FrontierSearch
 from app.exploration.site_search.random_flights import RandomFlights
+from app.exploration.swath.lines import warm_up as warm_up_lines
 from app.exploration.swath.planner import SwathPlanner
 
 PLANNERS: dict[str, type[PlannerBase]] = {
@@ -117,6 +118,8 @@ def warm_up_planner(name: str, sensor: Sensor) -> None:
     # A sea floor of a few times the sensor's reach: one that a single step surveys needs the same machine code.
     unit_m = sensor.visibility_m if isinstance(sensor, RangeSensor) else 4.0
     situation = _small_search(sensor) if isinstance(sensor, Scanner) else _small_situation(unit_m)
+    if name in COVERERS:
+        warm_up_lines()
     create_planner(name, QUICK, sensor).propose(situation, np.random.default_rng(0))
 
 
