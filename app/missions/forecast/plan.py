@@ -229,7 +229,7 @@ def _swath_lines(
     grid, mask = make_grid(spec.local_area(), max(spec.cell_m, fewest_m, min(widths_m, default=0.0) / CELLS_OF_HALF))
     coverage = without_zones(spec, _level(grid, depth_m, mask))
     if constraints.keep_out:
-        barred = BarredGround(constraints, coverage)
+        barred = BarredGround(constraints.for_plans, coverage)
         for how in flying.values():
             coverage = barred.within_sight(coverage, how)
     space = FreeSpace(constraints.for_plans, 0.0)
