@@ -130,7 +130,12 @@ def coverage(floor: Terrain, seed: int, size: Size) -> Trial:
     scenario = CoverageScenario(floor, 2, sonar, cell_m, seed=seed)
     fleet = fly_ours(scenario)
     ours, fixed = outcome(fleet), outcome(fly_fixed(scenario))
-    facts = {"ensonified_pct": ours.ensonified_pct, "holidays": float(ours.holidays), "dense_pct": ours.density_ok_pct}
+    facts = {
+        "ensonified_pct": ours.ensonified_pct,
+        "holidays": float(ours.holidays),
+        "holidays_by_yardstick": float(fixed.holidays),
+        "dense_pct": ours.density_ok_pct,
+    }
     extent = np.array([floor.width_m, floor.height_m])
     tracks = [rounded(np.array(craft.ends_m) / extent) for craft in fleet.crafts.values()]
     rows, cols = np.nonzero(fleet.wanted & ~fleet.density.ensonified)
