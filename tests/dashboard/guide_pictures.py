@@ -165,8 +165,8 @@ def profile(guide: Guide, page: Page) -> None:
     by_id(page, "measure").click()
     page.mouse.click(470, 330)
     page.mouse.click(930, 520)
-    page.get_by_role("button", name="Profile").click()
-    by_id(page, "profile-chart").locator("canvas").first.wait_for()
+    by_id(page, "measured-profile").click()
+    by_id(page, "profile-chart").wait_for()
 
 
 def charts(guide: Guide, page: Page) -> None:
