@@ -373,9 +373,8 @@ class SimFleetLink(FleetLink):
         return vehicle in self._swimmers
 
     def is_adrift(self, vehicle: str) -> bool:
-        """Whether a vehicle was not heard for so long that it has given its waypoint up: the current takes it along."""
-        swimmer = self._swimmers[vehicle]
-        return swimmer.silent_since_s is not None and swimmer.order is None
+        """Whether a vehicle has no waypoint, or gave it up as nobody heard it: the current takes it along."""
+        return self._swimmers[vehicle].order is None
 
     def true_position(self, vehicle: str) -> Position:
         """Return where a vehicle is, whatever it takes itself to be."""
