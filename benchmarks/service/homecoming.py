@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     print(json.dumps(result, indent=2))
     title = f"Coming home, {'in still water' if options.still else 'in currents'}"
-    write_section(options.write, FLIGHT, title, result, seeds=seeds)
+    write_section(options.write, FLIGHT, title, result, seeds=seeds[: result["missions"]])
     return 1 if result["wrong"] else 0
 
 
