@@ -68,7 +68,7 @@ class Watch:
         self.seen: dict[str, Seen] = {}
         self.in_zones: set[str] = set()
         self.drifted_into_zones: set[str] = set()
-        """Those that the current took into one while their motor was off, as when nobody heard them."""
+        """Those that the current took into one after they gave their waypoint up as nobody heard them."""
         self.closest_m = math.inf
         """Least distance aside between two at about the same depth, of which one was on its way home."""
         self.too_close: set[tuple[str, str]] = set()

@@ -154,7 +154,7 @@ class Member:
     energy: Energy = field(default_factory=lambda: Energy(1.0))
     return_needs_s: float | None = None
     """How long its way home takes from where it is; None: it has none, or it is not known yet."""
-    adrift_s: float = 0.0
+    drift_reserve_s: float = 0.0
     """What its reserve has for a drift while nobody hears it."""
     way_home_m: NDArray[np.float64] | None = None
     """The corners of its way home from about where it is, (n, 2); None: it has none, or it is not known yet."""

@@ -22,7 +22,7 @@ from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions import safety
-from app.missions.flight.corner_room import room_around
+from app.missions.flight.zone_clearance import room_around
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec import mission
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec

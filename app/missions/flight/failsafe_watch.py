@@ -84,7 +84,7 @@ class FailsafeWatch:
             member.way_home_m = self._range.way(member)
             member.way_left_alone_m = self._range.way_left_alone(member)
             member.return_needs_s = self._range.needs_s(member)
-            member.adrift_s = self._range.adrift_s(member)
+            member.drift_reserve_s = self._range.drift_reserve_s(member)
             member.turn_back_m = self._range.turn_back(member)
             over = member.withdrawal is not None and member.withdrawal.over
             detected = {} if over else self._detected(member) | too_close.get(member.name, {})
@@ -200,7 +200,7 @@ class FailsafeWatch:
                 if math.isfinite(needs_s)
                 else "the current is too strong for its way home"
             )
-        if left.safe_s <= with_reserve_s(needs_s, member.adrift_s):
+        if left.safe_s <= with_reserve_s(needs_s, member.drift_reserve_s):
             found[Failsafe.LOW_ENERGY] = (
                 f"its energy lasts {left.safe_s:.0f} s for sure, and its way home takes {needs_s:.0f} s"
             )

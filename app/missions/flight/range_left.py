@@ -12,7 +12,7 @@ from app.missions import safety
 from app.missions.flight.commit import LegCommit, home_of
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import layer_of
-from app.missions.recovery.failsafes import adrift_s, with_reserve_s
+from app.missions.recovery.failsafes import drift_reserve_s, with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
@@ -150,7 +150,7 @@ class RangeLeft:
             return None
         end_m = member.last_end_m(self._live.frame)
         speed_mps = self._live.spec.speed_of(member.spec)
-        needs_s = with_reserve_s(self._needs_from_s(member, end_m, home_m), self.adrift_s(member))
+        needs_s = with_reserve_s(self._needs_from_s(member, end_m, home_m), self.drift_reserve_s(member))
         over_s = left.safe_s - self._until_end_s(member) - needs_s
         return max(over_s * speed_mps, 0.0) if math.isfinite(over_s) else 0.0
 
@@ -177,7 +177,7 @@ class RangeLeft:
         end_m = member.last_end_m(self._live.frame)
         speed_mps = self._live.spec.speed_of(member.spec)
         leg_s = float(np.hypot(*(target_m - end_m))) / speed_mps
-        needs_s = with_reserve_s(self._needs_from_s(member, target_m, home_m), self.adrift_s(member))
+        needs_s = with_reserve_s(self._needs_from_s(member, target_m, home_m), self.drift_reserve_s(member))
         return self._until_end_s(member) + leg_s + needs_s <= left.safe_s
 
     def lasts_for(self, member: Member, start_m: FloatArray, way_m: FloatArray) -> bool:
@@ -187,15 +187,15 @@ class RangeLeft:
             return True
         speed_mps = self._live.spec.speed_of(member.spec)
         after_s = np.cumsum(np.hypot(*np.diff(np.vstack([start_m, way_m]), axis=0).T)) / speed_mps
-        adrift = self.adrift_s(member)
+        drift_s = self.drift_reserve_s(member)
         return all(
-            float(passed_s) + with_reserve_s(self._needs_from_s(member, corner, home_m), adrift) <= left.safe_s
+            float(passed_s) + with_reserve_s(self._needs_from_s(member, corner, home_m), drift_s) <= left.safe_s
             for corner, passed_s in zip(way_m, after_s, strict=True)
         )
 
-    def adrift_s(self, member: Member) -> float:
+    def drift_reserve_s(self, member: Member) -> float:
         """Return what a vehicle's reserve has to have in it for a drift in the current while nobody hears it."""
-        return adrift_s(self._live.spec.speed_of(member.spec), self.current_mps)
+        return drift_reserve_s(self._live.spec.speed_of(member.spec), self.current_mps)
 
     def _until_end_s(self, member: Member) -> float:
         return member.way_ahead_m(self._live.frame) / self._live.spec.speed_of(member.spec)

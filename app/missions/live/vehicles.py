@@ -135,7 +135,7 @@ class VehicleViews:
         recovery, left, needs_s = self._spec.recovery_of(member.spec), member.energy.left, member.return_needs_s
         turn_back_at = None
         if left is not None and needs_s is not None and math.isfinite(needs_s) and member.withdrawal is None:
-            slack_s = (left.safe_s - with_reserve_s(needs_s, member.adrift_s)) / self._time_scale
+            slack_s = (left.safe_s - with_reserve_s(needs_s, member.drift_reserve_s)) / self._time_scale
             turn_back_at = (now() + timedelta(seconds=max(slack_s, 0.0))).replace(microsecond=0)
         over = member.withdrawal is not None and member.withdrawal.over
         active = [FailsafeView(failsafe=a.failsafe, response=a.response, message=a.message) for a in member.failsafes]

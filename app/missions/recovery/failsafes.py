@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from app.missions.recovery.way_home import LEAST_SHARE
 from app.missions.spec.failsafes import Failsafe, Response
 
 STRENGTH = {response: number for number, response in enumerate(Response)}
@@ -36,9 +37,6 @@ LOW_RATIO, LOW_RESERVE_S = 1.1, 60.0
 
 UNHEARD_S = 240.0
 """So long may a vehicle that is not heard drift without its motor: from a minute on, until DUNE brings it home."""
-
-LEAST_HEADWAY = 0.05
-"""The least part of its speed that a vehicle is taken to make good against the current."""
 
 LAST_S = 90.0
 """A vehicle that will not get home goes on towards it until so little is left, then it comes up while it still can."""
@@ -194,18 +192,18 @@ class FailsafeJudge:
         return self.overrides.get(failsafe, TABLE[failsafe].response)
 
 
-def with_reserve_s(needs_s: float, adrift_s: float = 0.0) -> float:
-    """Return what a vehicle has to have left for a way home that takes so long, with what :func:`adrift_s` returns."""
-    return LOW_RATIO * needs_s + LOW_RESERVE_S + adrift_s
+def with_reserve_s(needs_s: float, drift_s: float = 0.0) -> float:
+    """Return what a vehicle has to have left for a way home that takes so long; ``drift_s``: see ``drift_reserve_s``."""
+    return LOW_RATIO * needs_s + LOW_RESERVE_S + drift_s
 
 
-def adrift_s(speed_mps: float, current_mps: tuple[float, float]) -> float:
+def drift_reserve_s(speed_mps: float, current_mps: tuple[float, float]) -> float:
     """Return how long a vehicle takes to come back to where it was not heard any more and gave up its waypoint.
 
     Meanwhile its motor is off and the current takes it along, east and north, wherever to.
     """
     strength_mps = math.hypot(*current_mps)
-    return UNHEARD_S * strength_mps / max(speed_mps - strength_mps, LEAST_HEADWAY * speed_mps)
+    return UNHEARD_S * strength_mps / max(speed_mps - strength_mps, LEAST_SHARE * speed_mps)
 
 
 def table_text() -> str:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.recovery.failsafes import adrift_s, with_reserve_s
+from app.missions.recovery.failsafes import drift_reserve_s, with_reserve_s
 from app.missions.recovery.way_home import way_time_s
 
 STEP_M = 5.0
@@ -39,15 +39,16 @@ def turn_back_place(
     """
     if not legs_m.size:
         return None
-    spent_s, last = adrift_s(speed_mps, current_mps), start_m
-    if spent_s + with_reserve_s(needs_s(start_m)) > left_s:
+    spent_s, last = 0.0, start_m
+    drift_s = drift_reserve_s(speed_mps, current_mps)
+    if with_reserve_s(needs_s(start_m), drift_s) > left_s:
         return start_m
     for a, b in pairwise(np.vstack([start_m, legs_m])):
         leg_s = way_time_s(a, b[None], speed_mps, current_mps)
         pieces = max(1, math.ceil(float(np.hypot(*(b - a))) / STEP_M))
         for share in np.arange(1, pieces + 1) / pieces:
             place = a + share * (b - a)
-            if spent_s + share * leg_s + with_reserve_s(needs_s(place)) > left_s:
+            if spent_s + share * leg_s + with_reserve_s(needs_s(place), drift_s) > left_s:
                 return last
             last = place
         spent_s += leg_s

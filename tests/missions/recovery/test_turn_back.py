@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
-from app.missions.recovery.failsafes import LOW_RATIO, LOW_RESERVE_S, UNHEARD_S, adrift_s
+from app.missions.recovery.failsafes import LOW_RATIO, LOW_RESERVE_S, UNHEARD_S, drift_reserve_s
 from app.missions.recovery.turn_back import STEP_M, turn_back_place
 
 HERE = np.zeros(2)
@@ -38,10 +38,10 @@ def test_who_has_too_little_turns_back_where_it_is() -> None:
 
 
 def test_a_current_against_the_legs_brings_it_nearer_and_one_that_helps_counts_as_a_drift_only() -> None:
-    adrift = adrift_s(1.0, (0.0, 0.4))
-    assert adrift == pytest.approx(UNHEARD_S * 0.4 / 0.6), "as far as it went at 0.4 m/s, back at 0.6 m/s"
-    assert adrift_s(1.0, (0.0, 0.0)) == 0.0
-    left_s = 900.0 + adrift
+    drift_s = drift_reserve_s(1.0, (0.0, 0.4))
+    assert drift_s == pytest.approx(UNHEARD_S * 0.4 / 0.6), "as far as it went at 0.4 m/s, back at 0.6 m/s"
+    assert drift_reserve_s(1.0, (0.0, 0.0)) == 0.0
+    left_s = 900.0 + drift_s
     still, against, with_it = found(900.0), found(left_s, current=(0.0, -0.4)), found(left_s, current=(0.0, 0.4))
     assert still is not None
     assert against is not None

@@ -153,6 +153,8 @@ class _Swimmer:
         self.aground = False
         self.silent_since_s: float | None = None
         """Since when it is out of reach, by its clock."""
+        self.adrift = False
+        """Whether it gave its waypoint up meanwhile."""
         self.terrain = terrain
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
@@ -191,7 +193,7 @@ class _Swimmer:
         return self.report
 
     def begin(self, order: WaypointOrder) -> None:
-        self.order, self.reached, self.raised = order, False, False
+        self.order, self.reached, self.raised, self.adrift = order, False, False, False
         self.head_for(order, order.position, order.position.depth_m)
 
     def head_for(self, order: WaypointOrder, place: Position, depth_m: float) -> None:
@@ -373,8 +375,8 @@ class SimFleetLink(FleetLink):
         return vehicle in self._swimmers
 
     def is_adrift(self, vehicle: str) -> bool:
-        """Whether a vehicle has no waypoint, or gave it up as nobody heard it: the current takes it along."""
-        return self._swimmers[vehicle].order is None
+        """Whether a vehicle gave its waypoint up as nobody heard it, and has none yet: the current takes it along."""
+        return self._swimmers[vehicle].adrift
 
     def true_position(self, vehicle: str) -> Position:
         """Return where a vehicle is, whatever it takes itself to be."""
@@ -521,6 +523,7 @@ class SimFleetLink(FleetLink):
             if swimmer.body.time_s - since_s >= FORSAKEN_S:
                 swimmer.body.stop()
                 swimmer.order = None
+                swimmer.adrift = True
 
     def _keep_clear_of_bottom(self, swimmer: _Swimmer, order: WaypointOrder) -> None:
         state = swimmer.body.state

@@ -174,7 +174,9 @@ async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_
         link.reach(NAME)
         assert [info.state for info in link.vehicles()] == [LinkState.READY]
         await link.engage(NAME)
+        assert link.is_adrift(NAME), "heard again, it has no waypoint yet"
         await link.order(order(3, 50.0, 40.0))
+        assert not link.is_adrift(NAME)
         reached = [WaypointStatus.REACHED]
         await until(
             lambda: [e.status for e in events if isinstance(e, WaypointReport) and e.step == 3][2:] == reached,

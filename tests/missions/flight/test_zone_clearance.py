@@ -13,8 +13,8 @@ from shapely.geometry import LineString, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.core.routes import FreeSpace
-from app.missions.flight.corner_room import room_around
 from app.missions.flight.decision import Knowledge, Place, decide, make_constraints, make_planner
+from app.missions.flight.zone_clearance import room_around
 from app.missions.spec.mission import MissionSpec
 from tests.support.missions.decisions import belief_of, decide_for, place
 from tests.support.missions.specs import make_spec, rectangle
