@@ -193,7 +193,7 @@ class FailsafeJudge:
 
 
 def with_reserve_s(needs_s: float, drift_s: float = 0.0) -> float:
-    """Return what a vehicle has to have left for a way home that takes so long; ``drift_s``: see ``drift_reserve_s``."""
+    """Return what a vehicle has to have left for a way home that takes so long; ``drift_s`` for a drift, too."""
     return LOW_RATIO * needs_s + LOW_RESERVE_S + drift_s
 
 
