@@ -100,19 +100,6 @@ def test_one_vehicle_goes_home_and_surveys_again(page: Page, service: Service) -
     expect_state(page, "running")
 
 
-def test_a_vehicle_turns_back_in_time_and_says_why(page: Page, service: Service) -> None:
-    vehicles = [{"name": "sim-1", "kind": "sim", "sensor": "dvl", "endurance_min": 11.5}]
-    # It may turn back before it has begun a leg.
-    mission = service.create(name="Low on energy", recovery={"point": FAR}, vehicles=vehicles)
-    service.act(mission, "start")
-    show(page, mission)
-    expect(by_id(page, "energy-sim-1")).to_have_text(re.compile(r"^\d+ %$"))
-    alarm = by_id(page, "failsafe-low_energy-sim-1")
-    expect(alarm).to_contain_text("Low energy")
-    expect(alarm).to_have_class(re.compile("alarm"))
-    expect(by_id(page, "state-sim-1")).to_contain_text("Returning home")
-
-
 def test_a_recovery_point_is_picked_in_the_form(page: Page, service: Service) -> None:
     page.goto("/")
     expect(by_id(page, "map")).to_have_attribute("data-ready", "true")

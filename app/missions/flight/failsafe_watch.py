@@ -180,7 +180,7 @@ class FailsafeWatch:
         if breach and member.legs and member.withdrawal is None:
             found[Failsafe.GEOFENCE_LEFT] = f"it is {breach}"
         if member.followed and not member.engaged and member.refusal and link.state is not LinkState.LOST:
-            found[Failsafe.OTHER_CONSOLE] = member.refusal
+            found[Failsafe.OTHER_CONSOLE] = member.refusal.removeprefix(f"{member.name}: ")
         return found
 
     def _energy(self, member: Member) -> dict[Failsafe, str]:

@@ -185,7 +185,7 @@ def _position_quality(sd_m: float | None, policy: SurfacePolicy | None) -> Posit
 def _reason(member: Member, info: VehicleInfo) -> str:
     launched = member.capabilities.simulated and info.state is LinkState.UNKNOWN and member.report is not None
     # Nothing is to be done about a simulated vehicle that was put away with its mission.
-    return member.refusal or ("" if launched else info.reason)
+    return member.refusal.removeprefix(f"{member.name}: ") or ("" if launched else info.reason)
 
 
 def local_place(frame: LocalFrame, position: Position) -> tuple[float, float] | None:

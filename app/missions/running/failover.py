@@ -15,6 +15,7 @@ from app.missions.running.claims import Claims
 from app.missions.running.ownership import PERIOD_S, Ownership
 from app.missions.running.registry import MissionRegistry
 from app.missions.running.supervisor import MissionSupervisor
+from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.states import AT_SEA, MissionState
 from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
@@ -83,6 +84,10 @@ class Failover:
             return
         if live.header.state is MissionState.RUNNING:
             self._supervisor.run(live)
+            # Vehicles wait for no line of the log.
+            words = "the service was started anew: the mission goes on with what was committed"
+            facts = {"failsafe": Failsafe.SERVICE_RESTARTED, "response": Response.WARN}
+            await live.journal.log(Level.WARNING, "failsafe", words, **facts)
 
     async def _keep(self) -> None:
         while True:

@@ -56,6 +56,16 @@ describe("what needs a person", () => {
     });
   });
 
+  test("what an open alarm of a vehicle says is not said once more as a warning", () => {
+    const lost = { failsafe: "link_lost", response: "warn", message: "silent" } as const;
+    const close = { failsafe: "separation_lost", response: "warn", message: "b is near" } as const;
+    const told = { ...alarm("one", "critical", "2026-06-01T10:00:00Z"), kind: "link_lost" } as AlarmView;
+    const here = mission([vehicle("a", { failsafes: [lost, close] })]);
+    expect(mattersOf(here, [told]).map(({ what }) => what)).toEqual(["alarm one", "a: b is near"]);
+    // Somebody took it, and it goes on.
+    expect(mattersOf(here, []).map(({ what }) => what)).toEqual(["a: silent", "a: b is near"]);
+  });
+
   test("an alarm whose cause is over stays, no louder than a warning", () => {
     const over = { ...alarm("over", "critical", "2026-06-01T10:00:00Z"), ended_at: "2026-06-01T10:07:00Z" };
     expect(mattersOf(null, [over])[0]).toMatchObject({ tone: "warning", alarm: over });

@@ -23,7 +23,9 @@ const LOUDNESS = { alarm: 0, warning: 1, calm: 2 };
 export function mattersOf(mission: MissionView | null, alarms: readonly AlarmView[]): Matter[] {
   const found = [
     ...alarms.map(ofAlarm),
-    ...(mission ? [...ofMission(mission), ...mission.vehicles.flatMap((v) => ofVehicle(v, mission))] : []),
+    ...(mission
+      ? [...ofMission(mission), ...mission.vehicles.flatMap((v) => ofVehicle(v, mission, alarms))]
+      : []),
   ];
   return found.sort(
     (a, b) =>
@@ -63,7 +65,7 @@ function ofMission({ id, state, reason, updated_at }: MissionView): Matter[] {
   return [];
 }
 
-function ofVehicle(v: VehicleView, { state, ending }: MissionView): Matter[] {
+function ofVehicle(v: VehicleView, { state, ending }: MissionView, alarms: readonly AlarmView[]): Matter[] {
   const matter = { key: `vehicle ${v.name}`, vehicle: v.name, alarm: null, since: null };
   const led = state === "running" && ending === null;
   if (!v.active) {
@@ -78,18 +80,17 @@ function ofVehicle(v: VehicleView, { state, ending }: MissionView): Matter[] {
       },
     ];
   }
-  const warned = v.failsafes.find(({ response }) => response === "warn");
-  const found: Matter[] = warned
-    ? [
-        {
-          ...matter,
-          key: `warning ${v.name}`,
-          tone: "warning",
-          what: `${v.name}: ${warned.message}`,
-          todo: say("attention.watchIt"),
-        },
-      ]
-    : [];
+  const isTold = (failsafe: string) =>
+    alarms.some((one) => one.kind === failsafe && one.vehicle === v.name && one.ended_at === null);
+  const found: Matter[] = v.failsafes
+    .filter(({ failsafe, response }) => response === "warn" && !isTold(failsafe))
+    .map(({ failsafe, message }) => ({
+      ...matter,
+      key: `warning ${v.name} ${failsafe}`,
+      tone: "warning",
+      what: `${v.name}: ${message}`,
+      todo: say("attention.watchIt"),
+    }));
   if (led && v.phase === "home")
     found.push({
       ...matter,
