@@ -16,6 +16,7 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.motion.turning import ahead_of_end
+from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEG_SAMPLES = 9
 MOST_LEG_SAMPLES = 200
@@ -27,6 +28,8 @@ ENTRY_POINTS = 400
 LEAD_CLEARANCE_M = 0.5
 WAITING_CIRCLE_M = 10.0
 """How far from its waypoint a vehicle comes that waits there in circles: 7.5 m of radius, and what it overshoots."""
+CIRCLE_M = CIRCLE_RADIUS_M + 2.5
+"""Radius of the room for a circle: it is not flown on rails."""
 DEPTH_TOLERANCE_M = 0.25
 """A vehicle that keeps its layer may be this much deeper than asked."""
 CIRCLE_WITHIN = 2.5

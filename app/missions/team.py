@@ -166,6 +166,8 @@ class Member:
     """What is in force for it, the strongest response first."""
     asked: OperatorOrder | None = None
     """What its operator ordered; None: it does its part."""
+    waits_m: NDArray[np.float64] | None = None
+    """Centre of the circle in which it was sent to wait, (2,); None: it was not, or has an order since."""
     leg_start_m: NDArray[np.float64] | None = None
     """Where the leg of its order begins, (2,)."""
     leg_began_s: float = 0.0
@@ -215,7 +217,7 @@ class Member:
 
     def set_order(self, order: WaypointOrder | None, target_m: NDArray[np.float64] | None = None) -> None:
         """Give it an order and where that leads, or take its order away."""
-        self.order, self.target_m = order, target_m
+        self.order, self.target_m, self.waits_m = order, target_m, None
 
     def last_end_m(self, frame: LocalFrame) -> NDArray[np.float64]:
         """Return where its last committed leg ends, (2,), or where it is when it has none to fly."""

@@ -8,6 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, show
+from tests.support.missions.specs import lon_lat, rectangle
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -73,16 +74,20 @@ def test_vehicles_on_their_way_home_are_stopped(
 
 
 def test_a_vehicle_is_held_and_resumed(page: Page, service: Service) -> None:
-    under_way(page, service, "One waits", NEAR)
+    # With room for a circle.
+    starts = [lon_lat(35.0, 60.0), lon_lat(85.0, 60.0)]
+    vehicles = [vehicle | {"start": start} for vehicle, start in zip(PAIR, starts, strict=True)]
+    under_way(page, service, "One waits", NEAR, area=rectangle(0, 0, 120, 120), vehicles=vehicles)
     by_id(page, "hold-sim-1").click()
     expect(by_id(page, "withdrawn-sim-1")).to_contain_text("held by local operator")
-    expect(by_id(page, "state-sim-1")).to_contain_text("Stopped")
+    expect(by_id(page, "state-sim-1")).to_contain_text("Waits in circles")
     expect(by_id(page, "hold-sim-1")).to_have_count(0)
     # Holding everybody is a pause.
     expect(by_id(page, "hold-sim-2")).to_be_visible()
     by_id(page, "resume-sim-1").click()
     expect(by_id(page, "hold-sim-1")).to_be_visible()
     expect(by_id(page, "hold-sim-2")).to_be_visible()
+    expect(by_id(page, "state-sim-1")).not_to_contain_text("Waits in circles")
 
 
 def test_one_vehicle_goes_home_and_surveys_again(page: Page, service: Service) -> None:

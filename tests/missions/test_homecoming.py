@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from shapely.geometry import Point, Polygon
 
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import FaultKind
@@ -146,7 +147,7 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
 
 
 async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: MissionService) -> None:
-    mission = await service.create(recovered("a", "b", point=OUTSIDE, steps=1000))
+    mission = await service.create(recovered("a", "b", point=OUTSIDE, side_m=120.0, steps=1000))
     await act(service, mission.id, "start")
     await until_step(service, mission.id, 2)
     live = await service.get(mission.id)
@@ -159,11 +160,19 @@ async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: Mission
     await until(lambda: b.legs > other + 3, "b goes on meanwhile")
     assert a.legs == before
     assert await phase_of(service, mission, "a") is Phase.STOPPED
+    circles = {v.name: v.waiting_circle for v in (await view_of(service, mission.id)).vehicles}
+    assert circles["b"] is None
+    assert circles["a"] is not None
+    lon, lat = circles["a"].centre
+    east, north = FRAME.to_local(lat, lon)
+    room = Point(float(east), float(north)).buffer(circles["a"].radius_m)
+    assert Polygon(live.spec.local_area()).buffer(0.1).contains(room)
     # What is stored lets a restart go on with it.
     assert a.withdrawal is not None
     assert Withdrawal.recall(a.withdrawal.remember()) == replace(a.withdrawal, led=False)
     await service.send_on(live, "a", "Ana")
     await until(lambda: a.legs > before + 2, "a surveys again")
+    assert all(v.waiting_circle is None for v in (await view_of(service, mission.id)).vehicles)
     await hold(live, "b", "Ana")
     await call_home(live, "b", "Ana")
 

@@ -28,7 +28,6 @@ from app.missions.views.mission import Level
 from app.storage import missions as mission_queries
 from app.storage.models import StepRow, WaypointRow
 from app.storage.uncancellable import to_the_end
-from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAD_M = 25.0
 """How far beyond a waypoint a vehicle may be sent to pass it straight; more than the 15 m from which DUNE circles."""
@@ -41,9 +40,6 @@ NO_LEG = 0
 
 STILL_M = 0.5
 """Who goes no farther holds its place, which takes as much of its way as the longest leg: it flies circles there."""
-
-CIRCLE_M = CIRCLE_RADIUS_M + 2.5
-"""Radius of the room for a circle: it is not flown on rails."""
 
 WHERE = (Limit.AREA, Limit.AREA_LEG, Limit.KEEP_OUT, Limit.KEEP_OUT_LEG)
 """What a leg is held to once more when it is begun: its vehicle may be elsewhere than the leg was decided from."""
@@ -212,7 +208,7 @@ class LegCommit:
             start = member.place_m(self._live.frame)
             beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
             on = target + np.linspace(0.0, 1.0, LEAD_SAMPLES)[:, None] * (beyond - target)
-            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, CIRCLE_M)])
+            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, safety.CIRCLE_M)])
             lead = self._position(beyond[0], beyond[1], depth_m)
             known = safety.bottom_on_way(np.array([start, target, beyond]), self.bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
@@ -245,7 +241,7 @@ class LegCommit:
         centre_m = self._room(member, inside, inside)
         if centre_m is None:
             return None
-        ways = [*self._turning(member, inside, centre_m), disc(centre_m, CIRCLE_M)]
+        ways = [*self._turning(member, inside, centre_m), disc(centre_m, safety.CIRCLE_M)]
         wanted_m = member.order.position.depth_m
         if member.withdrawal is not None and member.withdrawal.below:
             wanted_m = self._depth_below_m(member, wanted_m)
@@ -296,9 +292,9 @@ class LegCommit:
             way += [] if other.target_m is None else [other.target_m]
             way += [leg.target_m for leg in other.ahead]
             if other.order is not None and other.order.circle is not None:
-                taken.append(CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
+                taken.append(safety.CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
             taken.append(np.array(way))
-        return safety.circling_room(self._constraints, start, target, CIRCLE_M, taken)
+        return safety.circling_room(self._constraints, start, target, safety.CIRCLE_M, taken)
 
     def _local(self, position: Position) -> FloatArray:
         east, north = self._live.frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))

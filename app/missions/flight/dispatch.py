@@ -135,6 +135,10 @@ class Dispatch:
             await self._hub.order(member.key, order)
         except VehicleRefusedError as error:
             log.info("a vehicle would not hold", vehicle=member.name, error=str(error))
+            return
+        east, north = self._live.frame.to_local(order.position.lat_deg, order.position.lon_deg)
+        member.waits_m = np.array([float(east), float(north)])
+        self._live.publish_summary()
 
     async def begin(self) -> None:
         """Send every vehicle that flies nothing its next leg, unless something bars that from where it is now."""

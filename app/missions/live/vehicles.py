@@ -13,10 +13,11 @@ from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
 from app.missions.recovery.failsafes import with_reserve_s
+from app.missions.safety import CIRCLE_M
 from app.missions.spec.mission import MissionSpec, SurfacePolicy
 from app.missions.spec.orders import OrderKind
 from app.missions.team import Member, Swath, Team
-from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView
+from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView, WaitingCircle
 from app.missions.views.orders import OrderView
 
 SWATH_KEPT_S = 5.0
@@ -88,6 +89,7 @@ class VehicleViews:
             on_plan_m=round(member.flown.on_plan_m, 1),
             idle_s=round(member.flown.idle_s, 1),
             order=self._order(member),
+            waiting_circle=self._waiting_circle(member),
             **self._recovery(member),
         )
         if report is None:
@@ -129,6 +131,12 @@ class VehicleViews:
             asked_at=order.asked_at,
             changed_at=order.asked_at,
         )
+
+    def _waiting_circle(self, member: Member) -> WaitingCircle | None:
+        """Return where a vehicle was sent to wait, as long as it does."""
+        if member.waits_m is None or not member.engaged:
+            return None
+        return WaitingCircle(centre=self._lon_lats(member.waits_m)[0], radius_m=CIRCLE_M)
 
     def _recovery(self, member: Member) -> dict[str, Any]:
         """Return what is shown of a vehicle's energy, its way home, and what is wrong with it."""

@@ -61,6 +61,13 @@ class FailsafeView(View):
     message: str
 
 
+class WaitingCircle(View):
+    """Where a vehicle waits: a circle that was found free of zones and of other vehicles' ways."""
+
+    centre: tuple[Longitude, Latitude]
+    radius_m: float = Field(description="Of the room that it is given: circles are not flown on rails")
+
+
 class VehicleView(View):
     """A vehicle as an operator sees it now."""
 
@@ -130,6 +137,9 @@ class VehicleView(View):
     way_home: list[tuple[Longitude, Latitude]] = Field(
         default_factory=list,
         description="Corners of its way home from about where it is, the last its recovery point; empty: none, or over",
+    )
+    waiting_circle: WaitingCircle | None = Field(
+        default=None, description="Where it was sent to wait; null: it was not, or goes on"
     )
     failsafes: list[FailsafeView] = Field(
         default_factory=list, description="What is wrong with it and what is done about that, the strongest first"

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from shapely import Point, Polygon
 from sqlalchemy import select
 
+from app.missions import safety
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight import deciding
-from app.missions.flight.commit import CIRCLE_M, NO_LEG, LegCommit
+from app.missions.flight.commit import NO_LEG, LegCommit
 from app.missions.flight.decision import Decision, decide
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
@@ -228,7 +229,7 @@ async def test_who_has_flown_everything_circles_inside_the_area(
     assert flown.held["fast"]
     for place in flown.held["fast"]:
         east, north = spec.frame().to_local(np.array(place.lat_deg), np.array(place.lon_deg))
-        assert Polygon(spec.local_area()).buffer(-CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
+        assert Polygon(spec.local_area()).buffer(-safety.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
 
 
 @given(st.integers(0, 10_000))

@@ -2529,6 +2529,8 @@ class VehicleView(Model):
     """
     way_home: list[tuple[float, float]]
     """Corners of its way home from about where it is, the last its recovery point; empty: none, or over"""
+    waiting_circle: WaitingCircle | None
+    """Where it was sent to wait; null: it was not, or goes on"""
     failsafes: list[FailsafeView]
     """What is wrong with it and what is done about that, the strongest first"""
     battery: BatteryState | None
@@ -2567,6 +2569,14 @@ class VolumeView(Model):
 
     m3: float
     sd_m3: float
+
+
+class WaitingCircle(Model):
+    """Where a vehicle waits: a circle that was found free of zones and of other vehicles' ways."""
+
+    centre: tuple[float, float]
+    radius_m: float
+    """Of the room that it is given: circles are not flown on rails"""
 
 
 class WaypointView(Model):

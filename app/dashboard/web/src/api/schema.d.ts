@@ -7442,6 +7442,8 @@ export interface components {
                 number,
                 number
             ][];
+            /** @description Where it was sent to wait; null: it was not, or goes on */
+            waiting_circle: components["schemas"]["WaitingCircle"] | null;
             /**
              * Failsafes
              * @description What is wrong with it and what is done about that, the strongest first
@@ -7526,6 +7528,22 @@ export interface components {
             m3: number;
             /** Sd M3 */
             sd_m3: number;
+        };
+        /**
+         * WaitingCircle
+         * @description Where a vehicle waits: a circle that was found free of zones and of other vehicles' ways.
+         */
+        WaitingCircle: {
+            /** Centre */
+            centre: [
+                number,
+                number
+            ];
+            /**
+             * Radius M
+             * @description Of the room that it is given: circles are not flown on rails
+             */
+            radius_m: number;
         };
         /**
          * WaypointStatus

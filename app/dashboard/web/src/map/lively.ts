@@ -3,7 +3,7 @@
 import type { LngLat, PolygonGeometry } from "../api/types";
 import { circle } from "./geo";
 import { boxOf, type Side } from "./labels";
-import type { PlaceMark, Route, Spot, Track } from "./marks";
+import type { Circle, PlaceMark, Route, Spot, Track } from "./marks";
 import type { Paper } from "./paper";
 import { dot, line, stroke, trace, way } from "./pen";
 import type { Projection } from "./projection";
@@ -33,7 +33,7 @@ export interface PlanLines {
 export interface LivelyContent {
   draft: { area: PolygonGeometry | null; keepOut: readonly PolygonGeometry[] };
   plan: PlanLines;
-  ranges: readonly { at: LngLat; radius_m: number; colour: string }[];
+  ranges: readonly Circle[];
   tails: readonly Track[];
   swaths: readonly SwathLine[];
   routes: readonly Route[];

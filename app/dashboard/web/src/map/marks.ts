@@ -21,6 +21,13 @@ export interface Spot {
   chosen: boolean;
 }
 
+/** A circle of a vehicle's on the map. */
+export interface Circle {
+  at: LngLat;
+  radius_m: number;
+  colour: string;
+}
+
 /** A place with a name; with a radius, what is about it. */
 export interface PlaceMark {
   words: string;

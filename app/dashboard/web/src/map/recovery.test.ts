@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { recoveryMarks, wayHome } from "./recovery";
+import { recoveryMarks, waitingCircle, wayHome } from "./recovery";
 
 const point = [-8.7, 41.2] as const;
 const own = [-8.6, 41.1] as const;
@@ -19,4 +19,12 @@ it("a way home begins where the vehicle is, and one that left, is there or was n
   for (const change of [{ active: false }, { lon_deg: null }, { way_home: [] }]) {
     expect(wayHome({ ...out, ...change }, "red")).toEqual([]);
   }
+});
+
+it("is a circle where a vehicle was sent to wait", () => {
+  const circle = { centre: [-8.7, 41.1], radius_m: 12.5 } as const;
+  const waiting = { active: true, waiting_circle: circle };
+  expect(waitingCircle(waiting, "red")).toEqual([{ at: [-8.7, 41.1], radius_m: 12.5, colour: "red" }]);
+  expect(waitingCircle({ ...waiting, active: false }, "red")).toEqual([]);
+  expect(waitingCircle({ ...waiting, waiting_circle: null }, "red")).toEqual([]);
 });

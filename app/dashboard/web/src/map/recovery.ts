@@ -1,7 +1,7 @@
 /** Where vehicles come home to, as places on the map. Pure. */
 
 import { say } from "../words/say";
-import type { PlaceMark, Track } from "./marks";
+import type { Circle, PlaceMark, Track } from "./marks";
 
 type At = readonly [number, number];
 
@@ -31,6 +31,17 @@ interface Homeward {
   lon_deg: number | null;
   lat_deg: number | null;
   way_home: readonly At[];
+}
+
+interface Waiting {
+  active: boolean;
+  waiting_circle: { centre: At; radius_m: number } | null;
+}
+
+/** The circle in which a vehicle was sent to wait; nothing where it was not. */
+export function waitingCircle({ active, waiting_circle: circle }: Waiting, colour: string): Circle[] {
+  if (!active || !circle) return [];
+  return [{ at: [circle.centre[0], circle.centre[1]], radius_m: circle.radius_m, colour }];
 }
 
 /** A vehicle's way home as a line from where it is; nothing where there is none, or it is there. */

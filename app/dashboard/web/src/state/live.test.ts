@@ -49,6 +49,7 @@ const vehicle = (
   turn_back_at: null,
   turn_back_point: null,
   way_home: [],
+  waiting_circle: null,
   failsafes: [],
 });
 

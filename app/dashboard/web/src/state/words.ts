@@ -208,6 +208,7 @@ function stateOf(vehicle: VehicleView, waypoint: WaypointView | undefined): Told
       tone: "calm",
     };
   const tone = LINK_TONES[vehicle.link];
+  if (vehicle.waiting_circle && vehicle.link !== "lost") return { words: say("state.waitsInCircles"), tone };
   if (vehicle.withdrawn && vehicle.phase && vehicle.link !== "lost")
     return { words: capital(PHASE_WORDS[vehicle.phase]), tone };
   if (vehicle.link !== "engaged" || !waypoint) return { words: LINK_WORDS[vehicle.link], tone };

@@ -155,7 +155,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
       {v.phase !== null && mission.value && mission.value.progress.elapsed_s > 0 ? (
         <p class="small" data-testid={`flown-${v.name}`}>
           {[
-            ...(v.active && !ended ? [capital(PHASE_WORDS[v.phase])] : []),
+            ...(v.active && !ended && !v.waiting_circle ? [capital(PHASE_WORDS[v.phase])] : []),
             say("cards.flown", { flownM: distance(v.flown_m) }),
             say("cards.sIdle", { idleS: Math.round(v.idle_s) }),
           ].join(" · ")}
@@ -238,7 +238,7 @@ function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; t
         </p>
       ) : null}
       {v.reason && !isSaid(v.reason, v) ? <p class={`reason ${tone}`}>{v.reason}</p> : null}
-      {waypoint?.reason ? <p class={`reason ${tone}`}>{waypoint.reason}</p> : null}
+      {waypoint?.reason && waypoint.reason !== v.withdrawn ? <p class={`reason ${tone}`}>{waypoint.reason}</p> : null}
     </>
   );
 }

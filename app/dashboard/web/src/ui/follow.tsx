@@ -16,7 +16,7 @@ import { Painter } from "../map/painter";
 import { lookupTable, vehicleColour } from "../map/palette";
 import type { Look } from "../map/paper";
 import { cutAt } from "../map/plan";
-import { recoveryMarks, wayHome } from "../map/recovery";
+import { recoveryMarks, waitingCircle, wayHome } from "../map/recovery";
 import { gridPlace, type SeaFloor } from "../map/seafloor";
 import { shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
@@ -127,9 +127,13 @@ export function follow(chart: Chart): () => void {
     }),
     effect(() => {
       const range = mission.value?.spec.limits.com_range_m;
-      chart.setRanges(
-        showRanges.value && range ? places().map(({ at, colour }) => ({ at, colour, radius_m: range })) : [],
-      );
+      const reach =
+        showRanges.value && range ? places().map(({ at, colour }) => ({ at, colour, radius_m: range })) : [];
+      const waiting =
+        replayStep.value === null
+          ? vehicles.value.flatMap(({ view: v, colour }) => waitingCircle(v, colour))
+          : [];
+      chart.setRanges([...reach, ...waiting]);
     }),
     effect(() =>
       chart.setTargets(

@@ -95,6 +95,7 @@ export const WATCHING = {
   "state.underWay": { en: "Under way", pt: "Em curso" },
   "state.leftTheMission": { en: "Left the mission", pt: "Saiu da missão" },
   "state.home2": { en: "Home", pt: "Recolhido" },
+  "state.waitsInCircles": { en: "Waits in circles", pt: "Espera em círculos" },
   "state.notLaunched": { en: "Not launched", pt: "Não lançado" },
   "state.simulationOver": { en: "Simulation over", pt: "Simulação acabada" },
   "state.toWaypoint": { en: "To waypoint {step}", pt: "Para o ponto {step}" },
