@@ -25,7 +25,7 @@ from simulator.battery import BatterySpec
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.equipment import Equipment
 from simulator.seafloors import generate
-from tests.support.ais import position
+from tests.support.ais import nmea, position
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, show
@@ -57,7 +57,7 @@ BEGAN_S = 1_795_225_140.0
 
 @dataclass
 class Scene:
-    """The service, its vehicles, and the page on it."""
+    """The service, its vehicles and receiver, and the page on it."""
 
     service: Service
     page: Page
@@ -274,3 +274,27 @@ def expect_alarm(page: Page, words: str) -> None:
         more.click()
     alarm = by_id(page, "alarms").locator("li.alarm").filter(has_text=re.compile(words))
     expect(alarm.first).to_contain_text("What to do:")
+
+
+def test_the_place_of_the_own_ship_is_taken_as_it_is_now(scene: Scene) -> None:
+    page = scene.page
+
+    def tell() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for words in ("GPGGA,092750,4111.1000,N,00842.2000,W,1,8,1.0,2.0,M,55.2,M,,", "HEHDT,60.0,T"):
+                sender.sendto(nmea(words) + b"\r\n", ("127.0.0.1", scene.ais_port))
+
+    show(page, scene.mission)
+    by_id(page, "go-to").click()
+    by_id(page, "own-ship-go-to").click()
+    expect(by_id(page, "own-ship-fault-go-to")).to_contain_text("The own ship is not heard")
+    tell()
+    scene.wait(lambda: scene.service.get("/traffic")["own_ship"], "she is heard")
+    by_id(page, "own-ship-go-to").click()
+    expect(page.get_by_role("button", name="Unmark")).to_be_visible()
+    expect(by_id(page, "own-ship-fault-go-to")).to_have_count(0)
+    by_id(page, "go-to").click()
+    by_id(page, "new-mission").click()
+    tell()
+    by_id(page, "own-ship-recovery").click()
+    expect(by_id(page, "field-recovery")).to_have_value("41.185000, -8.703333")

@@ -78,9 +78,9 @@ async def test_a_ship_that_comes_close_is_an_alarm_and_is_over_when_it_left(harb
         assert ship.closest is not None
         assert (ship.closest.vehicle, ship.closest.alarm) == ("a", True)
         live = await service.get(mission.id)
-        message = live.ship_views()
+        message = live.ships.message()
         assert message is not None
-        assert [one.mmsi for one in message] == [MMSI]
+        assert [one.mmsi for one in message.ships] == [MMSI]
         [row] = await service.rows(mission.id)
         [feature] = await features_of(live, service.maps, Kind.TRAFFIC, row)
         assert feature.properties["closest_vehicle"] == "a"
@@ -163,5 +163,5 @@ def test_no_mission_brings_vehicles_up_under_ships() -> None:
 
 async def test_without_a_receiver_nothing_is_shown(service: MissionService) -> None:
     mission = await service.create(sim_spec("a"))
-    assert (await service.get(mission.id)).ship_views() is None
+    assert (await service.get(mission.id)).ships.message() is None
     assert service.ships().sources == []

@@ -27,6 +27,14 @@ def sentence(channel: str = "A", part: int = 0, seq_id: int = 0, **message: Any)
     return made[part].encode()
 
 
+def nmea(words: str) -> bytes:
+    """Return a sentence of NMEA 0183 with its checksum."""
+    checksum = 0
+    for letter in words.encode():
+        checksum ^= letter
+    return f"${words}*{checksum:02X}".encode()
+
+
 def position(mmsi: int, lat_deg: float, lon_deg: float, knots: float = 0.0, course_deg: float = 0.0) -> bytes:
     """Return where a ship of class A is."""
     return sentence(msg_type=1, mmsi=mmsi, lat=lat_deg, lon=lon_deg, speed=knots, course=course_deg, status=0)

@@ -13,7 +13,7 @@ from app.missions.views.messages import MapMessage, TargetsMessage, VehiclesMess
 from app.missions.views.mission import VehicleView
 from app.missions.views.search import SearchMessage, SearchProgress
 from app.missions.views.targets import TargetView
-from app.missions.views.traffic import ShipView, TrafficMessage
+from app.missions.views.traffic import TrafficMessage
 
 LIVE_PERIOD_S = 0.2
 CROWD, MOST_PERIODS = 20, 5
@@ -31,9 +31,9 @@ class LiveFeed:
 
     Parameters
     ----------
-    vehicles, targets, search, ships
+    vehicles, targets, search, traffic
         Return how these are now. ``targets``: None for a mission without; ``search`` returns None in a survey,
-        ``ships`` where nothing listens for any.
+        ``traffic`` where nothing listens for ships.
     """
 
     def __init__(
@@ -42,13 +42,13 @@ class LiveFeed:
         vehicles: Callable[[], list[VehicleView]],
         targets: Callable[[], list[TargetView]] | None,
         search: Callable[[], SearchProgress | None],
-        ships: Callable[[], list[ShipView] | None] = lambda: None,
+        traffic: Callable[[], TrafficMessage | None] = lambda: None,
     ) -> None:
         self._broadcaster = broadcaster
         self._vehicles = vehicles
         self._targets = targets
         self._search = search
-        self._ships = ships
+        self._traffic = traffic
         self._ships_told_s = -np.inf
         self._ticker: asyncio.Task[None] | None = None
         self._map = MapMessage(version=0, step=0, min_depth_m=None, max_depth_m=None)
@@ -114,9 +114,9 @@ class LiveFeed:
         """Publish the ships about; they are slow, so that this is seldom."""
         if time.monotonic() - self._ships_told_s >= SHIPS_S:
             self._ships_told_s = time.monotonic()
-            ships = self._ships()
-            if ships is not None:
-                self._broadcaster.publish(TrafficMessage(time=now(), ships=ships))
+            message = self._traffic()
+            if message is not None:
+                self._broadcaster.publish(message)
 
     def _tell_of_search(self) -> None:
         """Publish how a search stands when a scan changed that."""

@@ -73,7 +73,6 @@ from app.missions.views.messages import StateMessage
 from app.missions.views.mission import Level, MissionSummary, Progress
 from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
-from app.missions.views.traffic import ShipView
 from app.storage import events as event_queries
 from app.storage import soundings as sounding_queries
 from app.storage.database import Database
@@ -236,7 +235,7 @@ class LiveMission:
         """Called when what was measured changes after the mission has ended."""
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
         """Ships near the mission."""
-        self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ship_views)
+        self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ships.message)
         self._time_scale = time_scale
         self._executor = executor
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
@@ -674,10 +673,6 @@ class LiveMission:
         """Return the moving targets, foretold for now."""
         pursuers = {member.pursuing: member.name for member in self.team if member.pursuing is not None}
         return target_views(self.ranges.tracking, self.frame, self.area, self.ranges.times.now_s(), pursuers)
-
-    def ship_views(self) -> list[ShipView] | None:
-        """Return the ships near the mission; None where nothing listens for any."""
-        return self.ships.views() if self.ships.listens else None
 
     def abandon(self, why: str = "another process has the mission now") -> None:
         """Write nothing any more, and let everyone who watches ask again."""

@@ -8,12 +8,13 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.georeference import LocalFrame
+from app.missions.clock import now
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member, Team
 from app.missions.traffic.approach import PlannedWay, closest_approach, planned_way
 from app.missions.traffic.roster import Ship
 from app.missions.traffic.watch import Traffic
-from app.missions.views.traffic import ApproachView, ShipView, ship_view
+from app.missions.views.traffic import ApproachView, ShipView, TrafficMessage, own_ship_view, ship_view
 
 SHOWN_S = 1800.0
 """How far ahead approaches are shown; alarms have a time of their own."""
@@ -65,6 +66,12 @@ class ShipsAbout:
     def listens(self) -> bool:
         """Whether there is anything to hear ships by."""
         return self.traffic is not None and self.traffic.listens
+
+    def message(self) -> TrafficMessage | None:
+        """Return what those who watch the mission are shown of ships; None where nothing listens for any."""
+        if self.traffic is None or not self.traffic.listens:
+            return None
+        return TrafficMessage(time=now(), ships=self.views(), own_ship=own_ship_view(self.traffic))
 
     def views(self) -> list[ShipView]:
         """Return the ships near the mission, the nearest first, each with the vehicle that it comes closest to."""

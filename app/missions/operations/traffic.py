@@ -6,7 +6,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.states import ENDED
 from app.missions.traffic.roster import Ship
 from app.missions.traffic.watch import Traffic
-from app.missions.views.traffic import ApproachView, TrafficView, ship_view, source_views
+from app.missions.views.traffic import ApproachView, TrafficView, own_ship_view, ship_view, source_views
 
 
 def places_of(missions: Iterable[LiveMission]) -> list[tuple[float, float]]:
@@ -26,6 +26,7 @@ def traffic_view(traffic: Traffic, missions: Iterable[LiveMission]) -> TrafficVi
                 closest[mmsi] = approach
     return TrafficView(
         ships=[ship_view(ship, traffic, closest.get(ship.position.mmsi)) for ship in ships],
+        own_ship=own_ship_view(traffic),
         sources=source_views(traffic),
         malformed=traffic.malformed,
         dropped=traffic.dropped,

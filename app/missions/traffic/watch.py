@@ -10,6 +10,7 @@ import structlog
 
 from app.missions.clock import now
 from app.missions.settings import AisSettings
+from app.missions.traffic.own_ship import OwnShip
 from app.missions.traffic.roster import NEAR_M, Roster, Ship, distance_m
 from app.missions.traffic.sentences import SentenceError, SentenceReader, ShipPosition
 from app.missions.traffic.sources import FileSource, Source, TcpSource, UdpSource
@@ -46,6 +47,8 @@ class Traffic:
     ----------
     settings
         See :class:`AisSettings`; without a source nothing is heard.
+    own_ship
+        Where the receivers themselves are.
     malformed, dropped
         Sentences that could not be read, and those that came faster than they can be.
     """
@@ -53,6 +56,7 @@ class Traffic:
     def __init__(self, settings: AisSettings, places: Callable[[], Sequence[tuple[float, float]]] = tuple) -> None:
         self.settings = settings
         self.roster = Roster(settings.max_age_s)
+        self.own_ship = OwnShip(settings.max_age_s)
         self.malformed = 0
         self.dropped = 0
         self._places = places
@@ -153,6 +157,8 @@ class Traffic:
         for _ in range(min(len(self._waiting), MOST_PER_TICK)):
             line, source = self._waiting.popleft()
             try:
+                if self.own_ship.read(line, source.name, self.now_s):
+                    continue
                 told = self._reader.read(line, source.name, self.now_s)
             except SentenceError:
                 self.malformed += 1
@@ -162,5 +168,7 @@ class Traffic:
             for one in told:
                 if isinstance(one, ShipPosition):
                     self.roster.place(one, self.now_s)
+                    if one.own:
+                        self.own_ship.place(one, source.name, self.now_s)
                 else:
                     self.roster.describe(one)

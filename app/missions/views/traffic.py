@@ -5,6 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from app.missions.traffic.own_ship import OLD_S
 from app.missions.traffic.roster import Ship
 from app.missions.traffic.watch import SILENCE_S, Traffic
 from app.missions.views.base import View
@@ -56,10 +57,25 @@ class TrafficSourceView(View):
     silent_s: float | None = Field(description="Since the last of them; null: none came yet")
 
 
+class OwnShipView(View):
+    """Where the operation's own ship is, by her GPS or AIS transponder. What she does not tell is null."""
+
+    lat_deg: float
+    lon_deg: float
+    sog_mps: float | None = Field(description="Speed over ground")
+    cog_deg: float | None = Field(description="Course over ground")
+    heading_deg: float | None = Field(description="True, of a compass")
+    source: str = Field(description="Where that came from")
+    heard_at: datetime = Field(description="When it was heard, UTC")
+    age_s: float = Field(description="Since it was heard")
+    current: bool = Field(description="Heard just now; false: she may be elsewhere")
+
+
 class TrafficView(View):
     """The ships about and how they are heard."""
 
     ships: list[ShipView] = Field(description="The nearest to a mission first")
+    own_ship: OwnShipView | None = Field(description="null: not heard for ais.max_age_s, or never")
     sources: list[TrafficSourceView] = Field(description="Empty: AIS is not set up, see the settings ais.*")
     malformed: int = Field(description="Sentences that could not be read")
     dropped: int = Field(description="Sentences that came faster than they can be read")
@@ -73,6 +89,7 @@ class TrafficMessage(View):
     type: Literal["traffic"] = "traffic"
     time: datetime
     ships: list[ShipView]
+    own_ship: OwnShipView | None = None
 
 
 class TrafficFinding(View):
@@ -104,6 +121,25 @@ def ship_view(ship: Ship, traffic: Traffic, closest: ApproachView | None = None)
         heard_at=traffic.utc_of(ship.heard_s),
         age_s=round(max(traffic.now_s - ship.heard_s, 0.0), 1),
         closest=closest,
+    )
+
+
+def own_ship_view(traffic: Traffic) -> OwnShipView | None:
+    """Return where the own ship is; None where nobody has told that lately."""
+    found = traffic.own_ship.at(traffic.now_s)
+    if found is None:
+        return None
+    age_s = max(traffic.now_s - found.heard_s, 0.0)
+    return OwnShipView(
+        lat_deg=round(found.lat_deg, 8),
+        lon_deg=round(found.lon_deg, 8),
+        sog_mps=_rounded(found.sog_mps),
+        cog_deg=_rounded(found.cog_deg),
+        heading_deg=_rounded(found.heading_deg),
+        source=found.source,
+        heard_at=traffic.utc_of(found.heard_s),
+        age_s=round(age_s, 1),
+        current=age_s <= OLD_S,
     )
 
 

@@ -1111,6 +1111,27 @@ class OrderView(Model):
     """Why it is over, where it was not carried out"""
 
 
+class OwnShipView(Model):
+    """Where the operation's own ship is, by her GPS or AIS transponder. What she does not tell is null."""
+
+    lat_deg: float
+    lon_deg: float
+    sog_mps: float | None
+    """Speed over ground"""
+    cog_deg: float | None
+    """Course over ground"""
+    heading_deg: float | None
+    """True, of a compass"""
+    source: str
+    """Where that came from"""
+    heard_at: datetime
+    """When it was heard, UTC"""
+    age_s: float
+    """Since it was heard"""
+    current: bool
+    """Heard just now; false: she may be elsewhere"""
+
+
 class PcaoModel(Model):
     """A controller that ``bathyfleet train`` wrote."""
 
@@ -2316,6 +2337,7 @@ class TrafficMessage(Model):
     type: Literal["traffic"]
     time: datetime
     ships: list[ShipView]
+    own_ship: OwnShipView | None
 
 
 class TrafficSourceView(Model):
@@ -2336,6 +2358,8 @@ class TrafficView(Model):
 
     ships: list[ShipView]
     """The nearest to a mission first"""
+    own_ship: OwnShipView | None
+    """null: not heard for ais.max_age_s, or never"""
     sources: list[TrafficSourceView]
     """Empty: AIS is not set up, see the settings ais.*"""
     malformed: int

@@ -40,6 +40,7 @@ import type {
   SystematicErrorsView,
   TelemetryView,
   TimedTracks,
+  TrafficView,
   VehicleView,
 } from "./types";
 
@@ -142,6 +143,7 @@ export const api = {
   signOut: () => remove("/session"),
   missions: () => request<MissionSummary[]>("/missions"),
   doctor: () => request<DoctorView>("/doctor"),
+  traffic: () => request<TrafficView>("/traffic"),
   vehicles: () => request<VehicleView[]>("/vehicles"),
   layers: () => request<LayerView[]>("/layers"),
   planners: () => request<PlannerView[]>("/planners"),

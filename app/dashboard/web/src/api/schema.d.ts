@@ -4253,6 +4253,52 @@ export interface components {
          */
         OverlayLayer: "depth" | "uncertainty" | "count" | "density" | "slope" | "tvu_fraction" | "difference" | "tvu" | "thu" | "shoal_pct" | "live";
         /**
+         * OwnShipView
+         * @description Where the operation's own ship is, by her GPS or AIS transponder. What she does not tell is null.
+         */
+        OwnShipView: {
+            /** Lat Deg */
+            lat_deg: number;
+            /** Lon Deg */
+            lon_deg: number;
+            /**
+             * Sog Mps
+             * @description Speed over ground
+             */
+            sog_mps: number | null;
+            /**
+             * Cog Deg
+             * @description Course over ground
+             */
+            cog_deg: number | null;
+            /**
+             * Heading Deg
+             * @description True, of a compass
+             */
+            heading_deg: number | null;
+            /**
+             * Source
+             * @description Where that came from
+             */
+            source: string;
+            /**
+             * Heard At
+             * Format: date-time
+             * @description When it was heard, UTC
+             */
+            heard_at: string;
+            /**
+             * Age S
+             * @description Since it was heard
+             */
+            age_s: number;
+            /**
+             * Current
+             * @description Heard just now; false: she may be elsewhere
+             */
+            current: boolean;
+        };
+        /**
          * Palette
          * @description Colours of the dashboard's map.
          * @enum {string}
@@ -6983,6 +7029,8 @@ export interface components {
             time: string;
             /** Ships */
             ships: components["schemas"]["ShipView"][];
+            /** @default null */
+            own_ship: components["schemas"]["OwnShipView"] | null;
         };
         /**
          * TrafficSourceView
@@ -7019,6 +7067,8 @@ export interface components {
              * @description The nearest to a mission first
              */
             ships: components["schemas"]["ShipView"][];
+            /** @description null: not heard for ais.max_age_s, or never */
+            own_ship: components["schemas"]["OwnShipView"] | null;
             /**
              * Sources
              * @description Empty: AIS is not set up, see the settings ais.*

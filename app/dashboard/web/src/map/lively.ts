@@ -293,7 +293,7 @@ const FILLS: Partial<Record<PlaceMark["sign"], string>> = {
 function paintMark(
   context: CanvasRenderingContext2D,
   at: Projection,
-  { at: place, sign, words, radius_m }: PlaceMark,
+  { at: place, sign, words, radius_m, bow_deg = 0, old = false }: PlaceMark,
   side: Side,
   paper: Paper,
 ): void {
@@ -302,13 +302,15 @@ function paintMark(
     line(context, at, circle(place, radius_m, 96), { colour: paper.casing, width: 4, opacity: 0.6 });
     line(context, at, circle(place, radius_m, 96), { colour: paper.ink, width: 2, dash });
   }
+  const [sin, cos] = [Math.sin((bow_deg * Math.PI) / 180), Math.cos((bow_deg * Math.PI) / 180)];
   context.beginPath();
   SIGNS[sign].forEach(([x, y], i) => {
-    if (i === 0) context.moveTo(at.x(place[0]) + x, at.y(place[1]) + y);
-    else context.lineTo(at.x(place[0]) + x, at.y(place[1]) + y);
+    const [px, py] = [at.x(place[0]) + x * cos - y * sin, at.y(place[1]) + x * sin + y * cos];
+    if (i === 0) context.moveTo(px, py);
+    else context.lineTo(px, py);
   });
   context.closePath();
-  context.fillStyle = FILLS[sign] ?? paper.casing;
+  context.fillStyle = old ? paper.casing : (FILLS[sign] ?? paper.casing);
   context.fill();
   stroke(context, { colour: paper.ink, width: 2 });
   if (words) label(context, at, place, words, side, paper);

@@ -34,4 +34,8 @@ export interface PlaceMark {
   sign: "goal" | "entry" | "transmitter" | "home" | "position" | "own";
   at: LngLat;
   radius_m: number;
+  /** Which way it points, degrees from north. */
+  bow_deg?: number;
+  /** It may be elsewhere by now. */
+  old?: boolean;
 }

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
-import type { LngLat, ShipView } from "../api/types";
+import type { LngLat, OwnShipView, ShipView } from "../api/types";
 import { wayBetween } from "./geo";
-import { shipMarks, shipWords } from "./ships";
+import { ownShipMark, shipMarks, shipWords } from "./ships";
 
 const AT: LngLat = [-8.7, 41.18];
 const ship = {
@@ -36,4 +36,14 @@ test("its words say who it is, and how close it comes to whom", () => {
   expect(shipWords({ ...ship, closest })).toBe("EVA (cargo), 9.7 kn, CPA 42 m from a in 2 min 5 s");
   expect(shipWords({ ...ship, name: "", own: true, sog_mps: null })).toBe("MMSI 211000001 (own)");
   expect(shipMarks([{ ...ship, closest }])[0]?.alarm).toBe(true);
+});
+
+test("the own ship points where her bow does, and is marked where she may be elsewhere by now", () => {
+  const own = { lat_deg: 41.18, lon_deg: -8.7, cog_deg: 30, heading_deg: 40, age_s: 0.4, current: true };
+  const ship = own as OwnShipView;
+  expect(ownShipMark(ship, true)).toMatchObject({ at: AT, words: "Own ship", bow_deg: 40, old: false });
+  expect(ownShipMark({ ...ship, heading_deg: null }, true).bow_deg).toBe(30);
+  const old = { words: "Own ship, 25 s ago", old: true };
+  expect(ownShipMark({ ...ship, current: false, age_s: 25 }, true)).toMatchObject(old);
+  expect(ownShipMark(ship, false).old).toBe(true);
 });

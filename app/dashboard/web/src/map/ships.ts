@@ -1,9 +1,10 @@
 /** Ships on the map: a triangle that points ahead, and where each will be in six minutes. Pure. */
 
-import type { LngLat, ShipView } from "../api/types";
+import type { LngLat, OwnShipView, ShipView } from "../api/types";
 import { fixed } from "../state/format";
 import { say } from "../words/say";
 import { metresPerDegree } from "./geo";
+import type { PlaceMark } from "./marks";
 
 const AHEAD_S = 360;
 const RAD = Math.PI / 180;
@@ -37,6 +38,20 @@ export function shipMarks(ships: readonly ShipView[]): ShipMark[] {
   });
 }
 
+/** The own ship: a boat that points where her bow does, hollow and with its age where she may be elsewhere by now. */
+export function ownShipMark(ship: OwnShipView, connected: boolean): PlaceMark {
+  const { lat_deg, lon_deg, heading_deg, cog_deg, age_s } = ship;
+  const old = !ship.current || !connected;
+  return {
+    words: old ? say("ships.ownShipOld", { age: minutes(age_s) }) : say("ships.ownShip"),
+    sign: "own",
+    at: [lon_deg, lat_deg],
+    radius_m: 0,
+    bow_deg: heading_deg ?? cog_deg ?? 0,
+    old,
+  };
+}
+
 export function shipWords({ name, mmsi, type, sog_mps, own, closest }: ShipView): string {
   const who = `${name || `MMSI ${mmsi}`}${own ? say("ships.own") : type ? ` (${type})` : ""}`;
   const speed = sog_mps === null ? "" : `, ${fixed((sog_mps * 3600) / 1852, 1)} kn`;
@@ -46,7 +61,7 @@ export function shipWords({ name, mmsi, type, sog_mps, own, closest }: ShipView)
   return say("ships.cpa", { who, speed, away, when });
 }
 
-function minutes(seconds: number): string {
+export function minutes(seconds: number): string {
   const whole = Math.round(seconds);
   return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)} min ${whole % 60} s`;
 }

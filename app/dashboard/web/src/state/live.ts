@@ -5,6 +5,7 @@ import type {
   EventView,
   LiveMessage,
   MissionView,
+  OwnShipView,
   Place,
   ShipView,
   VehicleView,
@@ -39,6 +40,8 @@ export interface LiveView {
   taken: AlarmView | null;
   /** Ships near the mission; null: nothing listens for any. */
   ships: readonly ShipView[] | null;
+  /** Where the own ship was when that was told last; null: not lately. */
+  ownShip: OwnShipView | null;
   mapVersion: number;
   /** Grows with what was sounded since that map. */
   liveVersion: number;
@@ -58,6 +61,7 @@ export const EMPTY_VIEW: LiveView = {
   alarms: [],
   taken: null,
   ships: null,
+  ownShip: null,
   mapVersion: 0,
   liveVersion: 0,
   lastEventId: 0,
@@ -87,6 +91,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         alarms: message.alarms,
         taken: view.mission?.id === message.mission.id ? view.taken : null,
         ships: view.mission?.id === message.mission.id ? view.ships : null,
+        ownShip: view.mission?.id === message.mission.id ? view.ownShip : null,
         mapVersion: message.map_version,
         liveVersion: 0,
         lastEventId: message.last_event_id,
@@ -107,7 +112,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
     case "targets":
       return view.mission ? { ...view, mission: { ...view.mission, targets: message.targets } } : view;
     case "traffic":
-      return view.mission ? { ...view, ships: message.ships } : view;
+      return view.mission ? { ...view, ships: message.ships, ownShip: message.own_ship } : view;
     case "search":
       if (!view.mission) return view;
       return {

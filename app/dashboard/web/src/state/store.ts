@@ -171,6 +171,7 @@ export const showTargets = kept("targets", true);
 export const showShips = kept("ships", true);
 /** Ships near the mission; null where nothing listens for any. */
 export const ships = computed(() => view.value.ships);
+export const ownShip = computed(() => view.value.ownShip);
 /** Ranges that the operator fixed, for each layer; a layer without one takes a fitting range. */
 export const fixedRanges = kept<Partial<Record<string, Range>>>("ranges", {});
 export const shownRange = computed(() => rangeOf(layer.value));

@@ -9,6 +9,7 @@ import { typedPlace } from "../state/place";
 import { picking } from "../state/store";
 import { named, say } from "../words/say";
 import { Button, Choice } from "./Controls";
+import { OwnShip } from "./OwnShip";
 
 export interface FormState {
   draft: Draft;
@@ -94,6 +95,7 @@ export function Place({ id, label, text, onText, placeholder, invalid = false, c
       >
         {waiting ? say("fields.clickOnTheMap") : say("fields.pick")}
       </Button>
+      <OwnShip id={id} onPlace={(at) => onText(typedPlace(at))} />
     </div>
   );
 }

@@ -2,6 +2,7 @@ import "./MapTools.css";
 import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import type { LngLat } from "../api/types";
 import { wayBetween } from "../map/geo";
 import { distance } from "../state/format";
 import { followOwn, ownFault, whyNoPosition } from "../state/own";
@@ -28,6 +29,7 @@ import {
 } from "../state/store";
 import { say, sayWith } from "../words/say";
 import { Button, flips, sets } from "./Controls";
+import { OwnShip } from "./OwnShip";
 
 /** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
 export function MapTools({ onFit }: { onFit: () => void }) {
@@ -148,13 +150,15 @@ function GoTo() {
   const fault = useSignal("");
   const field = useRef<HTMLInputElement>(null);
   useEffect(() => field.current?.focus(), []);
+  const show = (at: LngLat) => {
+    marked.value = at;
+    destination.value = [at[0] - ABOUT, at[1] - ABOUT, at[0] + ABOUT, at[1] + ABOUT];
+  };
   const go = (event: SubmitEvent) => {
     event.preventDefault();
     const at = placeOf(text.value);
     fault.value = at ? "" : say("mapTools.typeAPositionSuchAs", { sample: placeSample() });
-    if (!at) return;
-    marked.value = at;
-    destination.value = [at[0] - ABOUT, at[1] - ABOUT, at[0] + ABOUT, at[1] + ABOUT];
+    if (at) show(at);
   };
   return (
     <form class="go-to" onSubmit={go}>
@@ -173,6 +177,7 @@ function GoTo() {
       <button type="submit" class="command" data-testid="go">
         {say("mapTools.go")}
       </button>
+      <OwnShip id="go-to" onPlace={show} />
       {marked.value ? (
         <Button kind="link-button" onClick={sets(marked, null)}>
           {say("mapTools.unmark")}

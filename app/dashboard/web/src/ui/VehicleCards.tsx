@@ -238,7 +238,9 @@ function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; t
         </p>
       ) : null}
       {v.reason && !isSaid(v.reason, v) ? <p class={`reason ${tone}`}>{v.reason}</p> : null}
-      {waypoint?.reason && waypoint.reason !== v.withdrawn ? <p class={`reason ${tone}`}>{waypoint.reason}</p> : null}
+      {waypoint?.reason && waypoint.reason !== v.withdrawn ? (
+        <p class={`reason ${tone}`}>{waypoint.reason}</p>
+      ) : null}
     </>
   );
 }

@@ -18,7 +18,7 @@ import type { Look } from "../map/paper";
 import { cutAt } from "../map/plan";
 import { recoveryMarks, waitingCircle, wayHome } from "../map/recovery";
 import { gridPlace, type SeaFloor } from "../map/seafloor";
-import { shipMarks } from "../map/ships";
+import { ownShipMark, shipMarks } from "../map/ships";
 import { searchMarks } from "../map/site";
 import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../map/swath";
 import { targetMarks } from "../map/targets";
@@ -44,6 +44,7 @@ import {
   marked,
   measured,
   mission,
+  ownShip,
   panelOpen,
   planned,
   replayStep,
@@ -64,6 +65,7 @@ import {
   showTargets,
   showTracks,
   site,
+  socketStatus,
   stripHeight,
   theme,
   type Vehicle,
@@ -199,10 +201,12 @@ function planLines(): PlanLines {
   return { old, ways };
 }
 
-/** A place that was asked for, and where this device is. */
+/** A place that was asked for, where this device is, and where the own ship is. */
 function pointedOut(): PlaceMark[] {
-  const [asked, own] = [marked.value, ownPosition.value];
+  const [asked, own, ship] = [marked.value, ownPosition.value, ownShip.value];
+  const live = showShips.value && replayStep.value === null;
   return [
+    ...(live && ship ? [ownShipMark(ship, socketStatus.value?.kind === "open")] : []),
     ...(asked
       ? [
           {

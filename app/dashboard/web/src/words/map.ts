@@ -115,6 +115,17 @@ export const MAP = {
   "marks.left": { en: " left", pt: " saiu" },
   "follow.here": { en: "here", pt: "aqui" },
   "ships.own": { en: " (own)", pt: " (próprio)" },
+  "ships.ownShip": { en: "Own ship", pt: "Navio próprio" },
+  "ships.ownShipOld": { en: "Own ship, {age} ago", pt: "Navio próprio, há {age}" },
+  "ships.takeOwnShip": { en: "Where the own ship is now", pt: "Onde o navio próprio está agora" },
+  "ships.ownShipUnknown": {
+    en: "The own ship is not heard: see the settings ais.* and her GPS",
+    pt: "O navio próprio não é ouvido: veja as definições ais.* e o seu GPS",
+  },
+  "ships.ownShipWas": {
+    en: "Where the own ship is now is not known: it was last heard {age} ago",
+    pt: "Não se sabe onde o navio próprio está agora: foi ouvido pela última vez há {age}",
+  },
   "ships.mFrom": { en: "{distanceM} m from {vehicle}", pt: "a {distanceM} m de {vehicle}" },
   "ships.cpa": { en: "{who}{speed}, CPA {away} {when}", pt: "{who}{speed}, CPA {away} {when}" },
   "ships.now": { en: "now", pt: "agora" },
