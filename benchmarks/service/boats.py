@@ -70,8 +70,10 @@ def begin(service: Service, mission: str, vehicles: int) -> None:
     service.act(mission, "start")
 
 
-def lay_tracks(service: Service, mission: str, vehicles: int, points: int) -> None:
-    """Post what the vehicles did before: lines to and fro, a sounding at every tenth place."""
+def lay_tracks(
+    service: Service, mission: str, vehicles: int, points: int, every: int = 10, begin_s: float = 1.0
+) -> None:
+    """Post what the vehicles did before: lines to and fro, a sounding at every so many-th place."""
     per_vehicle = points // vehicles
     strip = SIDE_M / vehicles
     for v in range(vehicles):
@@ -81,8 +83,8 @@ def lay_tracks(service: Service, mission: str, vehicles: int, points: int) -> No
             line, along = divmod(i * 1.25, SIDE_M)
             boat.north_m = along if line % 2 == 0 else SIDE_M - along
             boat.east_m = v * strip + (line * 4.0 + 1.0) % strip
-            boat.time_s = START_S + 1 + i
-            items.append(boat.item(2.0, sounds=i % 10 == 0))
+            boat.time_s = START_S + begin_s + i
+            items.append(boat.item(2.0, sounds=i % every == 0))
         for first in range(0, len(items), 5000):
             service.post(f"/missions/{mission}/measurements", {"items": items[first : first + 5000]})
     ways = service.get(f"/missions/{mission}/tracks.geojson")["features"]

@@ -79,39 +79,55 @@ class Bench:
             page.wait_for_timeout(100)
 
     def frames(self) -> None:
-        seconds = self.options.seconds
         with self.page() as page:
             self.open(page)
             page.wait_for_timeout(3000)
-            for how in ("watching", "panning"):
-                page.evaluate(
-                    """() => { const frames = window.__frames = []; const tick = t => { frames.push(t);
-                    if (window.__frames === frames) requestAnimationFrame(tick); }; requestAnimationFrame(tick); }"""
-                )
-                end = time.monotonic() + seconds
-                before = browser_cpu_s()
-                if how == "panning":
-                    page.mouse.move(700, 450)
-                    page.mouse.down()
-                    n = 0
-                    while time.monotonic() < end:
-                        n += 1
-                        page.mouse.move(700 + 120 * ((n // 20) % 2 * 2 - 1) * (n % 20) / 20, 450 + (n % 7) * 6)
-                        page.wait_for_timeout(30)
-                    page.mouse.up()
-                else:
-                    page.wait_for_timeout(seconds * 1000)
-                spent = browser_cpu_s() - before
-                stamps = page.evaluate("window.__frames.splice(0)")
-                gaps = [b - a for a, b in pairwise(stamps)]
-                fps = 1000 / statistics.mean(gaps)
-                slow = sorted(gaps)[int(0.95 * len(gaps))]
-                per_frame = 1000 * spent / len(stamps)
-                drawn = (
-                    f"{fps:.1f} frames per second, 95 % of the gaps below {slow:.0f} ms; "
-                    f"{per_frame:.0f} ms of processor time per frame; load of the machine {os.getloadavg()[0]:.1f}"
-                )
-                self.note(f"Frames, {how}, software rendering", drawn, ">= 10")
+            self._count(page, "Frames, watching, software rendering", drags=False)
+            self._count(page, "Frames, panning, software rendering", drags=True)
+
+    def space(self) -> None:
+        with self.page() as page:
+            self.open(page)
+            page.get_by_test_id("open-3d").click()
+            page.get_by_test_id("toggle-points").click()
+            # All of them are read, page after page.
+            told = page.get_by_test_id("points-chosen")
+            while int(re.sub(r"\D", "", told.inner_text().partition(".")[0]) or 0) < self.options.soundings:
+                page.wait_for_timeout(500)
+            page.get_by_test_id("toggle-lasso").click()
+            page.wait_for_timeout(3000)
+            what = f"{self.options.soundings} soundings in 3-D, turned, software rendering"
+            self._count(page, what, drags=True, asked="usable")
+
+    def _count(self, page: Any, what: str, *, drags: bool, asked: str = ">= 10") -> None:
+        """Count the frames while nothing is done, or while what is shown is dragged to and fro."""
+        page.evaluate(
+            """() => { const frames = window.__frames = []; const tick = t => { frames.push(t);
+            if (window.__frames === frames) requestAnimationFrame(tick); }; requestAnimationFrame(tick); }"""
+        )
+        end = time.monotonic() + self.options.seconds
+        before = browser_cpu_s()
+        if drags:
+            page.mouse.move(700, 450)
+            page.mouse.down()
+            n = 0
+            while time.monotonic() < end:
+                n += 1
+                page.mouse.move(700 + 120 * ((n // 20) % 2 * 2 - 1) * (n % 20) / 20, 450 + (n % 7) * 6)
+                page.wait_for_timeout(30)
+            page.mouse.up()
+        else:
+            page.wait_for_timeout(self.options.seconds * 1000)
+        spent = browser_cpu_s() - before
+        stamps = page.evaluate("window.__frames.splice(0)")
+        gaps = [b - a for a, b in pairwise(stamps)]
+        slow = sorted(gaps)[int(0.95 * len(gaps))]
+        drawn = (
+            f"{1000 / statistics.mean(gaps):.1f} frames per second, 95 % of the gaps below {slow:.0f} ms; "
+            f"{1000 * spent / len(stamps):.0f} ms of processor time per frame; "
+            f"load of the machine {os.getloadavg()[0]:.1f}"
+        )
+        self.note(what, drawn, asked)
 
     def memory(self) -> None:
         minutes = self.options.minutes
@@ -172,9 +188,10 @@ class Bench:
 
 def main() -> None:
     parser = make_parser(__doc__, PAGE)
-    parser.add_argument("parts", nargs="+", choices=["frames", "memory", "viewers", "load"])
+    parser.add_argument("parts", nargs="+", choices=["frames", "space", "memory", "viewers", "load"])
     parser.add_argument("--vehicles", type=int, default=10)
     parser.add_argument("--points", type=int, default=50_000, help="track points that are there before")
+    parser.add_argument("--soundings", type=int, default=100_000, help="that are shown in 3-D")
     parser.add_argument("--seconds", type=float, default=20, help="of each measurement")
     parser.add_argument("--minutes", type=float, default=10, help="of the memory's measurement")
     parser.add_argument("--pace", type=float, default=6, help="how much faster vehicles live while memory is measured")
@@ -183,6 +200,8 @@ def main() -> None:
         mission = create_mission(service, options.vehicles)
         begin(service, mission, options.vehicles)
         lay_tracks(service, mission, options.vehicles, options.points)
+        if "space" in options.parts:
+            lay_tracks(service, mission, options.vehicles, options.soundings, every=1, begin_s=1e5)
         bench = Bench(options, service, mission)
         for part in options.parts:
             pace = options.pace if part == "memory" else 1.0
