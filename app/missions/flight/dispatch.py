@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import Iterable
 
+import numpy as np
 import structlog
 
 from app.arrays import FloatArray
