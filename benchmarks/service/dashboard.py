@@ -87,6 +87,8 @@ class Bench:
 
     def space(self) -> None:
         with self.page() as page:
+            # On a busy machine the first picture in space takes long.
+            page.set_default_timeout(300_000)
             self.open(page)
             page.get_by_test_id("open-3d").click()
             page.get_by_test_id("toggle-points").click()

@@ -147,7 +147,9 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
 
 
 async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: MissionService) -> None:
-    mission = await service.create(recovered("a", "b", point=OUTSIDE, side_m=120.0, steps=1000))
+    starts = {"a": lon_lat(35.0, 60.0), "b": lon_lat(85.0, 60.0)}
+    vehicles = [{"name": name, "kind": "sim", "start": start} for name, start in starts.items()]
+    mission = await service.create(recovered(vehicles=vehicles, point=OUTSIDE, side_m=120.0, steps=1000))
     await act(service, mission.id, "start")
     await until_step(service, mission.id, 2)
     live = await service.get(mission.id)
@@ -160,6 +162,7 @@ async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: Mission
     await until(lambda: b.legs > other + 3, "b goes on meanwhile")
     assert a.legs == before
     assert await phase_of(service, mission, "a") is Phase.STOPPED
+    await until(lambda: a.waits_m is not None, "it circles")
     circles = {v.name: v.waiting_circle for v in (await view_of(service, mission.id)).vehicles}
     assert circles["b"] is None
     assert circles["a"] is not None
