@@ -165,6 +165,7 @@ class SurveyRegressors:
         self._objective = SurveyObjective(self._scale, POWER, turns, REACH * self._spacing)
         self._vehicles = Vehicles(self._en, np.ascontiguousarray(team.headings_rad, dtype=np.float64), self._left_m)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
+        self._sounded = self._nodes.sounded(self._d2)
         self._reference = float(len(self._nodes.x))
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
@@ -421,12 +422,12 @@ class SurveyRegressors:
         roomy[:, : vias.shape[1]] = vias
         search = PlanSearch(self._spacing, constraints.region, MARGIN_M, HEAT)
         return improve(
-            self._d2, self._nodes, self._objective, self._vehicles, ViaPoints(roomy, counts, locked), search,
+            self._d2, self._sounded, self._objective, self._vehicles, ViaPoints(roomy, counts, locked), search,
             rng.random((self._options.search, DRAWS)),
         )  # fmt: skip
 
     def _value(self, vias: FloatArray, counts: IntArray) -> float:
-        return plan_value(self._d2, self._nodes, self._objective, self._vehicles, vias, counts)
+        return plan_value(self._d2, self._sounded, self._objective, self._vehicles, vias, counts)
 
     def _uncertainty_now(self) -> float:
         nothing = np.zeros(len(self._en), dtype=np.int64)
@@ -489,7 +490,7 @@ class SurveyRegressors:
                 vias[which, i, : len(rest)] = rest
                 counts[which, i] = len(rest)
         targets = np.ascontiguousarray(candidates[..., :2])
-        return values_after_first_leg(self._d2, self._nodes, self._objective, self._vehicles, targets, vias, counts)
+        return values_after_first_leg(self._d2, self._sounded, self._objective, self._vehicles, targets, vias, counts)
 
 
 def _unless_straight(start_m: FloatArray, via_m: FloatArray, next_m: FloatArray) -> FloatArray:
