@@ -15,9 +15,10 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
 from app.exploration.core.routes import FreeSpace
 from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
-from app.exploration.swath.lines_ahead import best_direction, nearest_entry, path_m
+from app.exploration.swath.lines_ahead import ahead, approaches_m, best_direction, nearest_entry, path_m
+from app.exploration.swath.lines_ahead import pose as pose_of
 from app.exploration.swath.near_zones import led_round
-from app.exploration.swath.passes import passes
+from app.exploration.swath.passes import MOST_PIECES, Pass, pieces, shared, tour
 from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
 MOST_TRIES = 4
@@ -37,6 +38,9 @@ WORTH_HELPING = 1.2
 
 FILLING_OVERLAP, STUBBORN_OVERLAP = 0.4, 0.95
 """Shares of half a swath that holes lie within: where a line to fill them sees them well, and where it is over them."""
+
+EARLY = 0.4
+"""Missed ground is passed on the way to a line where the detour is less than so much of the way back from the last."""
 
 DETOUR, BUSY = 1.5, 0.25
 """A line is left to another vehicle where the way there is longer than so many times the other's detour, and a part of
@@ -380,29 +384,115 @@ class SwathSurvey:
         if not own:
             share = sweep.share = self._help(vehicle, left, large, flying)
         sign = 1 if share is None else share.sign
-        overlap = flying.overlap
-        choice = [] if share is None else lines(left, large & _between(raster, share), sign, flying)
-        if not choice:
-            again = small & self._tried_twice(coverage)
-            overlap = STUBBORN_OVERLAP if again.any() else FILLING_OVERLAP
-            missed = again if again.any() else small
-            short, wide = passes(left, missed, closer(flying, overlap), pose)
-            for one in short:
-                path = self._led(one.path, flying, coverage)
-                if len(path) > 1 and not self._closer(vehicle, pose, path, one.away_m, team):
-                    east, north = path[1] - path[0]
-                    sweep.course = FlownLine(float(np.arctan2(north, east)), 1, path, overlap)
-                    return True
-            near_m = np.full(len(left.open), float(raster.axes.turned(pose[:2])[1]))
-            choice = lines(left, wide, sign, closer(flying, overlap), near_m)
+        mine = large & _between(raster, share) if share is not None else np.zeros_like(large)
+        choice = lines(left, mine, sign, flying) if mine.any() else []
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(_simple(path, 0.1 * raster.cell_m), flying, coverage)
             if len(path) > 1 and (own or not self._closer(vehicle, pose, path, away_m, team)):
-                sweep.course = FlownLine(self._direction_rad, sign, path, overlap)
+                early = self._on_the_way(vehicle, pose, flying, team, left, (mine, small), (path, away_m))
+                led = path if early is None else self._led(early.path, flying, coverage)
+                if early is None or len(led) < 2:
+                    sweep.course = FlownLine(self._direction_rad, sign, path, flying.overlap)
+                else:
+                    sweep.course = FlownLine(_towards(led), 1, led, FILLING_OVERLAP)
+                return True
+            choice = [other for other in choice if other is not line]
+        return bool(small.any()) and self._fill(vehicle, pose, flying, coverage, team, left, small)
+
+    def _fill(
+        self,
+        vehicle: str,
+        pose: FloatArray,
+        flying: Flying,
+        coverage: Coverage,
+        team: dict[str, FloatArray],
+        left: LineRaster,
+        small: BoolArray,
+    ) -> bool:
+        """Send a vehicle over what lines have missed; return whether there is anything for it."""
+        sweep = self._sweeps[vehicle]
+        again = small & self._tried_twice(coverage)
+        careful = closer(flying, STUBBORN_OVERLAP if again.any() else FILLING_OVERLAP)
+        found, wide = pieces(left, again if again.any() else small, careful)
+        share = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
+        near_m = np.full(len(left.open), float(left.axes.turned(pose[:2])[1]))
+        if share.pieces:
+            cells = np.zeros_like(small)
+            for piece in share.pieces:
+                cells[piece.cells[:, 0], piece.cells[:, 1]] = True
+            most_m = share.way_m + flying.radius_m * len(share.pieces)
+            if len(share.pieces) > 1 and ahead(replace(left, open=cells), careful, pose, most_m=most_m) is not None:
+                choice = lines(left, cells, 1, careful, near_m)
+                _, path, _ = nearest_entry(left, choice, pose, flying.radius_m)
+                path = self._led(_simple(path, 0.1 * left.cell_m), flying, coverage)
+                if len(path) > 1:
+                    sweep.course = FlownLine(self._direction_rad, 1, path, careful.overlap)
+                    return True
+            for one in tour(share.pieces, pose, flying.radius_m):
+                path = self._led(one.path, flying, coverage)
+                if len(path) > 1:
+                    sweep.course = FlownLine(_towards(path), 1, path, careful.overlap)
+                    return True
+        choice = lines(left, wide, 1, careful, near_m)
+        while choice:
+            line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
+            path = self._led(_simple(path, 0.1 * left.cell_m), flying, coverage)
+            if len(path) > 1 and not self._closer(vehicle, pose, path, away_m, team):
+                sweep.course = FlownLine(self._direction_rad, 1, path, careful.overlap)
                 return True
             choice = [other for other in choice if other is not line]
         return False
+
+    def _on_the_way(
+        self,
+        vehicle: str,
+        pose: FloatArray,
+        flying: Flying,
+        team: dict[str, FloatArray],
+        left: LineRaster,
+        swept_missed: tuple[BoolArray, BoolArray],
+        line: tuple[FloatArray, float],
+    ) -> Pass | None:
+        """Return a pass over missed ground that is a small detour on the way to a line; None where none is.
+
+        Parameters
+        ----------
+        swept_missed
+            What the vehicle has still to sweep, and what lines have missed, (along, across) both.
+        line
+            Its path (k, 2) and the way to it.
+        """
+        swept, missed = swept_missed
+        path, away_m = line
+        if not missed.any():
+            return None
+        found, _ = pieces(left, missed, closer(flying, FILLING_OVERLAP))
+        rows = np.flatnonzero(swept.any(axis=0))
+        ends_m = left.across_m[rows[[0, -1]]]
+        best: tuple[float, Pass] | None = None
+        for piece in shared(found, *self._free_at(vehicle, pose, team))[vehicle].pieces[:MOST_PIECES]:
+            (one,) = tour([piece], pose, flying.radius_m)
+            onward_m = approaches_m(pose_of(one.path, end=True), pose_of(path)[None], flying.radius_m)
+            detour_m = one.way_m + float(onward_m[0]) - away_m
+            later_m = float(np.abs(ends_m - left.axes.turned(piece.middle_m)[1]).max())
+            if detour_m < EARLY * later_m and (best is None or detour_m < best[0]):
+                best = detour_m, one
+        return None if best is None else best[1]
+
+    def _free_at(
+        self, vehicle: str, pose: FloatArray, team: dict[str, FloatArray]
+    ) -> tuple[dict[str, FloatArray], dict[str, float]]:
+        """Return where all vehicles are next free for another line, (2,), and how far it is there for them."""
+        places, busy_m = {vehicle: pose[:2]}, {vehicle: 0.0}
+        for name, at in team.items():
+            course = self._sweeps[name].course
+            if name == vehicle:
+                continue
+            flies = course is not None and len(course.path) > 1
+            places[name] = course.path[-1] if course is not None and flies else at[:2]
+            busy_m[name] = path_m(np.vstack([at[:2], course.path])) if course is not None and flies else 0.0
+        return places, busy_m
 
     def _led(self, path: FloatArray, flying: Flying, coverage: Coverage) -> FloatArray:
         """Return a line (k, 2) as vehicles may fly it; empty where they may not, and what it was to see is given up."""
@@ -724,6 +814,12 @@ def _cells_at(places: FloatArray, coverage: Coverage, cells: BoolArray) -> BoolA
     shape = cells.shape
     inside = (rows >= 0) & (rows < shape[0]) & (cols >= 0) & (cols < shape[1])
     return np.asarray(inside & cells[np.where(inside, rows, 0), np.where(inside, cols, 0)])
+
+
+def _towards(path: FloatArray) -> float:
+    """Return the direction of a path's first piece, anticlockwise from east."""
+    east, north = path[1] - path[0]
+    return float(np.arctan2(north, east))
 
 
 def _simple(path: FloatArray, tolerance_m: float) -> FloatArray:
