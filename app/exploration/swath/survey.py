@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import label
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
@@ -30,7 +31,7 @@ MOST_REFUSED = 3
 LOOK_AGAIN_AT = (0.02, 0.08, 0.2, 0.4)
 """Shares of the area after which the direction of lines is looked at again, with the depths that are known by then."""
 
-TURNING_GAIN = 0.1
+TURNING_GAIN = 0.2
 """Lines are turned into another direction where that shortens what is left by more than this share."""
 
 WORTH_HELPING = 1.2
@@ -376,9 +377,10 @@ class SwathSurvey:
         self._lay_out(flying, coverage, team)
         sweep = self._sweeps[vehicle]
         raster = self._raster(coverage, self._direction_rad)
-        free = raster.open & ~self._expected(raster, flying, vehicle)
-        left = replace(raster, open=free)
+        expected = self._expected(raster, flying, vehicle)
+        left = replace(raster, open=raster.open & ~expected)
         large, small = strips(left, flying)
+        missed = small & ~_touching(raster.open, expected)
         share = sweep.share
         own = share is not None and bool((large & _between(raster, share)).any())
         if not own:
@@ -390,7 +392,7 @@ class SwathSurvey:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(_simple(path, 0.1 * raster.cell_m), flying, coverage)
             if len(path) > 1 and (own or not self._closer(vehicle, pose, path, away_m, team)):
-                early = self._on_the_way(vehicle, pose, flying, team, left, (mine, small), (path, away_m))
+                early = self._on_the_way(vehicle, pose, flying, team, left, (mine, missed), (path, away_m))
                 led = path if early is None else self._led(early.path, flying, coverage)
                 if early is None or len(led) < 2:
                     sweep.course = FlownLine(self._direction_rad, sign, path, flying.overlap)
@@ -398,6 +400,8 @@ class SwathSurvey:
                     sweep.course = FlownLine(_towards(led), 1, led, FILLING_OVERLAP)
                 return True
             choice = [other for other in choice if other is not line]
+        if any(self._sweeps[name].course is not None for name in team if name != vehicle):
+            small = missed  # What others may see yet is not missed.
         return bool(small.any()) and self._fill(vehicle, pose, flying, coverage, team, left, small)
 
     def _fill(
@@ -412,9 +416,12 @@ class SwathSurvey:
     ) -> bool:
         """Send a vehicle over what lines have missed; return whether there is anything for it."""
         sweep = self._sweeps[vehicle]
-        again = small & self._tried_twice(coverage)
-        careful = closer(flying, STUBBORN_OVERLAP if again.any() else FILLING_OVERLAP)
-        found, wide = pieces(left, again if again.any() else small, careful)
+        # Where lines look at ground from aside in vain something stands in between.
+        stubborn = small & _touching(small, self._tried_twice(coverage))
+        careful = closer(flying, FILLING_OVERLAP)
+        found, wide = pieces(left, small & ~stubborn, careful)
+        over, wide_too = pieces(left, stubborn, closer(flying, STUBBORN_OVERLAP))
+        found, wide = found + over, wide | wide_too
         share = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
         near_m = np.full(len(left.open), float(left.axes.turned(pose[:2])[1]))
         if share.pieces:
@@ -771,6 +778,14 @@ def closer(flying: Flying, overlap: float) -> Flying:
 def _between(raster: LineRaster, share: Strip) -> BoolArray:
     inside = (raster.across_m >= share.low_m) & (raster.across_m <= share.high_m)
     return np.broadcast_to(inside, raster.open.shape)
+
+
+def _touching(cells: BoolArray, others: BoolArray) -> BoolArray:
+    """Return those of some cells (along, across) whose piece shares any with others."""
+    number, count = label(cells, np.ones((3, 3)))
+    touched = np.zeros(count + 1, dtype=bool)
+    touched[number[cells & others]] = True
+    return np.asarray(touched[number])
 
 
 def _work(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:
