@@ -4,24 +4,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, find_objects, label
+from scipy.ndimage import find_objects, label
 
-from app.arrays import BoolArray, FloatArray, IntArray
+from app.arrays import BoolArray, FloatArray
 from app.exploration.motion.dubins import lengths_m
 from app.exploration.swath.raster import Flying, LineRaster
 
 HEADINGS = 16
-MOST_PIECES = 5
-"""So many pieces of missed ground, the next ones, are toured at a time."""
+MOST_PIECES, MOST_TOURED = 30, 5
+"""So many pieces of missed ground, the nearest, are shared out, and so many of a vehicle's own toured at a time."""
 
 BUSY = 0.25
 """A piece is left to a vehicle though its way is longer by this part of what another has still to fly before."""
 
 ASIDE = (-1.0, 0.0, 1.0)
 """Sides that a pass leaves a piece on, in what the swath is wider."""
-
-TOGETHER = 1.0
-"""Pieces closer together than so many turning circles' radii are passed at once where that can be."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +48,12 @@ class Passable:
 
     Attributes
     ----------
-    cells : (m, 2)
-        Its cells in the raster.
     middle_m : (2,)
         East and north.
     begins, ends : (n, 3)
         Poses at both ends of all passes that see it, headings clockwise from north.
     """
 
-    cells: IntArray
     middle_m: FloatArray
     begins: FloatArray
     ends: FloatArray
@@ -70,28 +64,35 @@ class Passable:
         return np.asarray(np.hypot(*(self.ends - self.begins)[:, :2].T))
 
 
-@dataclass(frozen=True)
-class Share:
-    """What one vehicle is to pass: pieces in their order, and how far it is from its start over their middles."""
+def pieces(
+    raster: LineRaster, missed: BoolArray, flying: Flying, near_m: FloatArray
+) -> tuple[list[Passable], BoolArray]:
+    """Return the nearest pieces of missed cells (along, across) that one pass sees, and the cells that none does.
 
-    pieces: list[Passable]
-    way_m: float
-
-
-def pieces(raster: LineRaster, missed: BoolArray, flying: Flying) -> tuple[list[Passable], BoolArray]:
-    """Return the pieces of missed cells (along, across) that one pass sees, and the cells of those that none does."""
-    wide = np.zeros_like(missed)
+    ``near_m``: a place, (2,).
+    """
+    number, _ = label(missed, np.ones((3, 3)))
     found = []
-    for cells in _pieces(raster, missed, flying):
-        one = _passable(raster, cells, flying)
+    for k, where in enumerate(find_objects(number), start=1):
+        cells = np.argwhere(number[where] == k) + np.array([where[0].start, where[1].start])
+        places = raster.axes.to_en(raster.corner_m + (cells + 0.5) * raster.cell_m)
+        found.append((float(np.hypot(*(places - near_m).T).min()), cells, places))
+    found.sort(key=lambda one: one[0])
+    wide = np.zeros_like(missed)
+    passable = []
+    for _, cells, places in found[:MOST_PIECES]:
+        width_m = float(raster.half_width_m(flying)[cells[:, 0], cells[:, 1]].min())
+        one = _passable(raster, places, max((1.0 - flying.overlap) * width_m, raster.cell_m))
         if one is None:
             wide[cells[:, 0], cells[:, 1]] = True
         else:
-            found.append(one)
-    return found, wide
+            passable.append(one)
+    return passable, wide
 
 
-def shared(found: list[Passable], starts: Mapping[str, FloatArray], busy_m: Mapping[str, float]) -> dict[str, Share]:
+def shared(
+    found: list[Passable], starts: Mapping[str, FloatArray], busy_m: Mapping[str, float]
+) -> dict[str, list[Passable]]:
     """Return who passes which pieces, in which order: each is inserted where it makes the team's way least longer.
 
     Parameters
@@ -124,31 +125,48 @@ def shared(found: list[Passable], starts: Mapping[str, FloatArray], busy_m: Mapp
         order[name].insert(at, k)
         way_m[name] += longer
         left.remove(k)
-    return {name: Share([found[k] for k in order[name]], way_m[name]) for name in starts}
+    return {name: [found[k] for k in order[name]] for name in starts}
 
 
-def _pieces(raster: LineRaster, missed: BoolArray, flying: Flying) -> list[IntArray]:
-    """Return the cells (n, 2) of each piece of missed ground, of those together that one pass sees best."""
-    near = max(1, round(0.5 * TOGETHER * flying.radius_m / raster.cell_m))
-    groups, _ = label(binary_dilation(missed, np.ones((3, 3)), iterations=near), np.ones((3, 3)))
-    found = []
-    for k, where in enumerate(find_objects(groups), start=1):
-        corner = np.array([where[0].start, where[1].start])
-        inside = missed[where] & (groups[where] == k)
-        together = np.argwhere(inside) + corner
-        if _passable(raster, together, flying) is not None:
-            found.append(together)
-            continue
-        number, count = label(inside, np.ones((3, 3)))
-        found += [np.argwhere(number == one) + corner for one in range(1, count + 1)]
-    return found
+def tour(found: list[Passable], pose: FloatArray, radius_m: float) -> list[Pass]:
+    """Return one pass over each of the first pieces in the order that is shortest from a pose (3,) on.
+
+    Dynamic programming over all of them; a pose without a heading (NaN) may begin in any.
+    """
+    toured = found[:MOST_TOURED]
+    if not toured:
+        return []
+    owner = np.repeat(np.arange(len(toured)), [len(piece.begins) for piece in toured])
+    begins = np.concatenate([piece.begins for piece in toured])
+    ends = np.concatenate([piece.ends for piece in toured])
+    over_m = np.concatenate([piece.lengths_m for piece in toured])
+    away_m = np.hypot(*(begins - pose)[:, :2].T) if np.isnan(pose[2]) else lengths_m(pose, begins, radius_m)
+    between_m = lengths_m(ends[:, None], begins[None], radius_m) if len(toured) > 1 else np.zeros((0, 0))
+    # Over which pieces it has led, and which pass it ends with: how long it is, and the pass before.
+    best_m = {1 << k: np.where(owner == k, away_m + over_m, np.inf) for k in range(len(toured))}
+    before = {}
+    for seen in range(1, 1 << len(toured)):
+        if seen not in best_m:
+            reached, came = np.full(len(owner), np.inf), np.zeros(len(owner), dtype=np.int64)
+            for k in range(len(toured)):
+                if not seen >> k & 1:
+                    continue
+                of_k = np.flatnonzero(owner == k)
+                by_m = best_m[seen ^ (1 << k)][:, None] + between_m[:, of_k]
+                came[of_k] = by_m.argmin(axis=0)
+                reached[of_k] = by_m.min(axis=0) + over_m[of_k]
+            best_m[seen], before[seen] = reached, came
+    seen = (1 << len(toured)) - 1
+    order = [int(best_m[seen].argmin())]
+    while seen in before:
+        last = order[-1]
+        order.append(int(before[seen][last]))
+        seen ^= 1 << int(owner[last])
+    return [Pass(np.stack([begins[k, :2], ends[k, :2]]), float(away_m[k])) for k in reversed(order)]
 
 
-def _passable(raster: LineRaster, cells: IntArray, flying: Flying) -> Passable | None:
-    """Return the passes that have all cells (n, 2) within their reach; None where they lie too far apart."""
-    places = raster.axes.to_en(raster.corner_m + (cells + 0.5) * raster.cell_m)
-    width_m = float(raster.half_width_m(flying)[cells[:, 0], cells[:, 1]].min())
-    reach_m = max((1.0 - flying.overlap) * width_m, raster.cell_m)
+def _passable(raster: LineRaster, places: FloatArray, reach_m: float) -> Passable | None:
+    """Return the passes that have all places (n, 2) within their reach; None where they lie too far apart."""
     headings = np.arange(HEADINGS) * 2.0 * np.pi / HEADINGS
     towards = np.column_stack([np.sin(headings), np.cos(headings)])
     aside = np.column_stack([-towards[:, 1], towards[:, 0]])
@@ -164,44 +182,7 @@ def _passable(raster: LineRaster, cells: IntArray, flying: Flying) -> Passable |
         return None
     heading = np.broadcast_to(headings[:, None], (*begin.shape[:2], 1))
     begins, ends = (np.concatenate([place, heading], axis=-1)[fit] for place in (begin, end))
-    return Passable(cells, places.mean(axis=0), begins, ends)
-
-
-def tour(pieces: list[Passable], pose: FloatArray, radius_m: float) -> list[Pass]:
-    """Return one pass over each of the first pieces in the order that is shortest from a pose (3,) on.
-
-    Dynamic programming over all of them; a pose without a heading (NaN) may begin in any.
-    """
-    pieces = pieces[:MOST_PIECES]
-    if not pieces:
-        return []
-    owner = np.repeat(np.arange(len(pieces)), [len(piece.begins) for piece in pieces])
-    begins = np.concatenate([piece.begins for piece in pieces])
-    ends = np.concatenate([piece.ends for piece in pieces])
-    over_m = np.concatenate([piece.lengths_m for piece in pieces])
-    away_m = np.hypot(*(begins - pose)[:, :2].T) if np.isnan(pose[2]) else lengths_m(pose, begins, radius_m)
-    between_m = lengths_m(ends[:, None], begins[None], radius_m) if len(pieces) > 1 else np.zeros((0, 0))
-    # Over which pieces it has led, and which pass it ends with: how long it is, and the pass before.
-    best_m = {1 << k: np.where(owner == k, away_m + over_m, np.inf) for k in range(len(pieces))}
-    before = {}
-    for seen in range(1, 1 << len(pieces)):
-        if seen not in best_m:
-            reached, came = np.full(len(owner), np.inf), np.zeros(len(owner), dtype=np.int64)
-            for k in range(len(pieces)):
-                if not seen >> k & 1:
-                    continue
-                of_k = np.flatnonzero(owner == k)
-                by_m = best_m[seen ^ (1 << k)][:, None] + between_m[:, of_k]
-                came[of_k] = by_m.argmin(axis=0)
-                reached[of_k] = by_m.min(axis=0) + over_m[of_k]
-            best_m[seen], before[seen] = reached, came
-    seen = (1 << len(pieces)) - 1
-    order = [int(best_m[seen].argmin())]
-    while seen in before:
-        last = order[-1]
-        order.append(int(before[seen][last]))
-        seen ^= 1 << int(owner[last])
-    return [Pass(np.stack([begins[k, :2], ends[k, :2]]), float(away_m[k])) for k in reversed(order)]
+    return Passable(places.mean(axis=0), begins, ends)
 
 
 def _inside(raster: LineRaster, places: FloatArray) -> BoolArray:

@@ -16,10 +16,10 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
 from app.exploration.core.routes import FreeSpace
 from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
-from app.exploration.swath.lines_ahead import ahead, approaches_m, best_direction, nearest_entry, path_m
+from app.exploration.swath.lines_ahead import approaches_m, best_direction, nearest_entry, path_m
 from app.exploration.swath.lines_ahead import pose as pose_of
 from app.exploration.swath.near_zones import led_round
-from app.exploration.swath.passes import MOST_PIECES, Pass, pieces, shared, tour
+from app.exploration.swath.passes import BUSY, MOST_TOURED, Pass, pieces, shared, tour
 from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
 MOST_TRIES = 4
@@ -43,8 +43,8 @@ FILLING_OVERLAP, STUBBORN_OVERLAP = 0.4, 0.95
 EARLY = 0.4
 """Missed ground is passed on the way to a line where the detour is less than so much of the way back from the last."""
 
-DETOUR, BUSY = 1.5, 0.25
-"""A line is left to another vehicle where the way there is longer than so many times the other's detour, and a part of
+DETOUR = 1.5
+"""A line is left to another vehicle where the way there is longer than so many times the other's detour, and ``BUSY`` of
 what the other has still to fly of its own line."""
 
 SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
@@ -419,28 +419,16 @@ class SwathSurvey:
         # Where lines look at ground from aside in vain something stands in between.
         stubborn = small & _touching(small, self._tried_twice(coverage))
         careful = closer(flying, FILLING_OVERLAP)
-        found, wide = pieces(left, small & ~stubborn, careful)
-        over, wide_too = pieces(left, stubborn, closer(flying, STUBBORN_OVERLAP))
+        found, wide = pieces(left, small & ~stubborn, careful, pose[:2])
+        over, wide_too = pieces(left, stubborn, closer(flying, STUBBORN_OVERLAP), pose[:2])
         found, wide = found + over, wide | wide_too
-        share = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
+        mine = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
+        for one in tour(mine, pose, flying.radius_m):
+            path = self._led(one.path, flying, coverage)
+            if len(path) > 1:
+                sweep.course = FlownLine(_towards(path), 1, path, careful.overlap)
+                return True
         near_m = np.full(len(left.open), float(left.axes.turned(pose[:2])[1]))
-        if share.pieces:
-            cells = np.zeros_like(small)
-            for piece in share.pieces:
-                cells[piece.cells[:, 0], piece.cells[:, 1]] = True
-            most_m = share.way_m + flying.radius_m * len(share.pieces)
-            if len(share.pieces) > 1 and ahead(replace(left, open=cells), careful, pose, most_m=most_m) is not None:
-                choice = lines(left, cells, 1, careful, near_m)
-                _, path, _ = nearest_entry(left, choice, pose, flying.radius_m)
-                path = self._led(_simple(path, 0.1 * left.cell_m), flying, coverage)
-                if len(path) > 1:
-                    sweep.course = FlownLine(self._direction_rad, 1, path, careful.overlap)
-                    return True
-            for one in tour(share.pieces, pose, flying.radius_m):
-                path = self._led(one.path, flying, coverage)
-                if len(path) > 1:
-                    sweep.course = FlownLine(_towards(path), 1, path, careful.overlap)
-                    return True
         choice = lines(left, wide, 1, careful, near_m)
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
@@ -474,11 +462,11 @@ class SwathSurvey:
         path, away_m = line
         if not missed.any():
             return None
-        found, _ = pieces(left, missed, closer(flying, FILLING_OVERLAP))
+        found, _ = pieces(left, missed, closer(flying, FILLING_OVERLAP), pose[:2])
         rows = np.flatnonzero(swept.any(axis=0))
         ends_m = left.across_m[rows[[0, -1]]]
         best: tuple[float, Pass] | None = None
-        for piece in shared(found, *self._free_at(vehicle, pose, team))[vehicle].pieces[:MOST_PIECES]:
+        for piece in shared(found, *self._free_at(vehicle, pose, team))[vehicle][:MOST_TOURED]:
             (one,) = tour([piece], pose, flying.radius_m)
             onward_m = approaches_m(pose_of(one.path, end=True), pose_of(path)[None], flying.radius_m)
             detour_m = one.way_m + float(onward_m[0]) - away_m
