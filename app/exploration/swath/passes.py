@@ -31,10 +31,13 @@ class Pass:
         East and north, as flown.
     away_m
         The way to its beginning.
+    overlap
+        Share of half a swath that it keeps within.
     """
 
     path: FloatArray
     away_m: float
+    overlap: float
 
     @property
     def way_m(self) -> float:
@@ -52,11 +55,14 @@ class Passable:
         East and north.
     begins, ends : (n, 3)
         Poses at both ends of all passes that see it, headings clockwise from north.
+    overlap
+        Share of half a swath that these keep within.
     """
 
     middle_m: FloatArray
     begins: FloatArray
     ends: FloatArray
+    overlap: float
 
     @property
     def lengths_m(self) -> FloatArray:
@@ -82,7 +88,7 @@ def pieces(
     passable = []
     for _, cells, places in found[:MOST_PIECES]:
         width_m = float(raster.half_width_m(flying)[cells[:, 0], cells[:, 1]].min())
-        one = _passable(raster, places, max((1.0 - flying.overlap) * width_m, raster.cell_m))
+        one = _passable(raster, places, width_m, flying.overlap)
         if one is None:
             wide[cells[:, 0], cells[:, 1]] = True
         else:
@@ -162,11 +168,15 @@ def tour(found: list[Passable], pose: FloatArray, radius_m: float) -> list[Pass]
         last = order[-1]
         order.append(int(before[seen][last]))
         seen ^= 1 << int(owner[last])
-    return [Pass(np.stack([begins[k, :2], ends[k, :2]]), float(away_m[k])) for k in reversed(order)]
+    return [
+        Pass(np.stack([begins[k, :2], ends[k, :2]]), float(away_m[k]), toured[owner[k]].overlap)
+        for k in reversed(order)
+    ]
 
 
-def _passable(raster: LineRaster, places: FloatArray, reach_m: float) -> Passable | None:
-    """Return the passes that have all places (n, 2) within their reach; None where they lie too far apart."""
+def _passable(raster: LineRaster, places: FloatArray, width_m: float, overlap: float) -> Passable | None:
+    """Return the passes that have all places (n, 2) within half a swath; None where they lie too far apart."""
+    reach_m = max((1.0 - overlap) * width_m, raster.cell_m)
     headings = np.arange(HEADINGS) * 2.0 * np.pi / HEADINGS
     towards = np.column_stack([np.sin(headings), np.cos(headings)])
     aside = np.column_stack([-towards[:, 1], towards[:, 0]])
@@ -182,7 +192,7 @@ def _passable(raster: LineRaster, places: FloatArray, reach_m: float) -> Passabl
         return None
     heading = np.broadcast_to(headings[:, None], (*begin.shape[:2], 1))
     begins, ends = (np.concatenate([place, heading], axis=-1)[fit] for place in (begin, end))
-    return Passable(places.mean(axis=0), begins, ends)
+    return Passable(places.mean(axis=0), begins, ends, overlap)
 
 
 def _inside(raster: LineRaster, places: FloatArray) -> BoolArray:

@@ -19,7 +19,7 @@ from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, g
 from app.exploration.swath.lines_ahead import approaches_m, best_direction, nearest_entry, path_m
 from app.exploration.swath.lines_ahead import pose as pose_of
 from app.exploration.swath.near_zones import led_round
-from app.exploration.swath.passes import BUSY, MOST_TOURED, Pass, pieces, shared, tour
+from app.exploration.swath.passes import BUSY, MOST_TOURED, Pass, Passable, pieces, shared, tour
 from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
 MOST_TRIES = 4
@@ -44,8 +44,8 @@ EARLY = 0.4
 """Missed ground is passed on the way to a line where the detour is less than so much of the way back from the last."""
 
 DETOUR = 1.5
-"""A line is left to another vehicle where the way there is longer than so many times the other's detour, and ``BUSY`` of
-what the other has still to fly of its own line."""
+"""A line is left to another vehicle where the way there is longer than so many times the other's detour, and ``BUSY``
+of what the other has still to fly of its own line."""
 
 SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
 """Metres by which unknown ground is presumed to rise a metre away from known ground, least and most: so many times what
@@ -392,12 +392,12 @@ class SwathSurvey:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(_simple(path, 0.1 * raster.cell_m), flying, coverage)
             if len(path) > 1 and (own or not self._closer(vehicle, pose, path, away_m, team)):
-                early = self._on_the_way(vehicle, pose, flying, team, left, (mine, missed), (path, away_m))
+                early = self._on_the_way(vehicle, pose, flying, coverage, team, left, (mine, missed), (path, away_m))
                 led = path if early is None else self._led(early.path, flying, coverage)
                 if early is None or len(led) < 2:
                     sweep.course = FlownLine(self._direction_rad, sign, path, flying.overlap)
                 else:
-                    sweep.course = FlownLine(_towards(led), 1, led, FILLING_OVERLAP)
+                    sweep.course = FlownLine(_towards(led), 1, led, early.overlap)
                 return True
             choice = [other for other in choice if other is not line]
         if any(self._sweeps[name].course is not None for name in team if name != vehicle):
@@ -416,34 +416,42 @@ class SwathSurvey:
     ) -> bool:
         """Send a vehicle over what lines have missed; return whether there is anything for it."""
         sweep = self._sweeps[vehicle]
-        # Where lines look at ground from aside in vain something stands in between.
-        stubborn = small & _touching(small, self._tried_twice(coverage))
-        careful = closer(flying, FILLING_OVERLAP)
-        found, wide = pieces(left, small & ~stubborn, careful, pose[:2])
-        over, wide_too = pieces(left, stubborn, closer(flying, STUBBORN_OVERLAP), pose[:2])
-        found, wide = found + over, wide | wide_too
+        found, wide, overlap = self._missed(left, small, flying, coverage, pose)
         mine = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
         for one in tour(mine, pose, flying.radius_m):
             path = self._led(one.path, flying, coverage)
             if len(path) > 1:
-                sweep.course = FlownLine(_towards(path), 1, path, careful.overlap)
+                sweep.course = FlownLine(_towards(path), 1, path, one.overlap)
                 return True
         near_m = np.full(len(left.open), float(left.axes.turned(pose[:2])[1]))
-        choice = lines(left, wide, 1, careful, near_m)
+        choice = lines(left, wide, 1, closer(flying, overlap), near_m)
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(_simple(path, 0.1 * left.cell_m), flying, coverage)
             if len(path) > 1 and not self._closer(vehicle, pose, path, away_m, team):
-                sweep.course = FlownLine(self._direction_rad, 1, path, careful.overlap)
+                sweep.course = FlownLine(self._direction_rad, 1, path, overlap)
                 return True
             choice = [other for other in choice if other is not line]
         return False
+
+    def _missed(
+        self, left: LineRaster, small: BoolArray, flying: Flying, coverage: Coverage, pose: FloatArray
+    ) -> tuple[list[Passable], BoolArray, float]:
+        """Return the pieces of missed ground that a pass sees, cells of the others, and the overlap of lines to these.
+
+        What two lines looked at in vain is led over: something stands in between.
+        """
+        stubborn = small & _touching(small, self._tried_twice(coverage))
+        found, wide = pieces(left, small & ~stubborn, closer(flying, FILLING_OVERLAP), pose[:2])
+        over, not_over = pieces(left, stubborn, closer(flying, STUBBORN_OVERLAP), pose[:2])
+        return found + over, wide | not_over, STUBBORN_OVERLAP if not_over.any() else FILLING_OVERLAP
 
     def _on_the_way(
         self,
         vehicle: str,
         pose: FloatArray,
         flying: Flying,
+        coverage: Coverage,
         team: dict[str, FloatArray],
         left: LineRaster,
         swept_missed: tuple[BoolArray, BoolArray],
@@ -462,7 +470,7 @@ class SwathSurvey:
         path, away_m = line
         if not missed.any():
             return None
-        found, _ = pieces(left, missed, closer(flying, FILLING_OVERLAP), pose[:2])
+        found, _, _ = self._missed(left, missed, flying, coverage, pose)
         rows = np.flatnonzero(swept.any(axis=0))
         ends_m = left.across_m[rows[[0, -1]]]
         best: tuple[float, Pass] | None = None
