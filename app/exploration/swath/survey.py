@@ -206,7 +206,7 @@ class SwathSurvey:
             self._count(sweep.skipped, flying, left, tries=MOST_TRIES)
             left = replace(left, done=coverage.done | (self._tried >= MOST_TRIES))
             sweep.skipped = None
-        self._take_back(sweep, pose, flying, left)
+        self._take_back(sweep, pose)
         self._forget_flown(coverage)
         if sweep.laid_on is not coverage:
             sweep.laid_on = coverage
@@ -262,7 +262,7 @@ class SwathSurvey:
         """Return what is left of each vehicle's line, (k, 2) east and north."""
         return {name: sweep.course.path for name, sweep in self._sweeps.items() if sweep.course is not None}
 
-    def _take_back(self, sweep: Assignment, pose: FloatArray, flying: Flying, coverage: Coverage) -> None:
+    def _take_back(self, sweep: Assignment, pose: FloatArray) -> None:
         """Put a piece of a line back that a vehicle was not sent along: it does not go on from its end."""
         if not sweep.expected:
             return
@@ -277,7 +277,6 @@ class SwathSurvey:
             return
         course.path = np.vstack([piece, course.path[1:]])
         if sweep.refused >= MOST_REFUSED:
-            self._count(course.path, flying, coverage)
             sweep.course, sweep.refused = None, 0
 
     def _lay_anew(self, sweep: Assignment, vehicle: str, pose: FloatArray, flying: Flying, coverage: Coverage) -> None:
