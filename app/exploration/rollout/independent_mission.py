@@ -124,7 +124,7 @@ class ApartMission:
         score = float(judge(paths, self._free_part, count_all, self._points, self._rules, np.inf, left))
         return Best(RoutesFlown(routes, paths, left), score)
 
-    def first(self, search: int = FIRST_SEARCH) -> Best:
+    def first(self) -> Best:
         """Return the best of the sweeps over what is left, improved."""
         here = self._start[:, :2]
         flown = [
@@ -132,7 +132,7 @@ class ApartMission:
             for k, routes in enumerate(sectors(self._points.work.xyz[:2].T, here, self._area, self._rules.visibility_m))
         ]
         chosen = [self.refine(self.plan(routes), FRESH_SEARCH) for _, _, routes in sorted(flown)[:FRESH_STARTS]]
-        return self.refine(min(chosen, key=lambda best: best.score), search)
+        return self.refine(min(chosen, key=lambda best: best.score), FIRST_SEARCH)
 
     def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
         """Try a number of changes; the routes are improved in place."""

@@ -102,12 +102,6 @@ AWAY_STEPS = 40.0
 
 LEAST_FREE = 0.1
 
-RENEWAL, RENEWAL_SEARCH = 60, 300
-"""Steps after which routes of vehicles that need no links compete with new sweeps, and changes tried to the best."""
-
-BETTER = 10.0
-"""Steps that new sweeps must save: they look better than they are."""
-
 
 @dataclass
 class _Best:
@@ -248,9 +242,6 @@ class RolloutPlanner(PlannerBase):
         if set(whole.vehicles) == set(self._routes):
             kept = mission.plan([self._routes[name] for name in whole.vehicles])
             best = mission.refine(kept, self.options.rollouts, WORTH)
-            if team.step % RENEWAL == 0:
-                fresh = mission.first(RENEWAL_SEARCH)
-                best = fresh if fresh.score < best.score - BETTER else best
         else:
             best = mission.first()
         positions = team.positions.copy()
