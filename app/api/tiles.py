@@ -17,7 +17,7 @@ from app.api.schemas import API, MissionId
 from app.api.state import Service, edge_state
 from app.mapping.web_tiles import MAX_ZOOM, SIDE_PX, WebTile, finest_zoom
 from app.missions.live.mission import LiveMission
-from app.missions.maps.web_layers import WEB_LAYERS, Range, WebLayer
+from app.missions.maps.gis_layers import WEB_LAYERS, Range, WebLayer
 from app.missions.operations.map_pictures import PictureRequest
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec

@@ -12,7 +12,7 @@ from app.api.wms.parameters import DEFAULT_STYLE, LISTED_INFO_FORMATS, MOST_PX, 
 from app.api.wms.problems import NEW
 from app.mapping.map_windows import WGS84, projection
 from app.mapping.products.legend import CLASSES_PX, RANGE_PX
-from app.missions.maps.web_layers import WEB_LAYERS, WebLayer
+from app.missions.maps.gis_layers import WEB_LAYERS, WebLayer
 from imc_bridge.printable import printable
 
 _DTD = (

@@ -9,7 +9,7 @@ from starlette.datastructures import QueryParams
 
 from app.api.wms.problems import NEW, OLD, WmsError, missing, wrong
 from app.mapping.map_windows import WEB_MERCATOR, WGS84, MapWindow
-from app.missions.maps.web_layers import WEB_LAYERS, Range
+from app.missions.maps.gis_layers import WEB_LAYERS, Range
 
 MOST_PX = 4096
 """Pixels along each side of a picture."""

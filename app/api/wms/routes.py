@@ -34,7 +34,7 @@ from app.api.wms.problems import NEW, WmsError, report, wrong
 from app.api.wms.sources import pictures, usual_range, values
 from app.mapping.layers import LAYERS
 from app.mapping.products.legend import class_legend, range_legend
-from app.missions.maps.web_layers import WEB_LAYERS
+from app.missions.maps.gis_layers import WEB_LAYERS
 
 WMS = "/wms"
 WHOLE_EARTH = (-180.0, -90.0, 180.0, 90.0)

@@ -21,7 +21,7 @@ from app.api.wms.parameters import JSON, PNG, MapRequest
 from app.api.wms.problems import NEW
 from app.mapping.map_windows import WGS84, MapWindow
 from app.missions.errors import MissionElsewhereError, MissionNotFoundError
-from app.missions.maps.web_layers import WEB_LAYERS, CellValues, Range, WebLayer
+from app.missions.maps.gis_layers import WEB_LAYERS, CellValues, Range, WebLayer
 from app.missions.operations.map_pictures import MapPicture, PictureRequest
 from app.missions.running.ownership import Peer
 from app.missions.spec.mission import Limits

@@ -4,24 +4,16 @@ import asyncio
 import math
 from collections.abc import Iterable
 
-import numpy as np
 import structlog
 
 from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.flight.commit import LegCommit
+from app.missions.flight.stragglers import late_at_s, leg_allowed_s, missed, tell_of
 from app.missions.live.mission import LiveMission
-from app.missions.spec.mission import Guidance
 from app.missions.team import Member
 from app.missions.views.mission import Level
-from imc_bridge.control.plans import leg_time_s
-
-SOUND_S = 60.0
-"""What commands and reports take by sound, at the most."""
-
-SLOWEST_SHARE = 0.5
-"""Part of the speed asked for that a vehicle may make good on its leg, before it counts as a straggler."""
 
 HOLD_AFTER_S = 1.0
 """How long a vehicle that has no leg flies straight on, by its clock, before it is sent to circle somewhere."""
@@ -71,7 +63,7 @@ class Dispatch:
             for member in self._live.team:
                 if member.ordered and not member.busy:
                     member.leg_began_s = loop.time()  # it is out of reach
-            under_way = {m.name: self._late_at_s(m) for m in self._live.team if m.busy}
+            under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy}
             late = await self.settle_late()
             holds_s = await self._hold_idle()
             if late or (self._waiting and not self._live.halted):
@@ -86,17 +78,13 @@ class Dispatch:
     async def settle_late(self, of: Iterable[Member] | None = None) -> list[Member]:
         """End the legs that take too long, of some vehicles or of all; returns their vehicles."""
         now_s = asyncio.get_running_loop().time()
-        late = [m for m in (self._live.team if of is None else of) if m.busy and self._late_at_s(m) <= now_s]
+        asked = self._live.team if of is None else of
+        late = [member for member in asked if member.busy and late_at_s(member, self._time_scale) <= now_s]
         # All at once: while a line of the log is written, others may be sent on to their next legs.
         numbers = [self._settle_late(member) for member in late]
         for member, number in zip(late, numbers, strict=True):
-            await self._live.journal.log(
-                Level.WARNING,
-                "straggler",
-                f"{member.name} did not get to the end of its leg {number}: it goes on with the next",
-                step=number,
-                vehicles=[member.name],
-            )
+            message = f"{member.name} did not get to the end of its leg {number}: it goes on with the next"
+            await tell_of(self._live, [member], message, number)
         return late
 
     @property
@@ -148,7 +136,7 @@ class Dispatch:
                 continue
             self._committing.begin_next(member)
             member.leg_began_s = asyncio.get_running_loop().time()
-            member.leg_allowed_s = self._allowed_s(member)
+            member.leg_allowed_s = leg_allowed_s(self._live, member)
             self.turned_down.pop(member.name, None)
             if member.engaged:
                 beginning.append(self.send(member))
@@ -210,24 +198,10 @@ class Dispatch:
         )
         self._live.changed.set()
 
-    def _allowed_s(self, member: Member) -> float:
-        """Return how long a vehicle may take for its leg, by its clock: longer than asked for where that is long."""
-        spec, order = self._live.spec, member.order
-        if order is None or member.target_m is None or member.report is None:
-            return spec.step_deadline_s
-        away_m = float(np.linalg.norm(member.target_m - member.place_m(self._live.frame)))
-        if member.spec.guidance is Guidance.FOLLOW:
-            return max(spec.step_deadline_s, away_m / (SLOWEST_SHARE * order.speed_mps))
-        by_sound_s = SOUND_S if member.spec.guidance is Guidance.ACOUSTIC else 0.0
-        return max(spec.step_deadline_s, leg_time_s(away_m, order.position.depth_m, order.speed_mps) + by_sound_s)
-
-    def _late_at_s(self, member: Member) -> float:
-        return member.leg_began_s + member.leg_allowed_s / self._time_scale
-
     def _settle_late(self, member: Member) -> int:
         """End a vehicle's leg and return its number."""
         number = member.order.step if member.order is not None else member.legs
         if member.target_m is not None:
             self._note_given_up(member, [member.target_m])
-        self.settle(member, WaypointStatus.MISSED, f"not reached within {member.leg_allowed_s:.0f} s")
+        self.settle(member, WaypointStatus.MISSED, missed(member.leg_allowed_s))
         return number

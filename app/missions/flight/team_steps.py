@@ -14,10 +14,10 @@ from app.missions.flight.decision import Decision, Place
 from app.missions.flight.dispatch import Dispatch
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.flight.step_maps import StepMaps
+from app.missions.flight.stragglers import missed, step_allowed_s, tell_of
 from app.missions.flight.waiting import Waiting
 from app.missions.live.mission import LiveMission
 from app.missions.team import Member
-from app.missions.views.mission import Level
 
 REPORT_DELAY_S = 0.1
 """How old a vehicle's last report is at most, on the wall clock."""
@@ -57,7 +57,7 @@ class TeamSteps:
         """Fly all remaining steps; returns why there are no more. ``resumed``: legs of an earlier run come first."""
         live = self._live
         if resumed:
-            await self._waiting.for_team(patient_s=self._step_time_s() / self._time_scale)
+            await self._waiting.for_team(patient_s=step_allowed_s(self._live) / self._time_scale)
             await self._dispatch.begin()
             await self._arrive(self._deadline_s())
         decision: Decision | None = None
@@ -65,7 +65,7 @@ class TeamSteps:
             started_s = asyncio.get_running_loop().time()
             if decision is None:
                 await self._waiting.for_team(
-                    patient_s=None if live.header.step else self._step_time_s() / self._time_scale
+                    patient_s=None if live.header.step else step_allowed_s(self._live) / self._time_scale
                 )
                 await self._lookout.look_round()
                 decision = await self._decide_to_fly()
@@ -178,14 +178,9 @@ class TeamSteps:
         if not late:
             return
         for member in late:
-            self._dispatch.settle(member, WaypointStatus.MISSED, f"not reached within {self._step_time_s():.0f} s")
-        await self._live.journal.log(
-            Level.WARNING,
-            "straggler",
-            f"step {self._live.header.step} goes on without {', '.join(m.name for m in late)}",
-            step=self._live.header.step,
-            vehicles=[m.name for m in late],
-        )
+            self._dispatch.settle(member, WaypointStatus.MISSED, missed(step_allowed_s(self._live)))
+        number = self._live.header.step
+        await tell_of(self._live, late, f"step {number} goes on without {', '.join(m.name for m in late)}", number)
 
     async def _end_early(self, barred: list[Member]) -> None:
         """Where something stands on a vehicle's way, end the step: everybody is sent anew from where it is."""
@@ -204,9 +199,4 @@ class TeamSteps:
 
     def _deadline_s(self) -> float:
         """Return the event loop's time at which a step that begins now goes on without stragglers."""
-        return asyncio.get_running_loop().time() + self._step_time_s() / self._time_scale
-
-    def _step_time_s(self) -> float:
-        """Return how long a step may take: longer than asked for where a vehicle's leg takes longer."""
-        under_way = [member.leg_allowed_s for member in self._live.team if member.ordered and member.report is not None]
-        return max([self._spec.step_deadline_s, *under_way])
+        return asyncio.get_running_loop().time() + step_allowed_s(self._live) / self._time_scale

@@ -20,8 +20,8 @@ from app.mapping.map_windows import MapWindow, window_cells, window_pixel_cells
 from app.mapping.products.tile_pictures import Words, empty_png, stacked, window_png, window_words, words_of
 from app.missions.errors import MapNotReadyError
 from app.missions.live.mission import LiveMission
+from app.missions.maps.gis_layers import WEB_LAYERS, CellValues, Painted, Range, halved, painted, values_at
 from app.missions.maps.snapshot import MapSnapshot
-from app.missions.maps.web_layers import WEB_LAYERS, CellValues, Painted, Range, halved, painted, values_at
 from app.missions.operations.mission_maps import newest_map
 from app.missions.running.final_maps import FinalMaps
 

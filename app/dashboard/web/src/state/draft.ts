@@ -26,7 +26,7 @@ import {
   valueAt,
   vehicleFieldsOf,
   withTexts,
-} from "./fields";
+} from "./missionFields";
 import { placeOf, placeSample, typedPlace } from "./place";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */

@@ -13,8 +13,8 @@ import {
   toMission,
   withLength,
 } from "../state/draft";
-import { FIELDS } from "../state/fields";
 import { distance, duration, fixed } from "../state/format";
+import { FIELDS } from "../state/missionFields";
 import { say } from "../words/say";
 import { Choice } from "./Controls";
 import { Fault, Part, Text, useForm } from "./Fields";

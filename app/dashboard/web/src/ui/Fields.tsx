@@ -3,8 +3,8 @@
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 import type { Draft, Faults } from "../state/draft";
-import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../state/fields";
 import { pointed } from "../state/format";
+import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../state/missionFields";
 import { typedPlace } from "../state/place";
 import { picking } from "../state/store";
 import { named, say } from "../words/say";

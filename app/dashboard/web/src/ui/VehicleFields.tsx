@@ -1,7 +1,7 @@
 import type { Sensor, VehicleSpec, VehicleView } from "../api/types";
 import { type Own, sensorOf, simulatedNames, vehicleNames } from "../state/draft";
-import { SENSORS, schemaOf, vehicleFieldsOf } from "../state/fields";
 import { pointed } from "../state/format";
+import { SENSORS, schemaOf, vehicleFieldsOf } from "../state/missionFields";
 import { fleet } from "../state/store";
 import { batteryWords, vehicleState } from "../state/words";
 import { named, say } from "../words/say";

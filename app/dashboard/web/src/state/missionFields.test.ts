@@ -12,7 +12,7 @@ import {
   type LengthUnit,
   schemaOf,
   startOf,
-} from "./fields";
+} from "./missionFields";
 
 const ENTRIES = Object.entries(FIELDS) as [FieldName, Field][];
 const valueAt = (mission: NewMission, path: string): unknown =>
@@ -124,7 +124,7 @@ function numbersIn(file: string): string[] {
 
 it.each([
   // Seconds in a minute; without a factor: one.
-  ["state/fields.ts", ["60", "1"]],
+  ["state/missionFields.ts", ["60", "1"]],
   // Corners and digits of places; the size of the first rectangle and how many vehicles are simulated at first; seconds
   // in a minute, metres in a kilometre.
   ["state/draft.ts", ["1", "2", "3", "6", "60", "100", "1000"]],
