@@ -146,19 +146,20 @@ class Terrain:
         rows, cols = self.z_m.shape
         if not (0.0 <= east_m <= cols * self.cell_m and 0.0 <= north_m <= rows * self.cell_m):
             return math.nan
-        x = east_m / self.cell_m - 0.5
-        y = north_m / self.cell_m - 0.5
         last_col, last_row = cols - 1, rows - 1
-        x = min(max(x, 0.0), float(last_col))
-        y = min(max(y, 0.0), float(last_row))
-        j = min(int(x), last_col - 1)
-        i = min(int(y), last_row - 1)
+        x = min(max(east_m / self.cell_m - 0.5, 0.0), float(last_col))
+        y = min(max(north_m / self.cell_m - 0.5, 0.0), float(last_row))
+        j, i = int(x), int(y)
+        if j == last_col:
+            j -= 1
+        if i == last_row:
+            i -= 1
         u, v = x - j, y - i
-        item = self.z_m.item
-        depth = 0.0
-        for di, wy in ((0, 1.0 - v), (1, v)):
-            for dj, wx in ((0, 1.0 - u), (1, u)):
-                weight = wx * wy
-                if weight > 0.0:
-                    depth += weight * item(i + di, j + dj)
+        item, depth = self.z_m.item, 0.0
+        for row, wy in ((i, 1.0 - v), (i + 1, v)):
+            if wy > 0.0:
+                if u < 1.0:
+                    depth += (1.0 - u) * wy * item(row, j)
+                if u > 0.0:
+                    depth += u * wy * item(row, j + 1)
         return depth

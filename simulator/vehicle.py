@@ -240,9 +240,13 @@ class Vehicle:
         """
         m = self.motion
         radius = m.surge_mps / self.limits.turn_rate_radps
-        starboard_e, starboard_n = math.cos(m.heading_rad), -math.sin(m.heading_rad)
-        nearest = min(math.hypot(de - r * starboard_e, dn - r * starboard_n) for r in (radius, -radius))
-        self._leaving = nearest < (LEFT_BEHIND if self._leaving else TOO_CLOSE) * radius
+        close = (LEFT_BEHIND if self._leaving else TOO_CLOSE) * radius
+        if math.hypot(de, dn) >= close + radius:  # no centre can be so near
+            self._leaving = False
+            return False
+        aside_e, aside_n = radius * math.cos(m.heading_rad), -radius * math.sin(m.heading_rad)
+        nearest = min(math.hypot(de - aside_e, dn - aside_n), math.hypot(de + aside_e, dn + aside_n))
+        self._leaving = nearest < close
         return self._leaving
 
     def _heading_for(self, course: float) -> float:
@@ -265,9 +269,11 @@ class Vehicle:
 
 def wrap(angle_rad: float) -> float:
     """The same angle within (-pi, pi]."""
+    if -math.pi < angle_rad <= math.pi:
+        return angle_rad
     wrapped = math.remainder(angle_rad, 2.0 * math.pi)
     return math.pi if wrapped == -math.pi else wrapped
 
 
 def _clip(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
+    return limit if value > limit else -limit if value < -limit else value

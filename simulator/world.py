@@ -113,6 +113,8 @@ SOURCES = {
     SensorKind.MULTIBEAM: "Multibeam",
 }
 
+DOWN = [[0.0, 0.0, 1.0]]
+
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
@@ -394,15 +396,15 @@ class SimulatedVehicle:
         if isinstance(self.sonar, SwathSounder):
             raise ValueError(f"{self.name}: its sonar is multibeam, which measures whole swaths")
         m = self.vehicle.motion
-        ranges = self.sonar.ping(self.terrain, m)
         here, true = self.position, self.true_position
         if self.sonar.kind is SensorKind.SINGLE:
-            directions = np.array([[0.0, 0.0, 1.0]])
+            ranges, directions = [self.sonar.ping_below(self.terrain, m)], DOWN
         else:
-            directions = to_local_frame(self.sonar.beams.body, m.heading_rad, m.pitch_rad, m.roll_rad)
+            ranges = self.sonar.ping(self.terrain, m).tolist()
+            directions = to_local_frame(self.sonar.beams.body, m.heading_rad, m.pitch_rad, m.roll_rad).tolist()
         source = SOURCES[self.sonar.kind]
         out = []
-        for beam, (r, (de, dn, dd)) in enumerate(zip(ranges.tolist(), directions.tolist(), strict=True)):
+        for beam, (r, (de, dn, dd)) in enumerate(zip(ranges, directions, strict=True)):
             footprint = (
                 LocalPosition(here.east_m + r * de, here.north_m + r * dn, here.depth_m + r * dd)
                 if math.isfinite(r)

@@ -96,7 +96,7 @@ def main() -> None:
             bar.advance(task)
     found = figures(runs)
     print("\n".join(f"{name}: {value}" for name, value in found.items()))
-    title = f"Surveys at sea: {given.sets.replace(',', ', ')}"
+    title = f"Surveys at sea: {(given.only or given.sets).replace(',', ', ')}"
     found["load_of_the_machine"] = f"{os.getloadavg()[2]:.1f}"
     write_section(given.write, FLIGHT, title, found, seeds=given.seeds, hidden={given.terrains: "FOLDER"})
 

@@ -5,6 +5,7 @@ next has it decided from where the last one ends, with the others' legs as they 
 same vehicles fly the patterns.
 """
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from app.estimation import SingleBeam
 from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, LEAST_SD_M
 from app.evaluation.survey.world import SPEED_MPS, Log, MapSoFar, SurveyScenario
 from app.exploration.core.problem import Belief, Planner, Situation
-from app.exploration.core.track import along_leg
+from app.exploration.core.track import Place, along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.mapping.types import Soundings
@@ -66,8 +67,7 @@ class _Craft:
 
     @property
     def place_m(self) -> FloatArray:
-        here = self.body.position
-        return np.array([here.east_m, here.north_m])
+        return np.array(_en(self.body))
 
     @property
     def last_end_m(self) -> FloatArray:
@@ -97,10 +97,9 @@ class _Craft:
             self._begin()
 
     def _begin(self) -> None:
-        east, north = (float(x) for x in self.ends[0])
+        self._leg = (_pair(self._from), _pair(self.ends[0]))
         self.body.go_to(
-            east,
-            north,
+            *self._leg[1],
             self.depth_m,
             SPEED_MPS,
             arrival_radius_m=ARRIVAL_RADIUS_M,
@@ -109,16 +108,16 @@ class _Craft:
 
     def advance(self, log: Log, relative_noise: float) -> None:
         """Live for a tick, sound, and go on with the next leg where one was reached."""
-        before = self.place_m
+        before = _en(self.body)
         for echo in self.body.advance(TICK_S):
             if echo.footprint is not None:
                 place = echo.footprint
                 log.add(place.east_m, place.north_m, place.depth_m, max(relative_noise * echo.range_m, LEAST_SD_M))
         if not self.ends:
             return
-        after, leg = self.place_m, (_pair(self._from), _pair(self.ends[0]))
-        if along_leg(_pair(before), _pair(after), leg):
-            self.on_plan_m += float(np.hypot(*(after - before)))
+        after = _en(self.body)
+        if along_leg(before, after, self._leg):
+            self.on_plan_m += math.hypot(after[0] - before[0], after[1] - before[1])
         if self.body.arrived:
             self._from = self.ends.pop(0)
             if self.ends:
@@ -143,13 +142,13 @@ def fly_planner_at_sea(
     ready_s, now_s, step = np.inf, 0.0, 0
     names = tuple(f"auv-{k + 1}" for k in range(scenario.vehicles))
     while now_s < until_s:
-        due = _due(crafts, scenario.max_step_m, (until_s - now_s) * SPEED_MPS)
-        if not decided and due.any():
+        way_left_m = (until_s - now_s) * SPEED_MPS
+        if not decided and (due := _due(crafts, scenario.max_step_m, way_left_m)).any():
             if so_far.renew(log, now_s / until_s):
                 _take_back(crafts, names, chooser)
-                due = _due(crafts, scenario.max_step_m, (until_s - now_s) * SPEED_MPS)
+                due = _due(crafts, scenario.max_step_m, way_left_m)
             sounded_m, doubtful_m = so_far.sounded(log)
-            left_m = np.array([max((until_s - now_s) * SPEED_MPS - craft.way_ahead_m, 0.0) for craft in crafts])
+            left_m = np.array([max(way_left_m - craft.way_ahead_m, 0.0) for craft in crafts])
             step += 1
             situation = Situation(
                 step,
@@ -210,14 +209,23 @@ def fly_pattern_at_sea(
         way_m = until_s * SPEED_MPS
         budget_m *= min(FEWER_LINES, *(way_m / (way_m + craft.way_ahead_m) for craft in crafts))
     if best is None:
-        return SeaTrack(np.zeros(0), np.zeros(0), scenario.log(2).soundings, np.zeros(0), finished=False)
+        return SeaTrack(
+            np.zeros(scenario.vehicles),
+            np.zeros(scenario.vehicles),
+            scenario.log(2).soundings,
+            np.zeros(0),
+            finished=False,
+        )
     return best
 
 
 def _due(crafts: list[_Craft], leg_m: float, way_left_m: float) -> BoolArray:
     """Return who gets the next leg, (vehicles,): whoever needs one, with those that soon will."""
+    needs: BoolArray = np.array([len(craft.ends) <= AHEAD for craft in crafts])
+    if not needs.any():
+        return needs
     able = np.array([way_left_m - craft.way_ahead_m > LEAST_WAY_M for craft in crafts])
-    needs: BoolArray = able & np.array([len(craft.ends) <= AHEAD for craft in crafts])
+    needs &= able
     if not needs.any():
         return needs
     soon = [len(craft.ends) <= AHEAD + 1 and craft.left_of_leg_m <= HARDLY_BEGUN * leg_m for craft in crafts]
@@ -259,5 +267,10 @@ def _track(crafts: list[_Craft], log: Log, plan_s: list[float]) -> SeaTrack:
     )
 
 
-def _pair(place_m: FloatArray) -> tuple[float, float]:
+def _en(body: SimulatedVehicle) -> Place:
+    here = body.position
+    return here.east_m, here.north_m
+
+
+def _pair(place_m: FloatArray) -> Place:
     return float(place_m[0]), float(place_m[1])

@@ -34,6 +34,8 @@ class Nodes(NamedTuple):
         Corner of the first bucket and side of all.
     rows, cols : int
         Their number.
+    most_m : (rows * cols,)
+        The farthest that a node of each bucket is from the nearest sounding: a leg farther off lowers nothing there.
     """
 
     x: FloatArray
@@ -45,11 +47,18 @@ class Nodes(NamedTuple):
     side: float
     rows: int
     cols: int
+    most_m: FloatArray
 
     @property
     def en_m(self) -> FloatArray:
         """Positions (m, 2)."""
         return np.column_stack([self.x, self.y])
+
+    def sounded(self, d2: FloatArray) -> "Nodes":
+        """Return the same nodes for squared distances to soundings that are nowhere larger than ``d2`` (m,)."""
+        most2 = np.zeros(len(self.most_m))
+        np.maximum.at(most2, np.repeat(np.arange(len(most2)), np.diff(self.first)), d2)
+        return self._replace(most_m=np.sqrt(most2))
 
 
 class SurveyObjective(NamedTuple):
@@ -68,7 +77,7 @@ def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
     """Sort nodes at ``en_m`` (m, 2) with their ``weight`` (m,) into buckets."""
     if len(en_m) == 0:
         none = np.zeros(0)
-        return Nodes(none, none, none, np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1)
+        return Nodes(none, none, none, np.zeros(2, dtype=np.int64), 0.0, 0.0, 1.0, 1, 1, np.zeros(1))
     low, high = en_m.min(axis=0), en_m.max(axis=0)
     side = max(float((high - low).max()) / BUCKETS_PER_SIDE, 1e-6)
     cols, rows = (int(k) + 1 for k in (high - low) / side)
@@ -77,7 +86,8 @@ def make_nodes(en_m: FloatArray, weight: FloatArray) -> Nodes:
     order = np.argsort(bucket, kind="stable")
     first = np.searchsorted(bucket[order], np.arange(rows * cols + 1)).astype(np.int64)
     x, y, w = (np.ascontiguousarray(v[order], dtype=np.float64) for v in (en_m[:, 0], en_m[:, 1], weight))
-    return Nodes(x, y, w, first, float(low[0]), float(low[1]), side, rows, cols)
+    anything = np.full(rows * cols, np.inf)
+    return Nodes(x, y, w, first, float(low[0]), float(low[1]), side, rows, cols, anything)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -112,7 +122,6 @@ def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: flo
     c1 = min(nodes.cols - 1, int((max(ax, bx) + reach - nodes.west) / side))
     r0 = max(0, int((min(ay, by) - reach - nodes.south) / side))
     r1 = min(nodes.rows - 1, int((max(ay, by) + reach - nodes.south) / side))
-    far = reach + 0.7072 * side
     for r in range(r0, r1 + 1):
         # Of a row of buckets the nodes are contiguous: find its part that the segment comes close to.
         low, high = -1, -1
@@ -124,6 +133,7 @@ def lower_to_segment(d2: FloatArray, nodes: Nodes, ax: float, ay: float, bx: flo
             t = min(1.0, max(0.0, t))
             ex = rx - t * dx
             ey = ry - t * dy
+            far = min(reach, nodes.most_m[r * nodes.cols + c]) + 0.7072 * side
             if ex * ex + ey * ey <= far * far:
                 if low < 0:
                     low = c

@@ -13,6 +13,9 @@ STEEP_BLOCK, STEEP, FEWEST_RISES = 0.25, 0.95, 4
 """Steep is what so large a share of all ground is not, between blocks of this part of the depth; of fewer rises nothing
 is said."""
 
+NEVER_BETWEEN = 0.7
+"""Places so many cells apart, in rows of any direction, leave no cell out."""
+
 
 @dataclass(frozen=True)
 class Flying:
@@ -127,14 +130,15 @@ class LineRaster:
         turned = self.axes.turned(path_m)
         steps = np.diff(turned, axis=0)
         lengths = np.hypot(*steps.T)
-        at = np.arange(0.5 * self.cell_m, max(float(lengths.sum()), self.cell_m), self.cell_m)
+        apart_m = NEVER_BETWEEN * self.cell_m
+        at = np.arange(0.5 * apart_m, max(float(lengths.sum()), apart_m), apart_m)
         begins = np.concatenate([[0.0], np.cumsum(lengths)])
         piece = np.clip(np.searchsorted(begins, at, side="right") - 1, 0, len(lengths) - 1)
         towards = steps[piece] / np.maximum(lengths[piece], 1e-9)[:, None]
         places = turned[piece] + (at - begins[piece])[:, None] * towards
         below_m = self.depth_m[self.columns_of(places[:, 0]), self.rows_of(places[:, 1])]
         widest_m = float(flying.half_width_m(below_m).max(initial=0.0)) * 1.5 + self.cell_m
-        aside_m = np.arange(-widest_m, widest_m + self.cell_m, self.cell_m)
+        aside_m = np.arange(-widest_m, widest_m + apart_m, apart_m)
         seen = np.zeros_like(self.open)
         beside = places[:, None] + aside_m[:, None] * np.stack([-towards[:, 1], towards[:, 0]], axis=-1)[:, None]
         i = np.floor((beside[..., 0] - self.corner_m[0]) / self.cell_m).astype(np.int64)

@@ -10,14 +10,16 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import label
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
 from app.exploration.core.routes import FreeSpace
 from app.exploration.swath.lines import ALMOST, STEEPEST, Line, bend_radius_m, gentle, lines, needed_lines, strips
-from app.exploration.swath.lines_ahead import best_direction, nearest_entry, path_m
+from app.exploration.swath.lines_ahead import approaches_m, best_direction, nearest_entry, path_m
+from app.exploration.swath.lines_ahead import pose as pose_of
 from app.exploration.swath.near_zones import led_round
-from app.exploration.swath.passes import passes
+from app.exploration.swath.passes import BUSY, MOST_TOURED, Pass, Passable, pieces, shared, tour
 from app.exploration.swath.raster import Flying, LineRaster, raster_of, steepness
 
 MOST_TRIES = 4
@@ -29,7 +31,7 @@ MOST_REFUSED = 3
 LOOK_AGAIN_AT = (0.02, 0.08, 0.2, 0.4)
 """Shares of the area after which the direction of lines is looked at again, with the depths that are known by then."""
 
-TURNING_GAIN = 0.1
+TURNING_GAIN = 0.2
 """Lines are turned into another direction where that shortens what is left by more than this share."""
 
 WORTH_HELPING = 1.2
@@ -38,9 +40,12 @@ WORTH_HELPING = 1.2
 FILLING_OVERLAP, STUBBORN_OVERLAP = 0.4, 0.95
 """Shares of half a swath that holes lie within: where a line to fill them sees them well, and where it is over them."""
 
-DETOUR, BUSY = 1.5, 0.25
-"""A line is left to another vehicle where the way there is longer than so many times the other's detour, and a part of
-what the other has still to fly of its own line."""
+EARLY = 0.4
+"""Missed ground is passed on the way to a line where the detour is less than so much of the way back from the last."""
+
+DETOUR = 1.5
+"""A line is left to another vehicle where the way there is longer than so many times the other's detour, and ``BUSY``
+of what the other has still to fly of its own line."""
 
 SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
 """Metres by which unknown ground is presumed to rise a metre away from known ground, least and most: so many times what
@@ -201,7 +206,7 @@ class SwathSurvey:
             self._count(sweep.skipped, flying, left, tries=MOST_TRIES)
             left = replace(left, done=coverage.done | (self._tried >= MOST_TRIES))
             sweep.skipped = None
-        self._take_back(sweep, pose, flying, left)
+        self._take_back(sweep, pose)
         self._forget_flown(coverage)
         if sweep.laid_on is not coverage:
             sweep.laid_on = coverage
@@ -257,7 +262,7 @@ class SwathSurvey:
         """Return what is left of each vehicle's line, (k, 2) east and north."""
         return {name: sweep.course.path for name, sweep in self._sweeps.items() if sweep.course is not None}
 
-    def _take_back(self, sweep: Assignment, pose: FloatArray, flying: Flying, coverage: Coverage) -> None:
+    def _take_back(self, sweep: Assignment, pose: FloatArray) -> None:
         """Put a piece of a line back that a vehicle was not sent along: it does not go on from its end."""
         if not sweep.expected:
             return
@@ -272,7 +277,6 @@ class SwathSurvey:
             return
         course.path = np.vstack([piece, course.path[1:]])
         if sweep.refused >= MOST_REFUSED:
-            self._count(course.path, flying, coverage)
             sweep.course, sweep.refused = None, 0
 
     def _lay_anew(self, sweep: Assignment, vehicle: str, pose: FloatArray, flying: Flying, coverage: Coverage) -> None:
@@ -372,37 +376,125 @@ class SwathSurvey:
         self._lay_out(flying, coverage, team)
         sweep = self._sweeps[vehicle]
         raster = self._raster(coverage, self._direction_rad)
-        free = raster.open & ~self._expected(raster, flying, vehicle)
-        left = replace(raster, open=free)
+        expected = self._expected(raster, flying, vehicle)
+        left = replace(raster, open=raster.open & ~expected)
         large, small = strips(left, flying)
+        missed = small & ~_touching(raster.open, expected)
         share = sweep.share
         own = share is not None and bool((large & _between(raster, share)).any())
         if not own:
             share = sweep.share = self._help(vehicle, left, large, flying)
         sign = 1 if share is None else share.sign
-        overlap = flying.overlap
-        choice = [] if share is None else lines(left, large & _between(raster, share), sign, flying)
-        if not choice:
-            again = small & self._tried_twice(coverage)
-            overlap = STUBBORN_OVERLAP if again.any() else FILLING_OVERLAP
-            missed = again if again.any() else small
-            short, wide = passes(left, missed, closer(flying, overlap), pose)
-            for one in short:
-                path = self._led(one.path, flying, coverage)
-                if len(path) > 1 and not self._closer(vehicle, pose, path, one.away_m, team):
-                    east, north = path[1] - path[0]
-                    sweep.course = FlownLine(float(np.arctan2(north, east)), 1, path, overlap)
-                    return True
-            near_m = np.full(len(left.open), float(raster.axes.turned(pose[:2])[1]))
-            choice = lines(left, wide, sign, closer(flying, overlap), near_m)
+        mine = large & _between(raster, share) if share is not None else np.zeros_like(large)
+        choice = lines(left, mine, sign, flying) if mine.any() else []
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(_simple(path, 0.1 * raster.cell_m), flying, coverage)
             if len(path) > 1 and (own or not self._closer(vehicle, pose, path, away_m, team)):
-                sweep.course = FlownLine(self._direction_rad, sign, path, overlap)
+                early = self._on_the_way(vehicle, pose, flying, coverage, team, left, (mine, missed), (path, away_m))
+                led = path if early is None else self._led(early.path, flying, coverage)
+                if early is None or len(led) < 2:
+                    sweep.course = FlownLine(self._direction_rad, sign, path, flying.overlap)
+                else:
+                    sweep.course = FlownLine(_towards(led), 1, led, early.overlap)
+                return True
+            choice = [other for other in choice if other is not line]
+        if any(self._sweeps[name].course is not None for name in team if name != vehicle):
+            small = missed  # What others may see yet is not missed.
+        return bool(small.any()) and self._fill(vehicle, pose, flying, coverage, team, left, small)
+
+    def _fill(
+        self,
+        vehicle: str,
+        pose: FloatArray,
+        flying: Flying,
+        coverage: Coverage,
+        team: dict[str, FloatArray],
+        left: LineRaster,
+        small: BoolArray,
+    ) -> bool:
+        """Send a vehicle over what lines have missed; return whether there is anything for it."""
+        sweep = self._sweeps[vehicle]
+        found, wide, overlap = self._missed(left, small, flying, coverage, pose)
+        mine = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
+        for one in tour(mine, pose, flying.radius_m):
+            path = self._led(one.path, flying, coverage)
+            if len(path) > 1:
+                sweep.course = FlownLine(_towards(path), 1, path, one.overlap)
+                return True
+        near_m = np.full(len(left.open), float(left.axes.turned(pose[:2])[1]))
+        choice = lines(left, wide, 1, closer(flying, overlap), near_m)
+        while choice:
+            line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
+            path = self._led(_simple(path, 0.1 * left.cell_m), flying, coverage)
+            if len(path) > 1 and not self._closer(vehicle, pose, path, away_m, team):
+                sweep.course = FlownLine(self._direction_rad, 1, path, overlap)
                 return True
             choice = [other for other in choice if other is not line]
         return False
+
+    def _missed(
+        self, left: LineRaster, small: BoolArray, flying: Flying, coverage: Coverage, pose: FloatArray
+    ) -> tuple[list[Passable], BoolArray, float]:
+        """Return the pieces of missed ground that a pass sees, cells of the others, and the overlap of lines to these.
+
+        What two lines looked at in vain is led over: something stands in between.
+        """
+        stubborn = small & _touching(small, self._tried_twice(coverage))
+        found, wide = pieces(left, small & ~stubborn, closer(flying, FILLING_OVERLAP), pose[:2])
+        over, not_over = pieces(left, stubborn, closer(flying, STUBBORN_OVERLAP), pose[:2])
+        return found + over, wide | not_over, STUBBORN_OVERLAP if not_over.any() else FILLING_OVERLAP
+
+    def _on_the_way(
+        self,
+        vehicle: str,
+        pose: FloatArray,
+        flying: Flying,
+        coverage: Coverage,
+        team: dict[str, FloatArray],
+        left: LineRaster,
+        swept_missed: tuple[BoolArray, BoolArray],
+        line: tuple[FloatArray, float],
+    ) -> Pass | None:
+        """Return a pass over missed ground that is a small detour on the way to a line; None where none is.
+
+        Parameters
+        ----------
+        swept_missed
+            What the vehicle has still to sweep, and what lines have missed, (along, across) both.
+        line
+            Its path (k, 2) and the way to it.
+        """
+        swept, missed = swept_missed
+        path, away_m = line
+        if not missed.any():
+            return None
+        found, _, _ = self._missed(left, missed, flying, coverage, pose)
+        rows = np.flatnonzero(swept.any(axis=0))
+        ends_m = left.across_m[rows[[0, -1]]]
+        best: tuple[float, Pass] | None = None
+        for piece in shared(found, *self._free_at(vehicle, pose, team))[vehicle][:MOST_TOURED]:
+            (one,) = tour([piece], pose, flying.radius_m)
+            onward_m = approaches_m(pose_of(one.path, end=True), pose_of(path)[None], flying.radius_m)
+            detour_m = one.way_m + float(onward_m[0]) - away_m
+            later_m = float(np.abs(ends_m - left.axes.turned(piece.middle_m)[1]).max())
+            if detour_m < EARLY * later_m and (best is None or detour_m < best[0]):
+                best = detour_m, one
+        return None if best is None else best[1]
+
+    def _free_at(
+        self, vehicle: str, pose: FloatArray, team: dict[str, FloatArray]
+    ) -> tuple[dict[str, FloatArray], dict[str, float]]:
+        """Return where all vehicles are next free for another line, (2,), and how far it is there for them."""
+        places, busy_m = {vehicle: pose[:2]}, {vehicle: 0.0}
+        for name, at in team.items():
+            course = self._sweeps[name].course
+            if name == vehicle:
+                continue
+            flies = course is not None and len(course.path) > 1
+            places[name] = course.path[-1] if course is not None and flies else at[:2]
+            busy_m[name] = path_m(np.vstack([at[:2], course.path])) if course is not None and flies else 0.0
+        return places, busy_m
 
     def _led(self, path: FloatArray, flying: Flying, coverage: Coverage) -> FloatArray:
         """Return a line (k, 2) as vehicles may fly it; empty where they may not, and what it was to see is given up."""
@@ -683,6 +775,14 @@ def _between(raster: LineRaster, share: Strip) -> BoolArray:
     return np.broadcast_to(inside, raster.open.shape)
 
 
+def _touching(cells: BoolArray, others: BoolArray) -> BoolArray:
+    """Return those of some cells (along, across) whose piece shares any with others."""
+    number, count = label(cells, np.ones((3, 3)))
+    touched = np.zeros(count + 1, dtype=bool)
+    touched[number[cells & others]] = True
+    return np.asarray(touched[number])
+
+
 def _work(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:
     """Return how long lines over cells are, metres, (along, across)."""
     return np.asarray(np.where(cells, raster.work_m(flying), 0.0))
@@ -724,6 +824,12 @@ def _cells_at(places: FloatArray, coverage: Coverage, cells: BoolArray) -> BoolA
     shape = cells.shape
     inside = (rows >= 0) & (rows < shape[0]) & (cols >= 0) & (cols < shape[1])
     return np.asarray(inside & cells[np.where(inside, rows, 0), np.where(inside, cols, 0)])
+
+
+def _towards(path: FloatArray) -> float:
+    """Return the direction of a path's first piece, anticlockwise from east."""
+    east, north = path[1] - path[0]
+    return float(np.arctan2(north, east))
 
 
 def _simple(path: FloatArray, tolerance_m: float) -> FloatArray:

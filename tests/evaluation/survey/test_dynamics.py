@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from app.evaluation.cli import evaluate_app
 from app.evaluation.survey.dynamics import fly_pattern_at_sea, fly_planner_at_sea
-from app.evaluation.survey.run import best_even_survey
+from app.evaluation.survey.run import best_even_survey, judge
 from app.evaluation.survey.world import SPEED_MPS, SurveyScenario
 from app.exploration.core.routes import Turns
 from app.exploration.planner.options import PlannerOptions
@@ -51,6 +51,13 @@ def test_a_pattern_has_the_lines_that_can_be_finished(scenario: SurveyScenario) 
     assert track.finished
     assert (track.on_plan_m > 0.8 * track.flown_m).all()
     assert (track.flown_m <= 1.15 * 60.0 * MINUTES * SPEED_MPS).all()
+
+
+def test_minutes_in_which_no_pattern_can_be_finished_are_compared_all_the_same(scenario: SurveyScenario) -> None:
+    track = fly_pattern_at_sea(scenario, lambda metres: None, MINUTES)
+    assert len(track.soundings) == 0
+    np.testing.assert_array_equal(track.flown_m, [0.0, 0.0])
+    assert judge(scenario, track.soundings, track.flown_m, yardstick=True).samples == 0
 
 
 def test_the_command_tells_minutes_and_metres(tmp_path: Path) -> None:

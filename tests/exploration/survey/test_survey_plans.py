@@ -50,6 +50,18 @@ def test_nodes_within_reach_of_a_leg_get_their_distance_to_it(ax: Any, ay: Any, 
     assert (np.sqrt(d2[~near]) >= reach - 1e-6).all()
 
 
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=30), st.integers(0, 100))
+def test_among_soundings_legs_lower_what_they_lower_without_knowing_how_far_those_are(sounded: Any, seed: int) -> None:
+    nodes = nodes_of(seed)
+    to_soundings = np.asarray(cKDTree(np.array(sounded)).query(nodes.en_m)[0]) ** 2
+    plain, knowing = to_soundings.copy(), to_soundings.copy()
+    for ax, ay, bx, by in np.random.default_rng(seed).uniform(0.0, 100.0, (10, 4)):
+        lower_to_segment(plain, nodes, ax, ay, bx, by, 300.0)
+        lower_to_segment(knowing, nodes.sounded(to_soundings), ax, ay, bx, by, 300.0)
+    np.testing.assert_array_equal(knowing, plain)
+
+
 @dataclass(frozen=True)
 class WithZone(SurveyScenario):
     """A survey round keep-out zones."""

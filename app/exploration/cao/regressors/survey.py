@@ -165,6 +165,7 @@ class SurveyRegressors:
         self._objective = SurveyObjective(self._scale, POWER, turns, REACH * self._spacing)
         self._vehicles = Vehicles(self._en, np.ascontiguousarray(team.headings_rad, dtype=np.float64), self._left_m)
         self._d2 = np.asarray(tree.query(self._nodes.en_m)[0]) ** 2
+        self._sounded = self._nodes.sounded(self._d2)
         self._reference = float(len(self._nodes.x))
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
@@ -366,8 +367,16 @@ class SurveyRegressors:
     def _improve_plan(
         self, plan: tuple[FloatArray, IntArray], lattice: tuple[FloatArray, IntArray], values: tuple[float, float]
     ) -> tuple[tuple[FloatArray, IntArray], tuple[float, float]]:
-        """Improve the freer plan, then decide which of the two to follow; return it and the value of both."""
+        """Improve the freer plan, then decide which of the two to follow; return it and the value of both.
+
+        It is left as it is where it could not be followed: nothing is known, or nodes lie too far apart to judge it.
+        """
         team = self._team
+        self._planned_m = self._flown_m
+        knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
+        if not (knows and _cell(self._nodes.en_m) <= COARSE * self._spacing):
+            self._free = False
+            return plan, values
         coarse = np.array([self._coarse[v] for v in team.vehicles], dtype=np.int64)
         best: tuple[float, FloatArray, IntArray] | None = None
         for which, begin in enumerate((plan, lattice)):
@@ -377,11 +386,8 @@ class SurveyRegressors:
         assert best is not None  # noqa: S101 - two beginnings
         value, vias, counts = best
         self._plan = {v: vias[i, : counts[i]].copy() for i, v in enumerate(team.vehicles)}
-        knows = bool((np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)).any())
         leave = 1.0 if self._free else LEAVE_BACKBONE if self._adapts else LEAVE_LINES
-        fine = _cell(self._nodes.en_m) <= COARSE * self._spacing
-        self._free = knows and fine and value + self._noise < leave * (values[1] + self._noise)
-        self._planned_m = self._flown_m
+        self._free = value + self._noise < leave * (values[1] + self._noise)
         return (vias, counts), (value, values[1])
 
     def _runs_out(self) -> bool:
@@ -421,12 +427,12 @@ class SurveyRegressors:
         roomy[:, : vias.shape[1]] = vias
         search = PlanSearch(self._spacing, constraints.region, MARGIN_M, HEAT)
         return improve(
-            self._d2, self._nodes, self._objective, self._vehicles, ViaPoints(roomy, counts, locked), search,
+            self._d2, self._sounded, self._objective, self._vehicles, ViaPoints(roomy, counts, locked), search,
             rng.random((self._options.search, DRAWS)),
         )  # fmt: skip
 
     def _value(self, vias: FloatArray, counts: IntArray) -> float:
-        return plan_value(self._d2, self._nodes, self._objective, self._vehicles, vias, counts)
+        return plan_value(self._d2, self._sounded, self._objective, self._vehicles, vias, counts)
 
     def _uncertainty_now(self) -> float:
         nothing = np.zeros(len(self._en), dtype=np.int64)
@@ -489,7 +495,7 @@ class SurveyRegressors:
                 vias[which, i, : len(rest)] = rest
                 counts[which, i] = len(rest)
         targets = np.ascontiguousarray(candidates[..., :2])
-        return values_after_first_leg(self._d2, self._nodes, self._objective, self._vehicles, targets, vias, counts)
+        return values_after_first_leg(self._d2, self._sounded, self._objective, self._vehicles, targets, vias, counts)
 
 
 def _unless_straight(start_m: FloatArray, via_m: FloatArray, next_m: FloatArray) -> FloatArray:
