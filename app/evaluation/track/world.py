@@ -335,6 +335,7 @@ class TrackWorld:
             0.2,
             k.covariance_m2,
             flat,
+            sounded_m=self._felt,
         )
 
     def _depths(self, point: FloatArray, seen: BoolArray) -> FloatArray:

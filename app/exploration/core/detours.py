@@ -22,6 +22,9 @@ from app.exploration.core.dynamic import Localization, Targets
 LEAVES_AT = 0.9
 """Part of the accuracy threshold at which a target is about to leave ``A``."""
 
+LOST = 1.0
+"""Part of it from which one more vehicle than usual may go, as long as another one goes on with the plan."""
+
 ENOUGH = 0.6
 """Part of it at which the vehicle that went for it comes back."""
 
@@ -89,7 +92,10 @@ class Errands:
                 del self._on[name]
         for target in np.argsort(-part):
             taken = [what for what in self._on.values() if what != RISE]
-            if part[target] <= LEAVES_AT or int(target) in taken or len(taken) >= most_away(len(vehicles)):
+            if part[target] <= LEAVES_AT or int(target) in taken:
+                continue
+            # A target that is lost is not left waiting for the vehicle that is with another one.
+            if len(taken) >= most_away(len(vehicles)) + (part[target] > LOST and len(taken) < len(vehicles) - 1):
                 continue
             # A vehicle coming back from another target is on the way already.
             free = [i for i, name in enumerate(vehicles) if name not in self._on]

@@ -43,6 +43,9 @@ class Belief:
     complete : bool
         Whether everything that vehicles have seen is in it, so that what it lacks was not seen; no where messages are
         limited.
+    sounded_m : (k, 3)
+        East, north and depth where altimeters found the sea floor under vehicles, where landmarks are not seen from
+        straight above; empty where ``depth_m`` tells all that is known.
     """
 
     xy_m: FloatArray
@@ -54,6 +57,7 @@ class Belief:
     covariance_m2: FloatArray | None = None
     on_floor: bool = True
     complete: bool = True
+    sounded_m: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True)

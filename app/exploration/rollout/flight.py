@@ -34,6 +34,9 @@ CLIMB_PASSES = 4
 SINKING = 0.8
 """Part of a step by which vehicles sink at most where that may not wait."""
 
+STEEP = 0.95
+"""The same for a vehicle with a route of its own, which nobody waits for: it follows slopes of three to one."""
+
 DIVE = 2.0
 """In place of the part of a step by which vehicles may sink: they go down at the waypoint."""
 

@@ -79,6 +79,8 @@ def estimate_floor(
     unknown_m: float,
     held_m: float = 0.0,
     deeper_m: FloatArray | None = None,
+    *,
+    follows: bool = False,
 ) -> FloorEstimate:
     """Estimate the floor from a belief.
 
@@ -101,6 +103,8 @@ def estimate_floor(
     deeper_m : (k, 3) or None
         Landmarks that must lie deeper than their surroundings, for they were not seen from close by, with the least
         depth that they can have.
+    follows : bool
+        Whether plans follow the floor closely: estimates need no margin for detail where altimeters hold the clearance.
     """
     deeper = np.zeros((0, 3)) if deeper_m is None else deeper_m
     low, high = area.min(axis=0), area.max(axis=0)
@@ -113,29 +117,34 @@ def estimate_floor(
         # Where the estimate says less than that, others have filled the depth in.
         trust = np.minimum(np.sqrt(belief.covariance_m2[:, 2, 2]), ROUGHLY * visibility_m)
     if known.any():
+        sure = np.vstack([felt_m, belief.sounded_m])
         depth = _from_neighbours(
-            np.vstack([belief.xy_m[known], felt_m[:, :2], deeper[:, :2]]),
-            np.concatenate([belief.depth_m[known], felt_m[:, 2], deeper[:, 2]]),
-            np.concatenate([trust[known], np.zeros(len(felt_m)), np.full(len(deeper), ROUGHLY * visibility_m)]),
+            np.vstack([belief.xy_m[known], sure[:, :2], deeper[:, :2]]),
+            np.concatenate([belief.depth_m[known], sure[:, 2], deeper[:, 2]]),
+            np.concatenate([trust[known], np.zeros(len(sure)), np.full(len(deeper), ROUGHLY * visibility_m)]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
         ).reshape(rows, cols)
     else:
         depth = np.full((rows, cols), unknown_m)
-    smooth = gaussian_filter(depth, 0.12 * visibility_m / cell, mode="nearest")
-    limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
-    # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
-    looks = int(np.ceil(2.0 * cell / bottom.cell_m)) + 1  # no cell of the constraints' sea floor is skipped
-    shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
-    around = bottom.at(np.stack([east, north], axis=-1) + shifts)
     here = bottom.at(np.stack([east, north], axis=-1))
+    limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
     clear = np.where(np.isnan(here), limit, here - clearance_m)
-    limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
-    _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), ENVELOPE_SLOPE)
     _keep_above(clear, east, north, felt_m, clearance_m, STEEPEST_DIVE)
+    if follows:
+        smooth, slope = depth.copy(), STEEPEST_DIVE
+        limit = np.fmin(limit, here - clearance_m)
+    else:
+        smooth, slope = gaussian_filter(depth, 0.12 * visibility_m / cell, mode="nearest"), ENVELOPE_SLOPE
+        # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
+        looks = int(np.ceil(2.0 * cell / bottom.cell_m)) + 1  # no cell of the constraints' sea floor is skipped
+        shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
+        around = bottom.at(np.stack([east, north], axis=-1) + shifts)
+        limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
+        _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), slope)
     return FloorEstimate(
-        float(low[0]), float(low[1]), float(cell), depth, smooth, np.minimum(_envelope(limit, cell), depth - held_m),
-        np.minimum(clear, depth - held_m),
+        float(low[0]), float(low[1]), float(cell), depth, smooth,
+        np.minimum(_envelope(limit, cell, slope), depth - held_m), np.minimum(clear, depth - held_m),
     )  # fmt: skip
 
 
@@ -169,6 +178,22 @@ def let_stay(floor: FloorEstimate, positions: FloatArray, height_m: float, reach
                 fading = np.exp(-away * away)
                 floor.smooth_m[r, c] += max(0.0, smooth) * fading
                 floor.deepest_m[r, c] += max(0.0, deepest) * fading
+
+
+@njit(cache=True, nogil=True)
+def hold_to(floor: FloorEstimate, sounded_m: FloatArray, reach_m: float) -> None:
+    """Shift the estimate in place so that it is right where altimeters have just found the floor, (n, 3)."""
+    rows, cols = floor.depth_m.shape
+    for k in range(len(sounded_m)):
+        x, y = sounded_m[k, 0], sounded_m[k, 1]
+        off = sounded_m[k, 2] - sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+        for r in range(rows):
+            for c in range(cols):
+                away = np.hypot(floor.west_m + c * floor.cell_m - x, floor.south_m + r * floor.cell_m - y) / reach_m
+                fading = np.exp(-away * away)
+                floor.depth_m[r, c] += off * fading
+                floor.smooth_m[r, c] += off * fading
+                floor.deepest_m[r, c] += off * fading
 
 
 @njit(cache=True, nogil=True)
@@ -208,12 +233,12 @@ def fill_depths(xyz: FloatArray, floor: FloorEstimate) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _envelope(limit: FloatArray, cell: float) -> FloatArray:
+def _envelope(limit: FloatArray, cell: float, slope: float) -> FloatArray:
     """Return min over p' of limit(p') + slope |p - p'|, by sweeps there and back over the raster."""
     rows, cols = limit.shape
     out = limit.copy()
-    near = ENVELOPE_SLOPE * cell
-    far = ENVELOPE_SLOPE * cell * np.sqrt(2.0)
+    near = slope * cell
+    far = slope * cell * np.sqrt(2.0)
     for _ in range(2):
         for r in range(rows):
             for c in range(cols):

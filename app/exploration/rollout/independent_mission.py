@@ -11,7 +11,15 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import Rules
-from app.exploration.rollout.floor import HELD_NEAR, FloorEstimate, estimate_floor, fill_depths, let_stay, margin_m
+from app.exploration.rollout.floor import (
+    HELD_NEAR,
+    FloorEstimate,
+    estimate_floor,
+    fill_depths,
+    hold_to,
+    let_stay,
+    margin_m,
+)
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.independent_routes import (
     Routes,
@@ -45,7 +53,7 @@ WORTH = 2.0
 FRESH_STARTS, FRESH_SEARCH = 4, 100
 FIRST_SEARCH = 1000
 
-LOWER = 0.1
+LOWER = 0.25
 """How far below what the estimate of the floor allows vehicles are sent where their altimeters hold the clearance
 anyway, in visibilities."""
 
@@ -88,17 +96,22 @@ class ApartMission:
         fill_depths(xyz, floor)
         total = len(belief.accurate) * len(row) / len(open_)
         self._points: LandmarkPoints = make_points(
-            xyz, belief, row, accuracy_sd_m, self._area, rules.visibility_m, BUCKETS, total
+            xyz, belief, row, accuracy_sd_m, self._area, rules.visibility_m, BUCKETS, total, floor
         )
 
     def plan(self, waypoints: list[FloatArray]) -> Best:
-        """Make routes of waypoints (k, 2) per vehicle and fly them; what cannot be reached is left out."""
+        """Make routes of waypoints (k, 2 or 3) per vehicle and fly them; what cannot be reached is left out.
+
+        A third column is how quickly the vehicle sinks on the way to each; see ``Routes``.
+        """
         routes = no_routes(len(self._start), ROOM, self._height)
         for i, stops in enumerate(waypoints):
             route, count = route_of(routes, i), 0
             here = np.ascontiguousarray(self._start[i : i + 1, :2])
             for stop in stops[: ROOM - 4]:
-                route.at_m[count, 0] = stop
+                route.at_m[count, 0] = stop[:2]
+                if len(stop) > 2:
+                    route.sinking[count] = stop[2]
                 if settle_waypoint(self._free, route.at_m[count], route.chain, np.inf):
                     changed = int(clear_ways(self._free, route, count + 1, here, count, count, np.inf))
                     count = max(count, changed)
@@ -180,15 +193,26 @@ def apart_mission(
     lower = min(LOWER * sight, max(0.0, constraints.lowest_m - clearance))
     unknown = min(constraints.max_depth_m, float(team.positions[:, 2].max()) + height)
     floor = estimate_floor(
-        team.belief, bottom, felt_m, constraints.area, sight, clearance, unknown, constraints.lowest_m
-    )
+        team.belief, bottom, felt_m, constraints.area, sight, clearance, unknown, constraints.lowest_m,
+        follows=lower > 0.0,
+    )  # fmt: skip
     if lower > 0.0:
+        hold_to(floor, _under(team), HELD_NEAR * sight)
         let_stay(floor, team.positions, height, HELD_NEAR * sight)
     rules = Rules(
         constraints.max_step_m, np.inf, constraints.min_depth_m, min(constraints.max_depth_m, 1e9), sight,
         sensor.relative_noise, free.everywhere, directed=True,
     )  # fmt: skip
     return ApartMission(team, free_part, floor, free, rules, height, lower, options.accuracy_sd_m, rng)
+
+
+def _under(team: Situation) -> FloatArray:
+    """Return what was sounded closest to each vehicle, (n_vehicles, 3); nothing where nothing was sounded."""
+    sounded = team.belief.sounded_m
+    if not len(sounded):
+        return sounded
+    away = np.hypot(*(sounded[:, None, :2] - team.positions[None, :, :2]).transpose(2, 0, 1))
+    return np.ascontiguousarray(sounded[away.argmin(axis=0)])
 
 
 def _left_of(step_m: float, ahead_m: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.rollout.flight import PER_WAYPOINT, SINKING, WORTH_OF_EARLY, Plan, Rules, advance
+from app.exploration.rollout.flight import PER_WAYPOINT, STEEP, WORTH_OF_EARLY, Plan, Rules, advance
 from app.exploration.rollout.floor import FloorEstimate, sample
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.local_search import change
@@ -33,26 +33,36 @@ class Routes(NamedTuple):
         Waypoints, east and north.
     height_m : (n_vehicles, room)
         Height above the floor on the way to each.
+    sinking : (n_vehicles, room)
+        Part of a step by which the vehicle may sink on the way to each, at the cost of its way ahead.
     counts : (n_vehicles,)
         How many there are.
     """
 
     at_m: FloatArray
     height_m: FloatArray
+    sinking: FloatArray
     counts: IntArray
 
 
 def no_routes(vehicles: int, room: int, height_m: float) -> Routes:
     """Return empty routes to be flown ``height_m`` above the floor."""
     return Routes(
-        np.zeros((vehicles, room, 1, 2)), np.full((vehicles, room), height_m), np.zeros(vehicles, dtype=np.int64)
-    )
+        np.zeros((vehicles, room, 1, 2)), np.full((vehicles, room), height_m), np.full((vehicles, room), STEEP),
+        np.zeros(vehicles, dtype=np.int64),
+    )  # fmt: skip
+
+
+def stops_of(routes: Routes, i: int) -> FloatArray:
+    """Return a vehicle's waypoints and how quickly it sinks on the way to each, (k, 3)."""
+    count = routes.counts[i]
+    return np.column_stack([routes.at_m[i, :count, 0], routes.sinking[i, :count]])
 
 
 @njit(cache=True, nogil=True)
 def route_of(routes: Routes, i: int) -> Plan:
     """Return a view of one vehicle's route as the plan of a team of one."""
-    return Plan(routes.at_m[i], routes.height_m[i], np.zeros(routes.height_m.shape[1]), np.zeros(1, dtype=np.int64))
+    return Plan(routes.at_m[i], routes.height_m[i], routes.sinking[i], np.zeros(1, dtype=np.int64))
 
 
 @njit(cache=True, nogil=True)
@@ -66,6 +76,7 @@ def fly_alone(
     step = rules.step_m * (1.0 - 1e-9)
     there = np.empty((1, 2))
     enough, too_far, reach = 0.0, step, step
+    sinking = plan.sinking[min(k, count - 1)]
     here = at[:, :2]
     after = k
     for halving in range(HALVINGS + 2):
@@ -74,8 +85,9 @@ def fly_alone(
         wish = sample(floor.smooth_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
         wish -= plan.height_m[min(k, count - 1)]
         limit = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
-        # Sinking may wait a little; most of what is in sight would be missed from much higher up.
-        lowest = at[0, 2] + SINKING * step
+        # Sinking may wait, with what the way ahead leaves of the step, or as the route says.
+        spare = np.sqrt(max(0.0, step * step - (x - at[0, 0]) ** 2 - (y - at[0, 1]) ** 2))
+        lowest = at[0, 2] + max(spare, sinking * step)
         z = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), lowest)
         out[0, 0], out[0, 1], out[0, 2] = x, y, z
         fits = (x - at[0, 0]) ** 2 + (y - at[0, 1]) ** 2 + (z - at[0, 2]) ** 2 <= step * step
@@ -242,6 +254,7 @@ def _copy(source: RoutesFlown, target: RoutesFlown, i: int) -> None:
     """Copy a vehicle's route and path."""
     target.routes.at_m[i] = source.routes.at_m[i]
     target.routes.height_m[i] = source.routes.height_m[i]
+    target.routes.sinking[i] = source.routes.sinking[i]
     target.routes.counts[i] = source.routes.counts[i]
     length = source.paths.length[i]
     target.paths.at_m[i, :length] = source.paths.at_m[i, :length]

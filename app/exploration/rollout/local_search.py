@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
-from app.exploration.rollout.flight import DIVE, FlownPlan, Plan, Rules, Task, Work, fly_plan
+from app.exploration.rollout.flight import DIVE, STEEP, FlownPlan, Plan, Rules, Task, Work, fly_plan
 from app.exploration.rollout.free_space import Free, clear_ways, insert, settle_waypoint
 
 DRAWS = 8
@@ -237,7 +237,10 @@ def change(
         plan.at_m[k, i, 0] += size * _bell(u[3], u[4])
         plan.at_m[k, i, 1] += size * _bell(u[5], u[6])
         return count, k, k
-    if kind == 5 and u[4] < 0.5 and not rules.directed:  # sink quicker or slower, or go down at the waypoint
+    if kind == 5 and u[4] < 0.5 and rules.directed:  # sink quicker or slower
+        plan.sinking[k] = min(1.0, 2.0 * u[5])
+        return count, k, k
+    if kind == 5 and u[4] < 0.5:  # sink quicker or slower, or go down at the waypoint
         plan.sinking[k] = u[5] if u[5] < MOST_SINKING else (DIVE if u[6] < 0.5 else 0.0)
         return count, k, k
     if kind == 5:  # fly higher or lower
@@ -255,6 +258,8 @@ def change(
         if m >= 0:
             x, y = work.xyz[0, m], work.xyz[1, m]
             place = _visit(plan, count, start, x, y, u)
+            if rules.directed:
+                plan.sinking[place] = STEEP
             if u[3] < 0.5 and not rules.directed:
                 _dive(plan, place, x, y, GATHERED * rules.visibility_m * u[1])
                 plan.height_m[place] = LEAST_HEIGHT * rules.visibility_m

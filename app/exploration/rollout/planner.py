@@ -41,6 +41,7 @@ from app.exploration.rollout.flight import (
 from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m, sample
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.independent_mission import WORTH, apart_mission
+from app.exploration.rollout.independent_routes import stops_of
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
 from app.exploration.rollout.tour import tour_of
@@ -156,7 +157,7 @@ class RolloutPlanner(PlannerBase):
         self._sinking = np.array(state["sinking"], dtype=np.float64)
         self._least_m = np.array(state["least"], dtype=np.float64)
         self._felt.recall(state["felt"])
-        self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 2) for name, at in state["routes"].items()}
+        self._routes = {name: np.array(at, dtype=np.float64).reshape(-1, 3) for name, at in state["routes"].items()}
         self._away = {str(name): float(part) for name, part in state["away"].items()}
         self._kept = None
         if state["at_m"] is not None:
@@ -167,7 +168,7 @@ class RolloutPlanner(PlannerBase):
         if team.belief.accurate.all():
             return Proposal(self._rest(team, bottom), 0.0)
         if team.belief.covariance_m2 is not None and team.belief.on_floor and np.isinf(team.constraints.com_range_m):
-            return self._decide_apart(team, bottom, seed)
+            return self._decide_apart(team, seed)
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
@@ -213,9 +214,13 @@ class RolloutPlanner(PlannerBase):
         }
         return Proposal(positions, -best.score, terms)
 
-    def _decide_apart(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
+    def _decide_apart(self, team: Situation, seed: int) -> Proposal:
         """Decide where no links are needed: a route for each vehicle, those on detours included."""
         whole = team if self._whole is None else self._whole
+        belief, sounded = team.belief, team.belief.sounded_m
+        bottom = Bottom.from_landmarks(
+            np.vstack([belief.xy_m, sounded[:, :2]]), np.append(belief.depth_m, sounded[:, 2])
+        )
         self._felt.feel(team)
         constraints = team.constraints
         if self._free is None or not _same(self._free[0], constraints):
@@ -241,7 +246,7 @@ class RolloutPlanner(PlannerBase):
             best = mission.first()
         positions = team.positions.copy()
         rows = {name: whole.vehicles.index(name) for name in whole.vehicles}
-        self._routes = {name: best.routes.at_m[i, : best.routes.counts[i], 0].copy() for name, i in rows.items()}
+        self._routes = {name: stops_of(best.routes, i) for name, i in rows.items()}
         for j, name in enumerate(team.vehicles):
             wishes, passed = mission.steps(best, rows[name])
             tries = np.repeat(positions[None], len(wishes), axis=0)

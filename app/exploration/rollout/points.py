@@ -14,12 +14,19 @@ from numpy.typing import NDArray
 from app.arrays import BoolArray, FloatArray
 from app.exploration.core.problem import Belief
 from app.exploration.rollout.flight import NEAREST, Work, make_work
+from app.exploration.rollout.floor import FloorEstimate, sample
 
 DEPTH_PRESUMED = 0.5
 """Deviation, in visibilities, of the depth that a landmark is presumed to have before anybody has seen it."""
 
 SURELY = 0.8
 """Part of the accuracy threshold that flights must come below: estimates come out a little worse than the bound."""
+
+AZIMUTHS, RINGS = 16, 8
+"""Directions and distances, up to that of sight, in which the floor around a landmark is taken to hide it."""
+
+GRAZE = 0.05
+"""How much higher than estimated the floor may be between a vehicle and a landmark that it sees, in visibilities."""
 
 
 class LandmarkPoints(NamedTuple):
@@ -33,16 +40,22 @@ class LandmarkPoints(NamedTuple):
         Inverse covariances: xx, xy, xz, yy, yz, zz.
     variance_m2 : float
         Along every axis a landmark is accurate below this.
+    ground_m : (m,)
+        Depth of the estimated floor where they lie.
+    horizon : (m, AZIMUTHS, RINGS)
+        How far the floor around a landmark rises above it per distance, at most, in each direction up to each distance.
     """
 
     work: Work
     information: FloatArray
     variance_m2: float
+    ground_m: FloatArray
+    horizon: NDArray[np.float32]
 
 
 def make_points(
     xyz: FloatArray, belief: Belief, row: NDArray[np.int64], accuracy_sd_m: float, area: FloatArray, sight_m: float,
-    buckets: int, total: float,
+    buckets: int, total: float, floor: FloorEstimate,
 ) -> LandmarkPoints:  # fmt: skip
     """Return the landmarks ``row`` (m,) of a belief, presumed at ``xyz`` (m, 3), as flights look at them.
 
@@ -55,7 +68,38 @@ def make_points(
     information[seen] = np.linalg.inv(belief.covariance_m2[row[seen]] + 1e-12 * np.eye(3))
     work, order = make_work(xyz, np.ones(len(row)), area, sight_m / buckets, 0.0, total, 1.0)
     six = information[order][:, (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)]
-    return LandmarkPoints(work, np.ascontiguousarray(six.T), (SURELY * accuracy_sd_m) ** 2)
+    ground, horizon = _horizons(work.xyz, floor, sight_m)
+    return LandmarkPoints(work, np.ascontiguousarray(six.T), (SURELY * accuracy_sd_m) ** 2, ground, horizon)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _horizons(xyz: FloatArray, floor: FloorEstimate, sight_m: float) -> tuple[FloatArray, NDArray[np.float32]]:
+    """Return the floor's depth at landmarks (3, m) and how steeply it rises around them; see ``LandmarkPoints``."""
+    size = xyz.shape[1]
+    ground, horizon = np.empty(size), np.empty((size, AZIMUTHS, RINGS), dtype=np.float32)
+    for m in range(size):
+        x, y = xyz[0, m], xyz[1, m]
+        ground[m] = sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+        for a in range(AZIMUTHS):
+            angle = 2.0 * np.pi * a / AZIMUTHS
+            east, north, steepest = np.cos(angle), np.sin(angle), -np.inf
+            for ring in range(RINGS):
+                away = sight_m * (ring + 1) / RINGS
+                at = sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, x + away * east, y + away * north)
+                steepest = max(steepest, (ground[m] - at) / away)
+                horizon[m, a, ring] = steepest
+    return ground, horizon
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _hidden(points: LandmarkPoints, m: int, dx: float, dy: float, z: float, reach: float) -> bool:
+    """Whether the floor hides landmark ``m`` from a vehicle at depth ``z`` from which it lies ``dx``, ``dy`` away."""
+    away = np.sqrt(dx * dx + dy * dy)
+    ring = min(RINGS, int(away / reach * RINGS)) - 1
+    if ring < 0:
+        return False
+    azimuth = int(np.floor(np.arctan2(-dy, -dx) * (AZIMUTHS / (2.0 * np.pi)) + 0.5)) % AZIMUTHS
+    return bool(points.ground_m[m] - z + GRAZE * reach < points.horizon[m, azimuth, ring] * away)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -107,7 +151,7 @@ def look_whole(
             dy = work.xyz[1, m] - y
             dz = work.xyz[2, m] - z
             r2 = max(dx * dx + dy * dy + dz * dz, NEAREST * v2)
-            if r2 >= v2:
+            if r2 >= v2 or _hidden(points, m, dx, dy, z, reach):
                 continue
             g = gain / (r2 * r2)
             information[0, m] += g * dx * dx

@@ -88,12 +88,23 @@ def test_each_for_itself_where_fixes_are_not_shared() -> None:
     assert [e.vehicle for e in make("cao")._errands.assign(NAMES, START, None, own)] == ["a", "c"]
 
 
+BOTH = ((80, 60, 5), (20, 30, 5))
+
+
 def test_one_vehicle_goes_from_target_to_target() -> None:
     errands = make("cao")._errands
-    near = [e.vehicle for e in errands.assign(NAMES, START, targets((4.0, 5.0), ((80, 60, 5), (20, 30, 5))), None)]
+    near = [e.vehicle for e in errands.assign(NAMES, START, targets((1.9, 1.95), BOTH), None)]
     assert near == ["a"]
-    again = errands.assign(NAMES, START, targets((4.0, 0.5), ((80, 60, 5), (20, 30, 5))), None)
+    again = errands.assign(NAMES, START, targets((4.0, 0.5), BOTH), None)
     assert [(e.vehicle, e.target) for e in again] == [("a", 0)]
+
+
+def test_a_second_vehicle_goes_for_a_target_that_is_lost_meanwhile_but_never_the_last() -> None:
+    errands = make("cao")._errands
+    assert [(e.vehicle, e.target) for e in errands.assign(NAMES, START, targets((1.9, 1.95), BOTH), None)] == [("a", 1)]
+    both = errands.assign(NAMES, START, targets((2.1, 1.95), BOTH), None)
+    assert [(e.vehicle, e.target) for e in both] == [("a", 1), ("c", 0)]
+    assert len(make("cao")._errands.assign(NAMES[:2], START[:2], targets((4.0, 5.0), BOTH), None)) == 1
 
 
 @pytest.mark.parametrize("name", sorted(PLANNERS))

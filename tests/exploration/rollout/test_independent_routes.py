@@ -17,7 +17,7 @@ from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.rollout.flight import Rules
-from app.exploration.rollout.floor import estimate_floor, let_stay, sample
+from app.exploration.rollout.floor import FloorEstimate, estimate_floor, hold_to, let_stay, sample
 from app.exploration.rollout.free_space import free_space
 from app.exploration.rollout.independent_mission import apart_mission
 from app.exploration.rollout.independent_routes import (
@@ -58,14 +58,21 @@ def hilly(seed: int, n: int = 120) -> Any:
     return Belief(xy, depth, sd, np.zeros(n, dtype=bool), np.ones(n), 0.2, covariance)
 
 
+def flat(depth: float) -> Any:
+    """An even floor over the cube."""
+    side = np.full((41, 41), depth)
+    return FloorEstimate(-1.0, -1.0, 0.05, side, side.copy(), side - HELD, side - HELD)
+
+
 def make_case(seed: int, stops: int = 4) -> Any:
     """Three vehicles with random routes over what is left."""
     rng = np.random.default_rng(seed)
     belief = hilly(seed)
     row = np.arange(len(belief.xy_m))
-    points = make_points(np.column_stack([belief.xy_m, belief.depth_m]), belief, row, ACCURACY, CUBE, 0.4, 3, len(row))
     bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
     floor = estimate_floor(belief, bottom, np.zeros((0, 3)), CUBE, 0.4, 0.2, 0.6, HELD)
+    xyz = np.column_stack([belief.xy_m, belief.depth_m])
+    points = make_points(xyz, belief, row, ACCURACY, CUBE, 0.4, 3, len(row), floor)
     routes = no_routes(3, 12, HELD)
     routes.at_m[:, :stops, 0] = rng.uniform(-0.9, 0.9, (3, stops, 2))
     routes.counts[:] = stops
@@ -91,6 +98,7 @@ def open_landmarks(information: FloatArray) -> Any:
 @settings(max_examples=30, deadline=None)
 def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed: int, at: Any) -> None:
     _, points, _, _ = make_case(seed)
+    points = points._replace(horizon=np.full_like(points.horizon, -np.inf))
     information = points.information.copy()
     done = open_landmarks(information) == 0
     already = done.copy()
@@ -106,13 +114,31 @@ def test_a_look_adds_what_the_fisher_information_of_a_range_is(seed: int, at: An
     assert completed == done.sum() - already.sum()
 
 
+def test_a_ridge_hides_what_lies_behind_it_and_not_what_lies_before_it() -> None:
+    floor = flat(0.5)
+    floor.depth_m[:, 21:23] = 0.3
+    xyz = np.array([[0.0, 0.0, 0.5], [0.2, 0.0, 0.5]])
+    belief = Belief(
+        xyz[:, :2], xyz[:, 2], np.full(2, np.inf), np.zeros(2, dtype=bool), np.ones(2), 0.2,
+        np.repeat(np.diag([np.inf] * 3)[None], 2, axis=0),
+    )  # fmt: skip
+    points = make_points(xyz, belief, np.arange(2), ACCURACY, CUBE, 0.4, 3, 2.0, floor)
+    seen = []
+    for x, z in ((-0.1, 0.25), (0.05, 0.05), (0.3, 0.25)):
+        information = points.information.copy()
+        look_whole(x, 0.0, z, points, 0.6, 0.1, information, np.zeros(2, dtype=bool))
+        changed = (information != points.information).any(axis=0)
+        seen.append({float(points.work.xyz[0, m]) for m in np.flatnonzero(changed)})
+    assert seen == [{0.0}, {0.0, 0.2}, {0.2}]
+
+
 def test_one_straight_line_does_not_tell_where_a_landmark_is_and_a_second_one_does() -> None:
     n = 1
     belief = Belief(
         np.array([[0.12, 0.0]]), np.array([0.5]), np.full(n, np.inf), np.zeros(n, dtype=bool), np.ones(n), 0.2,
         np.diag([np.inf] * 3)[None],
     )  # fmt: skip
-    points = make_points(np.array([[0.12, 0.0, 0.5]]), belief, np.array([0]), ACCURACY, CUBE, 0.4, 3, 1.0)
+    points = make_points(np.array([[0.12, 0.0, 0.5]]), belief, np.array([0]), ACCURACY, CUBE, 0.4, 3, 1.0, flat(0.5))
     information, done = points.information.copy(), np.zeros(n, dtype=bool)
     for x in (0.0, 0.24):
         assert not done[0]
@@ -183,6 +209,34 @@ def test_nobody_climbs_because_an_estimate_calls_it_too_low() -> None:
     low = np.array([[0.3, 0.1, sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) + 0.1]])
     let_stay(floor, low, HELD, 0.1)
     assert sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) >= low[0, 2] - 0.03
+
+
+def test_an_altimeter_is_believed_more_than_the_estimate() -> None:
+    _, _, floor, _ = make_case(1)
+    sounded = np.array([[0.3, 0.1, sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) + 0.2]])
+    hold_to(floor, sounded, 0.12)
+    assert sample(floor.depth_m, floor.west_m, floor.south_m, floor.cell_m, 0.3, 0.1) == pytest.approx(
+        sounded[0, 2], abs=0.03
+    )
+
+
+def test_a_vehicle_that_follows_the_floor_comes_close_to_it_in_a_trench() -> None:
+    north = np.linspace(-1.0, 1.0, 60)
+    xy = np.stack(np.meshgrid(north, north), axis=-1).reshape(-1, 2)
+    depth = np.where(np.abs(xy[:, 0]) < 0.15, 0.8, 0.4)
+    n = len(xy)
+    belief = Belief(
+        xy, depth, np.full(n, 0.01), np.zeros(n, dtype=bool), np.ones(n), 0.2, np.repeat(1e-4 * np.eye(3)[None], n, 0)
+    )
+    bottom = Bottom.from_landmarks(xy, depth)
+    reached = []
+    for follows in (False, True):
+        floor = estimate_floor(
+            belief, bottom, np.zeros((0, 3)), CUBE, 0.4, 0.2, 0.6, HELD, follows=follows
+        )  # fmt: skip
+        reached.append(sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, 0.0, 0.0))
+    assert reached[0] < 0.4
+    assert reached[1] == pytest.approx(0.8 - HELD, abs=0.02)
 
 
 @given(seed=st.integers(0, 1000))
