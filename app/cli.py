@@ -76,7 +76,7 @@ class LogFormat(StrEnum):
 
 
 class TokenRole(StrEnum):
-    """What the holder of a token may do: the roles of ``app.api.tokens``."""
+    """What the holder of a token may do: the roles of ``app.api.accounts.tokens``."""
 
     VIEWER = "viewer"
     VEHICLE = "vehicle"
@@ -121,7 +121,7 @@ def serve(
     )
     from app.api import logs
     from app.compiled import compile_beside
-    from app.storage.prepare import prepare_database
+    from app.storage.upkeep.prepare import prepare_database
 
     compile_beside()
     logs.configure(settings.log_level, settings.log_format)
@@ -155,8 +155,8 @@ def migrate(
     from alembic.util import CommandError as AlembicError
     from sqlalchemy.exc import SQLAlchemyError
 
-    from app.storage import migrate as migrations
-    from app.storage.prepare import of_another_version
+    from app.storage.upkeep import migrate as migrations
+    from app.storage.upkeep.prepare import of_another_version
 
     async def run() -> tuple[str | None, str | None]:
         url = settings.database_url
@@ -197,7 +197,7 @@ def create_token(
         raise typer.BadParameter("the name has 1 to 120 characters", param_hint="NAME")
     from datetime import UTC, datetime, timedelta
 
-    from app.api.tokens import Role, TokenStore
+    from app.api.accounts.tokens import Role, TokenStore
 
     expires_at = None if days is None else datetime.now(UTC) + timedelta(days=days)
 
@@ -215,7 +215,7 @@ def list_tokens(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False, database: Database = None
 ) -> None:
     """List the access tokens, newest first."""
-    from app.api.tokens import TokenStore
+    from app.api.accounts.tokens import TokenStore
 
     async def run(store: TokenStore) -> list[dict[str, Any]]:
         return [
@@ -256,7 +256,7 @@ def revoke_token(
     database: Database = None,
 ) -> None:
     """Revoke an access token for good."""
-    from app.api.tokens import TokenStore
+    from app.api.accounts.tokens import TokenStore
 
     async def run(store: TokenStore) -> str:
         found = [row.id for row in await store.all() if row.revoked_at is None and row.id.startswith(token_id)]
@@ -475,9 +475,9 @@ def evaluate(context: typer.Context) -> None:
 
 def _with_tokens(database: str | None, run: Any, changing: str = "", target: str = "") -> Any:
     settings = command_settings(database_url=database)
-    from app.api.tokens import TokenStore
+    from app.api.accounts.tokens import TokenStore
     from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
+    from app.storage.upkeep.prepare import prepare_database
 
     async def use() -> Any:
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
@@ -530,7 +530,7 @@ def _exit_code(error: Exception) -> int | None:
     """Return the exit code of an error that is expected; None for a fault of the program."""
     from app.missions.errors import MissionError
     from app.settings import SettingsError, StartupError
-    from app.storage.prepare import DatabaseNotReadyError
+    from app.storage.upkeep.prepare import DatabaseNotReadyError
 
     if isinstance(error, SettingsError):
         return USAGE

@@ -46,9 +46,9 @@ RAYS = "rays"
 """What simulated vehicles wait for."""
 PARTS = {
     "constraints": Part(("app.exploration.core.constraints",)),
-    RAYS: Part(("simulator.raycasting",)),
+    RAYS: Part(("simulator.sonars.raycasting",)),
     "plans": Part(("app.exploration.survey.value", "app.exploration.core.routes")),
-    "maps": Part(("app.mapping.gp",)),
+    "maps": Part(("app.mapping.gaussian_process.gp",)),
     "search": Part(("app.exploration.survey.local_search",), after=("constraints", "plans")),
     "checks": Part(("app.mapping.quality.crossovers", "app.estimation.adjustment"), after=("maps",)),
 }

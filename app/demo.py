@@ -32,9 +32,9 @@ from app.mapping.types import Grid
 from app.missions.spec.budget import Budget
 from app.settings import Settings
 from app.storage import private
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 READY_TIMEOUT_S = 60.0
 POLL_S = 0.4

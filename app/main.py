@@ -22,61 +22,43 @@ from sqlalchemy import make_url
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
-from app.api import (
-    alarms,
-    audit_routes,
-    corrections,
-    fleet,
-    forecasts,
-    imports,
-    logs,
-    maps,
-    measurements,
-    missions,
-    openapi,
-    orders,
-    pings,
-    problems,
-    profiles,
-    searches,
-    signing_in,
-    sites,
-    soundings,
-    streams,
-    targets,
-    tiles,
-)
-from app.api.address_key import AddressKeyMiddleware
-from app.api.audit_log import AuditLog, AuditMiddleware
-from app.api.auth import console_log_in
-from app.api.bodies import BodyMiddleware
-from app.api.budget import Budget
-from app.api.connections import Sockets, is_shared_host, patient_http
-from app.api.direct import DirectRoutes
-from app.api.forwarding import ForwardingMiddleware, PeerMiddleware
+from app.api import logs
+from app.api.access import audit_routes, signing_in
+from app.api.access.address_key import AddressKeyMiddleware
+from app.api.access.auth import console_log_in
+from app.api.access.shares import ShareMiddleware
+from app.api.accounts.audit_log import AuditLog, AuditMiddleware
+from app.api.accounts.peers import is_own_user
+from app.api.accounts.quotas import Shares
+from app.api.accounts.rates import LimitMiddleware, RequestLimits
+from app.api.accounts.sessions import SessionStore
+from app.api.accounts.tokens import Role, TokenStore
+from app.api.bodies.admission import BodyMiddleware
+from app.api.bodies.budget import Budget
+from app.api.bodies.intake import Intakes
+from app.api.bodies.unread import UnreadBodyMiddleware
 from app.api.health import health_router
-from app.api.intake import Intakes
-from app.api.limits import LimitMiddleware, RequestLimits
-from app.api.middleware import RequestMiddleware
-from app.api.ogc import routes as features
-from app.api.peers import is_own_user
-from app.api.quotas import Shares
+from app.api.http import openapi, problems
+from app.api.maps import maps, profiles, sites, tiles
+from app.api.maps.ogc import routes as features
+from app.api.maps.wms import routes as web_maps
+from app.api.middleware.connections import Sockets, is_shared_host, patient_http
+from app.api.middleware.direct import DirectRoutes
+from app.api.middleware.forwarding import ForwardingMiddleware, PeerMiddleware
+from app.api.middleware.requests import RequestMiddleware
+from app.api.missions import alarms, fleet, forecasts, missions, orders, searches, streams, targets
 from app.api.schemas import API
-from app.api.sessions import SessionStore
-from app.api.shares import ShareMiddleware
+from app.api.soundings import corrections, imports, measurements, pings, soundings
 from app.api.state import EdgeState
-from app.api.tokens import Role, TokenStore
-from app.api.unread import UnreadBodyMiddleware
-from app.api.wms import routes as web_maps
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
 from app.malloc import keep_memory_together, settled
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
-from app.storage.audit import Command
 from app.storage.database import Database
-from app.storage.membership import MembershipLostError
-from app.storage.prepare import prepare_database
+from app.storage.processes.membership import MembershipLostError
+from app.storage.queries.audit import Command
+from app.storage.upkeep.prepare import prepare_database
 from app.supervision import Supervisor
 from imc_bridge import PortInUseError
 

@@ -1,4 +1,4 @@
-"""Alembic's entry: runs on the connection that app.storage.migrate hands over, or on BATHYFLEET_DATABASE_URL."""
+"""Alembic's entry: runs on the connection that app.storage.upkeep.migrate hands over, or on BATHYFLEET_DATABASE_URL."""
 
 import asyncio
 import os

@@ -14,18 +14,18 @@ from typing import Annotated
 
 import typer
 
-from simulator import seafloors
-from simulator.battery import BatterySpec
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.fleet import EQUIPMENT
 from simulator.dune.lost_comms import TIMEOUT_S
 from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
 from simulator.equipment import Equipment
+from simulator.floors import seafloors
+from simulator.floors.terrain_files import load_terrain
 from simulator.network import NetworkFaults
-from simulator.sensors import SensorKind, SonarNoise
-from simulator.swath import SwathSonar
+from simulator.sonars.sensors import SensorKind, SonarNoise
+from simulator.sonars.swath import SwathSonar
 from simulator.targets import RangingNoise, TargetSpec
-from simulator.terrain_files import load_terrain
+from simulator.vehicles.battery import BatterySpec
 
 NEW_BATTERY = BatterySpec()
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from simulator.battery import BatterySpec
-from simulator.sensors import SensorKind, SonarNoise
-from simulator.swath import SwathSonar
-from simulator.vehicle import VehicleLimits
+from simulator.sonars.sensors import SensorKind, SonarNoise
+from simulator.sonars.swath import SwathSonar
+from simulator.vehicles.battery import BatterySpec
+from simulator.vehicles.vehicle import VehicleLimits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 from simulator.world import LocalPosition
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulator.arrays import FloatArray
-from simulator.battery import Battery
 from simulator.equipment import Equipment
-from simulator.navigation import Navigation
-from simulator.sensors import SensorKind, Sonar, to_local_frame
-from simulator.swath import SwathErrors, SwathSounder
-from simulator.terrain import Terrain
-from simulator.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle
+from simulator.floors.terrain import Terrain
+from simulator.sonars.sensors import SensorKind, Sonar, to_local_frame
+from simulator.sonars.swath import SwathErrors, SwathSounder
+from simulator.vehicles.battery import Battery
+from simulator.vehicles.navigation import Navigation
+from simulator.vehicles.vehicle import STEP_S, Guidance, Motion, SteeringTarget, Vehicle
 
 log = logging.getLogger(__name__)
 

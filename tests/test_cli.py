@@ -19,7 +19,7 @@ import pytest
 import rasterio
 
 from app.cli import main
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from tests.support import commands
 from tests.support.commands import serving
 from tests.support.imc import log_writer as writer

@@ -20,7 +20,7 @@ import pytest
 import typer
 from pydantic import BaseModel
 
-from app.api.problems import TITLES
+from app.api.http.problems import TITLES
 from app.api.schemas import API, MeasurementBatch, ScanBatch
 from app.cli import app as command_line
 from app.cli import evaluations

@@ -4,9 +4,9 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from app import __version__
-from app.api.auth import Reader
+from app.api.access.auth import Reader
+from app.api.http.problems import problems
 from app.api.metrics import exposition
-from app.api.problems import problems
 from app.api.schemas import ComponentHealth, Liveness
 from app.api.state import EdgeState, Service, State
 

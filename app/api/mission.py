@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import Depends
 
-from app.api.auth import Reader
+from app.api.access.auth import Reader
 from app.api.schemas import MissionId
 from app.api.state import Service
 from app.missions.live.mission import LiveMission

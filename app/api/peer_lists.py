@@ -8,7 +8,7 @@ import structlog
 from pydantic import TypeAdapter
 from starlette.requests import Request
 
-from app.api.processes import comes_from_peer
+from app.api.accounts.processes import comes_from_peer
 from app.api.state import EdgeState
 from app.missions.running.ownership import Peer
 

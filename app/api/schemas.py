@@ -15,8 +15,8 @@ from pydantic import (
     WrapValidator,
 )
 
-from app.api.json_text import Bounds
-from app.api.problems import MAX_ERRORS, field_problem
+from app.api.http.json_text import Bounds
+from app.api.http.problems import MAX_ERRORS, field_problem
 from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
 from app.missions.soundings.measurement import Measurement

@@ -10,14 +10,14 @@ from typing import Annotated, Any
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from app.api.audit_log import AuditLog
-from app.api.limits import RequestLimits, host_of, network_of
+from app.api.accounts.audit_log import AuditLog
+from app.api.accounts.processes import PeerClients
+from app.api.accounts.quotas import Shares, holder_of
+from app.api.accounts.rates import RequestLimits, host_of, network_of
+from app.api.accounts.sessions import SessionStore
+from app.api.accounts.tokens import TokenStore
+from app.api.http.problems import ProblemError
 from app.api.metrics import LIVE_VIEWERS
-from app.api.problems import ProblemError
-from app.api.processes import PeerClients
-from app.api.quotas import Shares, holder_of
-from app.api.sessions import SessionStore
-from app.api.tokens import TokenStore
 from app.missions.service import MissionService
 from app.settings import Settings
 

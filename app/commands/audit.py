@@ -33,9 +33,9 @@ def audit(
     if form not in ("table", "csv", "json"):
         raise typer.BadParameter(f"{form!r} is not one of table, csv, json", param_hint="--format")
     settings = command_settings(database_url=database)
-    from app.storage import audit as stored
     from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
+    from app.storage.queries import audit as stored
+    from app.storage.upkeep.prepare import prepare_database
 
     most = limit or (50 if form == "table" else sys.maxsize)
 

@@ -9,7 +9,7 @@ import typer
 from app.commands.common import CommandError, Database, command_settings, noted
 
 if TYPE_CHECKING:
-    from app.storage.backup import Contents
+    from app.storage.upkeep.backup import Contents
 
 
 def backup(
@@ -24,9 +24,9 @@ def backup(
     database: Database = None,
 ) -> None:
     """Copy the database to a file while the service goes on writing, and check the copy."""
-    from app.storage.backup import BackupError, back_up, contents_of
     from app.storage.ping_files import PingFiles
-    from app.storage.prepare import is_up_to_date
+    from app.storage.upkeep.backup import BackupError, back_up, contents_of
+    from app.storage.upkeep.prepare import is_up_to_date
 
     if verify is not None and file is not None:
         raise typer.BadParameter("check a backup or write one, not both", param_hint="--verify")
@@ -55,8 +55,8 @@ def restore(
     database: Database = None,
 ) -> None:
     """Put a backup in the database's place, after checking it. Stop the service first."""
-    from app.storage.backup import BackupError, restore_to
     from app.storage.ping_files import PingFiles
+    from app.storage.upkeep.backup import BackupError, restore_to
 
     settings = command_settings(database_url=database)
     try:
@@ -79,8 +79,8 @@ def prune(
     settings = command_settings(database_url=database)
     from app.storage.database import Database as Store
     from app.storage.ping_files import PingFiles
-    from app.storage.prepare import prepare_database
-    from app.storage.retention import Ended, ended_before, finish_removing, give_space_back, remove
+    from app.storage.upkeep.prepare import prepare_database
+    from app.storage.upkeep.retention import Ended, ended_before, finish_removing, give_space_back, remove
 
     async def run() -> tuple[list[Ended], str]:
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)

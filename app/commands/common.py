@@ -55,9 +55,9 @@ async def noted(
     settings: "Settings", action: str, target: str, mission_id: str | None = None, *, refused: str | None = None
 ) -> None:
     """Write a command that was given on this machine into the audit log; ``refused`` is why it was not carried out."""
-    from app.storage import audit
     from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
+    from app.storage.queries import audit
+    from app.storage.upkeep.prepare import prepare_database
 
     await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
     store = Store(settings.database_url)
@@ -86,7 +86,7 @@ def with_missions(
     from app.missions.errors import MissionError
     from app.missions.service import MissionService
     from app.storage.database import Database as Store
-    from app.storage.prepare import prepare_database
+    from app.storage.upkeep.prepare import prepare_database
 
     async def use() -> "T":
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)

@@ -58,7 +58,7 @@ def export(
     settings = command_settings(database_url=database)
     from app.mapping.s44 import Order
     from app.missions.maps.products import PRODUCTS, Product, ProductOptions
-    from app.missions.operations import mission_maps
+    from app.missions.operations.maps import mission_maps
     from app.missions.service import MissionService
 
     if format not in PRODUCTS:
@@ -169,8 +169,8 @@ def import_file(
     database: Database = None,
 ) -> None:
     """Begin a mission with soundings or a map from elsewhere. The same file again changes nothing."""
-    from app.missions.operations.uploads import open_upload
-    from app.missions.views.imports import ImportOptions, ImportView, ReferenceView
+    from app.missions.operations.imports.uploads import open_upload
+    from app.missions.views.measurements.imports import ImportOptions, ImportView, ReferenceView
 
     given = {
         "filename": file.name,
@@ -243,8 +243,8 @@ def tide(
     database: Database = None,
 ) -> None:
     """Correct a mission's tide, also afterwards: every sounding is corrected anew from its raw depth."""
-    from app.missions.operations.recorrection import set_tide
-    from app.missions.views.corrections import CorrectionsView, TideCorrection
+    from app.missions.operations.corrections.recorrection import set_tide
+    from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection
 
     try:
         text = None if table is None else table.read_text(encoding="utf-8")
@@ -286,8 +286,8 @@ def adjust(
     """Adjust a mission's tracks for their drift, by overlapping soundings and fixes; repeat it when logs came in."""
     import json
 
-    from app.missions.operations import adjustment
-    from app.missions.views.adjustment import AdjustmentRequest, AdjustmentView
+    from app.missions.operations.corrections import adjustment
+    from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
 
     try:
         given = {} if fixes is None else {"fixes": json.loads(fixes.read_text(encoding="utf-8"))}

@@ -56,7 +56,7 @@ def drawn(seed: int, *, still: bool) -> "tuple[MissionSpec, SimulationSettings, 
     """Return a mission, the sea that it is flown in, and who joins it later."""
     import numpy as np
 
-    from app.mapping.georeference import LocalFrame
+    from app.mapping.coordinates.georeference import LocalFrame
     from app.missions.settings import SimulationSettings
     from app.missions.spec.mission import MissionSpec, VehicleSpec
 
@@ -131,7 +131,7 @@ async def _served(
     from app.missions.service import MissionService
     from app.missions.settings import ImcSettings, ServiceSettings
     from app.storage.database import Database
-    from app.storage.prepare import prepare_database
+    from app.storage.upkeep.prepare import prepare_database
 
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite+aiosqlite:///{Path(folder) / 'mission.db'}"

@@ -105,7 +105,7 @@ class Watch:
             self._compare((a, b), here, there, returning=returning)
 
     def _note(self, member: "Member", seen: Seen, place: Place, left_pct: float) -> None:
-        from app.missions.flight.commit import point_of
+        from app.missions.flight.legs.commit import point_of
         from app.missions.flown import Phase
 
         if seen.surveys_at_pct is None and member.flown.phase is Phase.SURVEY:

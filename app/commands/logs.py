@@ -11,7 +11,7 @@ from app.commands.common import Database, command_settings, meant_mission, with_
 
 if TYPE_CHECKING:
     from app.missions.service import MissionService
-    from app.missions.views.soundings import LogImportView
+    from app.missions.views.measurements.soundings import LogImportView
 
 
 def import_logs(
@@ -35,8 +35,8 @@ def import_logs(
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-    from app.missions.operations.log_import import import_log
-    from app.missions.views.soundings import LogImportView
+    from app.missions.operations.imports.log_import import import_log
+    from app.missions.views.measurements.soundings import LogImportView
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())

@@ -12,7 +12,7 @@ from app.commands.data import write_product
 if TYPE_CHECKING:
     from app.missions.maps.products import Product
     from app.missions.service import MissionService
-    from app.missions.views.sites import SiteView, SurveyView
+    from app.missions.views.maps.sites import SiteView, SurveyView
 
 sites_app = typer.Typer(help="List sites, and write their maps and what changed to files.", no_args_is_help=True)
 

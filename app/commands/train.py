@@ -33,18 +33,18 @@ def train(
 ) -> None:
     """Train a PCAO controller that missions fly with. Killed, the same command goes on where it was."""
     from app import __version__
-    from app.evaluation.pcao.curves import draw_curve
-    from app.evaluation.pcao.optimisers import METHODS, Optimiser
-    from app.evaluation.pcao.scoring import DaskScorer, LocalScorer, Scorer
-    from app.evaluation.pcao.task import TrainingTask
+    from app.evaluation.pcao.simulation.task import TrainingTask
+    from app.evaluation.pcao.simulation.world import SeaFloor
     from app.evaluation.pcao.terrains import sea_floors_of
-    from app.evaluation.pcao.training import Checkpoint, CheckpointError, Curve, make_optimiser, write_model
-    from app.evaluation.pcao.training import train as run_training
-    from app.evaluation.pcao.world import SeaFloor
+    from app.evaluation.pcao.training.curves import draw_curve
+    from app.evaluation.pcao.training.optimisers import METHODS, Optimiser
+    from app.evaluation.pcao.training.scoring import DaskScorer, LocalScorer, Scorer
+    from app.evaluation.pcao.training.training import Checkpoint, CheckpointError, Curve, make_optimiser, write_model
+    from app.evaluation.pcao.training.training import train as run_training
     from app.evaluation.runs.cluster import Cluster, ClusterError
     from app.evaluation.runs.command import progress_bar
     from app.exploration.pcao.model import Training
-    from simulator.terrain import TerrainError
+    from simulator.floors.terrain import TerrainError
 
     if method not in METHODS:
         raise typer.BadParameter(f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method")

@@ -8,11 +8,11 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.counting import cell_numbers
-from app.mapping.kernels import exp_minus
-from app.mapping.neighbours import nearest
-from app.mapping.supersoundings import merge_soundings
-from app.mapping.threads import each
+from app.mapping.kriging.counting import cell_numbers
+from app.mapping.kriging.kernels import exp_minus
+from app.mapping.kriging.neighbours import nearest
+from app.mapping.kriging.supersoundings import merge_soundings
+from app.mapping.kriging.threads import each
 from app.mapping.types import BathymetricMap, Grid, Soundings
 
 REACH = 4.0

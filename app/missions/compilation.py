@@ -12,7 +12,7 @@ from app.estimation import Sensor, SingleBeam
 from app.estimation.adjustment import warm_up as warm_up_adjustment
 from app.exploration.planners import warm_up_planner
 from app.exploration.survey.local_search import warm_up as warm_up_search
-from app.mapping.gp import warm_up as warm_up_maps
+from app.mapping.gaussian_process.gp import warm_up as warm_up_maps
 from app.mapping.quality.crossovers import warm_up as warm_up_crossings
 from app.missions.spec.mission import PlannerSpec
 

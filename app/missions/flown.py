@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from app.exploration.core.track import Place, along_leg
+from app.exploration.motion.on_leg import Place, along_leg
 
 
 class Phase(StrEnum):

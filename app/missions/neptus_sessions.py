@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.errors import MissionError
 from app.missions.fleet.links.neptus import NeptusFleetLink
 from app.missions.live.mission import LiveMission
@@ -16,9 +16,9 @@ from app.missions.spec.base import PolygonGeometry
 from app.missions.spec.mission import Limits, MissionSpec, PlannerSpec, Tide, VehicleKind, VehicleSpec
 from app.missions.states import ENDED, Action, MissionState
 from app.missions.views.mission import ActionView, Level, MissionView
-from app.storage import events as event_queries
-from app.storage import missions as mission_queries
 from app.storage.database import Database
+from app.storage.queries import events as event_queries
+from app.storage.queries import missions as mission_queries
 from imc_bridge.neptus import Area, Restored, SessionRefusedError, StepData
 from imc_bridge.neptus.samples import looks_slanted
 

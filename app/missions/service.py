@@ -26,14 +26,14 @@ from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
 from app.missions.live.mission import Ending, LiveMission
-from app.missions.operations.imports import Imports
-from app.missions.operations.map_pictures import MapPictures
-from app.missions.operations.reading import Reader
-from app.missions.operations.recorrection import check_level_is_known
+from app.missions.operations.corrections.recorrection import check_level_is_known
+from app.missions.operations.imports.imports import Imports
+from app.missions.operations.imports.reading import Reader
+from app.missions.operations.imports.uploads import Uploads
+from app.missions.operations.maps.map_pictures import MapPictures
 from app.missions.operations.reports import Reports
 from app.missions.operations.sites import Sites
 from app.missions.operations.traffic import places_of, traffic_view
-from app.missions.operations.uploads import Uploads
 from app.missions.operations.work_processes import WorkProcesses
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
@@ -53,13 +53,13 @@ from app.missions.traffic.watch import Traffic
 from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
 from app.missions.views.mission import ActionView, Level, MissionSummary, MissionView, VehicleView
 from app.missions.views.traffic import TrafficView, traffic_findings
-from app.storage import missions as mission_queries
 from app.storage.database import Database
 from app.storage.fast_read import AtOnce
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
-from app.storage.retention import finish_removing
-from app.storage.sites import set_site
+from app.storage.queries import missions as mission_queries
+from app.storage.queries.sites import set_site
+from app.storage.upkeep.retention import finish_removing
 
 log = structlog.get_logger(__name__)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.errors import VehicleNotFoundError
 from app.missions.fleet.hub import VehicleKey
 from app.missions.fleet.interface import (

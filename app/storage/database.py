@@ -12,8 +12,8 @@ from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
 
 from app.storage import private
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.db_errors import trouble_of
-from app.storage.uncancellable import to_the_end
 
 BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for one of another process."""

@@ -32,7 +32,7 @@ import numpy as np
 from numba import njit
 from shapely.geometry import Polygon
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.links.imc import sounding_report
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, Gate

@@ -25,24 +25,24 @@ from typing import Any
 import numpy as np
 
 from app.api import logs
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.metrics import PACKETS_DROPPED
 from app.missions.operations.history import events_after, soundings_of
-from app.missions.operations.log_import import import_log
+from app.missions.operations.imports.log_import import import_log
 from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, Action
 from app.storage.database import Database
-from app.storage.missions import waypoints_of_step
-from app.storage.prepare import prepare_database
+from app.storage.queries.missions import waypoints_of_step
+from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import BridgeSettings, NodeState, Sounding, StateReport
 from imc_bridge.logs import VehicleLog
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 ORIGIN = (41.185, -8.705)
 SIDE_M = 120.0

@@ -23,9 +23,9 @@ from app.evaluation.adjust.run import AdjustJob
 from app.evaluation.adjust.world import DriftScenario
 from app.evaluation.runs.jobs import run_jobs
 from benchmarks.common.report import ADJUSTMENT, make_parser, write_section
-from simulator.seafloors import FAMILIES, generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import FAMILIES, generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 UNSEEN_SEED, UNSEEN_SIDE_M = 9203, 100.0
 FLAT_M = 0.3

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
-from app.mapping.gp import warm_up
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.gaussian_process.gp import warm_up
 from app.missions.forecast.request import starts_of
 from app.missions.forecast.simulate import fly
 from app.missions.maps.builder import MapBuilder
@@ -25,8 +25,8 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
 from benchmarks.common.report import Page, facts, make_parser, write_page
 from benchmarks.mapping.terrains import terrains
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 from tests.support.paths import TERRAINS
 
 PARTS = (1, 2, 5, 10, 20, 50)

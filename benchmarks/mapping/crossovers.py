@@ -20,18 +20,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.quality.crossovers import Crossings, warm_up
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.quality.tracks import GAP_M, GAP_S, Tracks
-from app.missions.operations.crossovers import survey_tracks
+from app.missions.operations.corrections.crossovers import survey_tracks
 from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings, SimulationSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, Action
 from app.storage.database import Database
-from app.storage.prepare import prepare_database
+from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import Page, make_parser, write_section
 from benchmarks.imc.mission import ORIGIN
 from tests.support.paths import TERRAINS

@@ -15,8 +15,8 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.compare import difference, interval_coverage
-from app.mapping.gp import warm_up
-from app.mapping.outliers import flag_outliers
+from app.mapping.gaussian_process.gp import warm_up
+from app.mapping.gross_errors.outliers import flag_outliers
 from app.mapping.types import Grid, Soundings
 from benchmarks.common.report import Page, facts, make_parser, write_page
 from benchmarks.mapping.methods import METHODS, Method, ours

@@ -9,8 +9,8 @@ from scipy.interpolate import RBFInterpolator
 
 from app.arrays import FloatArray
 from app.mapping.gaussian import GaussianInterpolator, choose_width
-from app.mapping.gp import GaussianProcessMap
-from app.mapping.supersoundings import merge_soundings
+from app.mapping.gaussian_process.gp import GaussianProcessMap
+from app.mapping.kriging.supersoundings import merge_soundings
 from app.mapping.types import Grid, Soundings
 
 Method = Callable[[Soundings, Grid], tuple[FloatArray, FloatArray | None]]

@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.types import MapExtent, ReadOptions
 from app.mapping.types import Grid
-from app.missions.operations.reading import Reader
-from app.missions.operations.uploads import open_upload
+from app.missions.operations.imports.reading import Reader
+from app.missions.operations.imports.uploads import open_upload
 from benchmarks.common.report import LOAD, make_parser, write_section
 from tests.support.multibeam import line, write_gsf, write_kmall
 

@@ -22,13 +22,13 @@ from scipy.ndimage import map_coordinates
 from scipy.stats import norm
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.gp import GaussianProcessMap
+from app.mapping.gaussian_process.gp import GaussianProcessMap
 from app.mapping.shoals import deviations_above, shoal_chance
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map, without_guesses
 from app.mapping.types import BathymetricMap, Grid, Soundings
 from benchmarks.common.report import Page, facts, make_parser, write_page
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 from tests.support.paths import TERRAINS
 
 FLOORS = ("boulders", "reef", "reef_field", "harbour", "rugged", "ridge", "canyon", "smooth")

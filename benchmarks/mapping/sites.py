@@ -17,12 +17,12 @@ import numpy as np
 from rich.progress import track
 
 from app.arrays import FloatArray
-from app.mapping.gp import warm_up
+from app.mapping.gaussian_process.gp import warm_up
 from app.mapping.sites import Survey, compare, survey_of
 from app.missions.maps.builder import MapBuilder
 from benchmarks.common.report import SITES, make_parser, write_section
-from simulator.seafloors import FAMILIES, generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import FAMILIES, generate
+from simulator.floors.terrain import Terrain
 
 SIDE_M = 100.0
 PIT_M = (30.0, 50.0)

@@ -10,8 +10,8 @@ import numpy as np
 from app.arrays import FloatArray
 from app.mapping.compare import difference, interval_coverage
 from app.mapping.gaussian import GaussianInterpolator, choose_width
-from app.mapping.gp import GaussianProcessMap, warm_up
-from app.mapping.likelihood import SLOPE_SD, Hyperparameters
+from app.mapping.gaussian_process.gp import GaussianProcessMap, warm_up
+from app.mapping.kriging.likelihood import SLOPE_SD, Hyperparameters
 from app.mapping.types import Grid, Soundings
 from benchmarks.mapping.terrains import sound, wide_floor
 

@@ -25,10 +25,10 @@ from app.missions.settings import ImcSettings
 from app.settings import Settings
 from benchmarks.common.report import make_parser, write_section
 from benchmarks.mapping.crossovers import QUALITY
-from simulator.seafloors import generate
-from simulator.swath import SwathErrors, SwathSonar, SwathSounder
-from simulator.terrain import Terrain
-from simulator.vehicle import Motion
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.sonars.swath import SwathErrors, SwathSonar, SwathSounder
+from simulator.vehicles.vehicle import Motion
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.rest import make_client, mission_spec, running
 from tests.support.tracks import flown, lawnmower

@@ -8,7 +8,7 @@ from scipy.ndimage import map_coordinates
 
 from app.arrays import FloatArray
 from app.mapping.types import Grid, Soundings
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 
 GENERATED = ("reef", "harbour", "ridge", "smooth")
 PATCHY = ("leixoes_sharp", "leixoes_sharp_diagonal", "leixoes_sharp_wall_sw", "reef (seed 1)")

@@ -24,9 +24,9 @@ from app.evaluation.coverage.run import CoverageJob
 from app.evaluation.coverage.world import MIN_ALTITUDE_M, CoverageScenario, cell_by_depth_m
 from app.evaluation.runs.jobs import run_jobs
 from benchmarks.common.report import COVERAGE, make_parser, write_section
-from simulator.seafloors import FAMILIES, generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import FAMILIES, generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 SLOPES = {"slope_5_40_300": (300, 300, 5.0, 40.0, 0.0), "slope_5_40_turned": (250, 200, 5.0, 40.0, 0.7)}
 UNSEEN_SIDE_M = (220.0, 160.0)

@@ -28,9 +28,9 @@ from app.evaluation.explore.world import ExploreScenario
 from app.evaluation.runs.jobs import Progress, run_jobs
 from app.exploration.planner.options import PlannerOptions
 from benchmarks.common.report import LANDMARKS, make_parser, write_section
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 GENERATED = ("canyon", "flat", "harbour", "reef", "ridge", "rugged", "slope", "smooth")
 OURS, PAPERS = "ours", "least squares"

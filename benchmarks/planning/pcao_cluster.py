@@ -14,11 +14,11 @@ import time
 import psutil
 from distributed import Client, LocalCluster
 
-from app.evaluation.pcao.scoring import DaskScorer
-from app.evaluation.pcao.task import TrainingTask
+from app.evaluation.pcao.simulation.task import TrainingTask
+from app.evaluation.pcao.simulation.world import SeaFloor
 from app.evaluation.pcao.terrains import sea_floor
-from app.evaluation.pcao.training import make_optimiser
-from app.evaluation.pcao.world import SeaFloor
+from app.evaluation.pcao.training.scoring import DaskScorer
+from app.evaluation.pcao.training.training import make_optimiser
 from app.evaluation.runs.cluster import Cluster
 from benchmarks.common.report import PLANNING, make_parser, write_section
 

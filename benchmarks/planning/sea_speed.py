@@ -15,7 +15,7 @@ from app.evaluation.survey.run import run_survey_at_sea
 from app.evaluation.survey.world import SPEED_MPS, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from benchmarks.common.report import FLIGHT, make_parser, write_section
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 
 VEHICLES, STEP_M = 3, 10.0
 MINUTES = (10.0, 30.0)

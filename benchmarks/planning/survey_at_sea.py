@@ -26,8 +26,8 @@ from app.evaluation.survey.world import SPEED_MPS, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from benchmarks.common.report import FLIGHT, make_parser, write_section
 from benchmarks.planning.survey_study import PATCHY, PATTERNS, sea_floors
-from simulator.seafloors import FAMILIES, generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import FAMILIES, generate
+from simulator.floors.terrain import Terrain
 
 VEHICLES, STEPS, STEP_M = 2, 60, 10.0
 MINUTES = STEPS * STEP_M / SPEED_MPS / 60.0

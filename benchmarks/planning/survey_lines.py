@@ -16,7 +16,7 @@ from app.evaluation.survey.symmetry import turned
 from app.evaluation.survey.world import SurveyScenario, fly_planner
 from app.exploration.planner.options import PlannerOptions
 from benchmarks.common.report import PLANNING, make_parser, write_section
-from simulator.terrain_files import load_terrain
+from simulator.floors.terrain_files import load_terrain
 
 SPACING_M, ALONG_M, DEPTH_M = 10.0, 0.5, 2.5
 

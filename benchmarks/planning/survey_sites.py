@@ -23,9 +23,9 @@ from app.evaluation.survey.run import best_even_survey, fly_pattern
 from app.evaluation.survey.world import SurveyScenario, default_map, fly_planner, rmse_m
 from app.exploration.planner.options import PlannerOptions
 from benchmarks.common.report import PLANNING, make_parser, write_section
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 LINES = 40
 STEP_M = 25.0

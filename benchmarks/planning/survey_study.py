@@ -28,9 +28,9 @@ from app.evaluation.survey.world import Sampling, Sounder, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
 from benchmarks.common.report import Page, facts, make_parser, write_page
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 SIDE_M = (95.0, 110.0)
 GENERATED = (("reef", 1), ("reef_field", 1))

@@ -15,7 +15,7 @@ from typing import Any
 
 import httpx
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from tests.support.dashboard.service import Service
 
 FRAME = LocalFrame(41.185, -8.705)

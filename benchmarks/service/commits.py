@@ -22,7 +22,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage.database import Database
-from app.storage.prepare import prepare_database
+from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import LOAD, make_parser, write_section
 from tests.support.databases import KINDS, Databases
 from tests.support.missions.specs import FRAME, make_spec

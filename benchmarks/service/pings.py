@@ -25,7 +25,7 @@ from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.storage.database import Database
-from app.storage.prepare import prepare_database
+from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import LOAD, make_parser, write_section
 from benchmarks.service.boats import FRAME, SIDE_M, START_S, bottom_m, running_service
 from benchmarks.service.opening import Watch

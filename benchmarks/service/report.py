@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import PingReport, Position
-from app.missions.operations.mission_maps import export
+from app.missions.operations.maps.mission_maps import export
 from app.missions.operations.reports import ReportOptions
 from app.missions.report.kinds import REPORTS
 from app.missions.report.texts import Language
@@ -27,7 +27,7 @@ from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.storage.database import Database
-from app.storage.prepare import prepare_database
+from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import LOAD, make_parser, write_section
 from benchmarks.imc.mission import ORIGIN
 from benchmarks.service.pings import LoopWatch

@@ -13,15 +13,15 @@ from typing import Any, Self
 
 import numpy as np
 
-from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
-from simulator.dune.discovery import listen_for_announces
 from simulator.dune.node import DuneOptions, FakeDune
+from simulator.dune.transport.discovery import listen_for_announces
 from simulator.equipment import Equipment
+from simulator.floors.terrain import Terrain
 from simulator.network import Address, UdpEndpoint
 from simulator.targets import Ranging, RangingNoise, Target, TargetSpec
-from simulator.terrain import Terrain
-from simulator.vehicle import STEP_S
+from simulator.vehicles.battery import BatterySpec
+from simulator.vehicles.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)

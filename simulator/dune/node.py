@@ -14,7 +14,6 @@ import imcpy
 import numpy as np
 
 from simulator.clock import SimulationClock
-from simulator.dune.contacts import REFRESH_PERIOD_S, Contacts
 from simulator.dune.entities import (
     ANY,
     HARDWARE_DVL,
@@ -30,15 +29,16 @@ from simulator.dune.lost_comms import PERIOD_S as LOST_COMMS_PERIOD_S
 from simulator.dune.lost_comms import PLAN_NAME, LostComms
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
 from simulator.dune.plan_database import PLAN_DATABASE, PlanDatabase
-from simulator.dune.radio import Radio
-from simulator.dune.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
-from simulator.dune.tcp import FIRST_PORT, TcpServer
 from simulator.dune.telemetry import Telemetry
-from simulator.navigation import SURFACE_DEPTH_M
+from simulator.dune.transport.contacts import REFRESH_PERIOD_S, Contacts
+from simulator.dune.transport.radio import Radio
+from simulator.dune.transport.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
+from simulator.dune.transport.tcp import FIRST_PORT, TcpServer
 from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint
-from simulator.sensors import SensorKind, cast_rays, to_local_frame
+from simulator.sonars.sensors import SensorKind, cast_rays, to_local_frame
 from simulator.targets import Ranging
-from simulator.vehicle import STEP_S
+from simulator.vehicles.navigation import SURFACE_DEPTH_M
+from simulator.vehicles.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)

@@ -7,12 +7,12 @@ from enum import IntEnum
 
 import imcpy
 
-from simulator.dune.elevator import ElevatorManeuver
 from simulator.dune.entities import ANY, SIMULATION
-from simulator.dune.follow_reference import FollowReference
-from simulator.dune.goto import GotoManeuver
-from simulator.dune.pop_up import PopUpManeuver
-from simulator.dune.station_keeping import StationKeepingManeuver
+from simulator.dune.maneuvers.elevator import ElevatorManeuver
+from simulator.dune.maneuvers.follow_reference import FollowReference
+from simulator.dune.maneuvers.goto import GotoManeuver
+from simulator.dune.maneuvers.pop_up import PopUpManeuver
+from simulator.dune.maneuvers.station_keeping import StationKeepingManeuver
 from simulator.geodesy import LocalFrame
 from simulator.world import SimulatedVehicle
 

@@ -9,10 +9,10 @@ from datetime import UTC, datetime
 import imcpy
 import numpy as np
 
-from simulator.battery import Battery
 from simulator.geodesy import LocalFrame
-from simulator.navigation import SURFACE_DEPTH_M
-from simulator.sensors import DVL_TILT_RAD
+from simulator.sonars.sensors import DVL_TILT_RAD
+from simulator.vehicles.battery import Battery
+from simulator.vehicles.navigation import SURFACE_DEPTH_M
 from simulator.world import BeamReturn, SimulatedVehicle, SwathPing
 
 GPS_VALIDITY = 511

@@ -24,7 +24,7 @@ from schemathesis.specs.openapi.checks import (
     response_schema_conformance,
 )
 
-from app.api.tokens import Role, TokenStore
+from app.api.accounts.tokens import Role, TokenStore
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database

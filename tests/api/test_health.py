@@ -10,8 +10,8 @@ import pytest
 from app import __version__
 from app.main import Server, create_app
 from app.settings import Settings
-from app.storage import migrate
-from app.storage.prepare import DatabaseNotReadyError
+from app.storage.upkeep import migrate
+from app.storage.upkeep.prepare import DatabaseNotReadyError
 from tests.support.rest import mission_spec, soundings
 from tests.support.waiting import until
 

@@ -17,14 +17,14 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from app.api import logs
-from app.api.tokens import Role, TokenStore
+from app.api.accounts.tokens import Role, TokenStore
 from app.cli import _show_diagnosis, app
 from app.csv_cells import text_cell
 from app.mapping.products.kml import tracks_kml
 from app.mapping.products.tracks import Track, TrackPoint, tracks_gpx
 from app.settings import Settings
 from app.storage.database import Database
-from app.storage.prepare import prepare_database
+from app.storage.upkeep.prepare import prepare_database
 from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, problem
 from imc_bridge.events import NodeState
 from imc_bridge.printable import printable

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from app.settings import Settings
-from app.storage import migrate
+from app.storage.upkeep import migrate
 from bathyfleet.client import AsyncClient
 from tests.support.databases import query
 from tests.support.rest import mission_spec, running, soundings

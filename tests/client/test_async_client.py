@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.api.tokens import TokenStore
+from app.api.accounts.tokens import TokenStore
 from app.main import Server
 from app.missions.settings import ImcSettings
 from app.settings import Settings

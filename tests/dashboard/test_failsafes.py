@@ -21,10 +21,10 @@ from app.missions.alarm_kinds import AlarmKind
 from app.missions.recovery.failsafes import TABLE
 from app.missions.spec.failsafes import Failsafe, Response
 from imc_bridge import BridgeSettings
-from simulator.battery import BatterySpec
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.equipment import Equipment
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
+from simulator.vehicles.battery import BatterySpec
 from tests.support.ais import nmea, position
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service

@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
 ENDLESS_DECISIONS = """
 import threading
-from app.missions.flight import deciding
+from app.missions.flight.decisions import deciding
 
 deciding.decide = lambda *_: threading.Event().wait()
 """

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from app.arrays import FloatArray
 from app.estimation import in_sight
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 
 def place(terrain: Terrain, rng: np.random.Generator, n: int, height: float) -> FloatArray:

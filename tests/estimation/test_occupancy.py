@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from app.estimation import Cell, OccupancyGrid, Scanner
-from simulator.obstacles import ObstacleWorld
+from simulator.obstacles.obstacles import ObstacleWorld
 
 SIDE = 20
 

@@ -5,9 +5,9 @@ import pytest
 from typer.testing import CliRunner
 
 from app.evaluation.cli import evaluate_app
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import save_npz
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import save_npz
 
 EXPLORE = {
     "planner", "terrain", "seed", "robots", "landmarks", "steps", "remaining_pct", "t99", "sum_of_error", "history",

@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 from app.mapping.readers.files import read_file
 from app.mapping.readers.types import ReadError
-from app.missions.views.imports import ImportOptions
-from simulator.terrain import Terrain, TerrainError
-from simulator.terrain_files import load_terrain, save_npz
+from app.missions.views.measurements.imports import ImportOptions
+from simulator.floors.terrain import Terrain, TerrainError
+from simulator.floors.terrain_files import load_terrain, save_npz
 from tests.support.faults.hostile import PLACE, npy, npz
 from tests.support.paths import PROJECT
 

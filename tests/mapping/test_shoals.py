@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.mapping.gp import GaussianProcessMap
+from app.mapping.gaussian_process.gp import GaussianProcessMap
 from app.mapping.layers import LAYERS, LayerSource, file_layers
 from app.mapping.shoals import rises_m, rock_chance, shoal_chance
 from app.mapping.swath.density import DensityGrid

@@ -14,7 +14,7 @@ import pytest
 from app.missions.maps.builder import make_grid
 from app.missions.operations.history import soundings_of
 from app.missions.states import MissionState
-from app.missions.views.soundings import Verdict
+from app.missions.views.measurements.soundings import Verdict
 from imc_bridge.neptus import SessionRefusedError
 from tests.support.missions.harbour import act
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway

@@ -14,7 +14,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
 from app.missions import safety
-from app.missions.flight.decision import Knowledge, decide, make_constraints
+from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
 from tests.support.missions.specs import make_spec, rectangle
 

@@ -29,11 +29,11 @@ from app.missions.errors import (
     VehicleNotFoundError,
 )
 from app.missions.fleet.interface import LinkState, WaypointStatus
-from app.missions.live import feed
+from app.missions.live.watchers import feed
 from app.missions.maps.products import PRODUCTS
 from app.missions.operations.history import events_after, soundings_of, telemetry_of
+from app.missions.operations.maps.mission_maps import export, newest_map
 from app.missions.operations.measurements import measure
-from app.missions.operations.mission_maps import export, newest_map
 from app.missions.operations.polling import waypoint
 from app.missions.running.mission_views import planner_views, watched
 from app.missions.service import MissionService
@@ -41,9 +41,9 @@ from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.states import Action, MissionState, MoveRefusedError
+from app.missions.views.measurements.soundings import Verdict
 from app.missions.views.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage
 from app.missions.views.mission import EventView, Level
-from app.missions.views.soundings import Verdict
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow, SoundingRow, StepRow, WaypointRow
 from tests.support.missions.harbour import (
@@ -887,7 +887,7 @@ async def test_readiness_and_planners(service: MissionService) -> None:
 async def test_the_real_sea_floor_is_mapped_as_it_is(
     terrains: Any, harbour: Harbour, make_settings: Callable[..., ServiceSettings]
 ) -> None:
-    from simulator.terrain_files import load_terrain
+    from simulator.floors.terrain_files import load_terrain
 
     path = terrains / "leixoes_slope.npz"
     service = await harbour.reopen(simulation={"terrain": path})

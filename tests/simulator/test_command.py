@@ -10,9 +10,9 @@ from signal import Signals
 import pytest
 from typer.testing import CliRunner
 
-from simulator import seafloors
 from simulator.__main__ import app
-from simulator.terrain_files import save_npz
+from simulator.floors import seafloors
+from simulator.floors.terrain_files import save_npz
 from tests.support.paths import PROJECT
 from tests.support.ports import free_ports
 

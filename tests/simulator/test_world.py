@@ -4,13 +4,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulator import seafloors
 from simulator.equipment import Equipment
-from simulator.navigation import LEAST_VARIANCE_M2, Navigation
-from simulator.sensors import SonarNoise
-from simulator.swath import SwathSonar
-from simulator.terrain import Terrain
-from simulator.vehicle import Guidance
+from simulator.floors import seafloors
+from simulator.floors.terrain import Terrain
+from simulator.sonars.sensors import SonarNoise
+from simulator.sonars.swath import SwathSonar
+from simulator.vehicles.navigation import LEAST_VARIANCE_M2, Navigation
+from simulator.vehicles.vehicle import Guidance
 from simulator.world import SimulatedVehicle
 
 HARBOUR = seafloors.generate("harbour", 0)

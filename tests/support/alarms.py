@@ -24,9 +24,9 @@ from app.missions.alarm_settings import AlarmSettings
 from app.missions.alarms.desk import AlarmDesk
 from app.missions.alarms.raised import make_alarm
 from app.missions.views.alarms import AlarmReport
-from app.storage import alarms as alarm_queries
 from app.storage.database import Database
 from app.storage.models import AlarmRow, ProcessRow
+from app.storage.queries import alarms as alarm_queries
 from tests.support import rows
 from tests.support.ports import free_ports
 from tests.support.waiting import until
@@ -243,7 +243,7 @@ async def with_mission(database: Database) -> None:
 
 async def end_of_process(watch: Watch) -> None:
     """End a desk and bury its process, as a process that ends or is killed is buried."""
-    from app.storage import processes
+    from app.storage.processes import processes
 
     await watch.desk.close()
     async with watch.database.writing() as session:

@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from app.storage import migrate
 from app.storage.database import make_engine
+from app.storage.upkeep import migrate
 
 KINDS = ("sqlite", "postgresql")
 SERVER_USERS = ("postgres", "nobody")

@@ -10,7 +10,7 @@ import numpy as np
 from GSFU.gsfu import gsf, new_name_value_parameters, new_swath_bathymetry_ping
 from KMALL.kmall import kmall
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 
 
 @dataclass

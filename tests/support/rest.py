@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from app.api.tokens import Role, TokenStore
+from app.api.accounts.tokens import Role, TokenStore
 from app.main import Server, serve
 from app.settings import Settings
 from tests.support.missions.specs import AREA

@@ -38,8 +38,8 @@ from app.storage.models import (
     WaypointRow,
 )
 from app.storage.ping_files import file_name
-from app.storage.scans import pack_ranges
-from app.storage.soundings import pack
+from app.storage.queries.scans import pack_ranges
+from app.storage.queries.soundings import pack
 
 TIME = datetime(2026, 6, 1, 12, 30, 15, 250_000, tzinfo=UTC)
 

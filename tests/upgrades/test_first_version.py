@@ -18,9 +18,9 @@ from sqlalchemy import JSON, Connection, DateTime, MetaData, Table, insert, sele
 
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from app.storage import migrate
 from app.storage.database import make_engine
-from app.storage.prepare import prepare_database
+from app.storage.upkeep import migrate
+from app.storage.upkeep.prepare import prepare_database
 from tests.support.databases import KINDS, Databases, path_of
 from tests.support.rest import running
 from tests.support.waiting import until

@@ -12,7 +12,7 @@ from app.estimation.adjustment import AdjustedTracks, TrackSoundings, adjusted, 
 from app.evaluation.adjust.world import DriftingSurvey, DriftScenario, fly, without_drift
 from app.evaluation.runs.jobs import Progress
 from app.mapping.compare import difference
-from app.mapping.gp import GaussianProcessMap
+from app.mapping.gaussian_process.gp import GaussianProcessMap
 from app.mapping.swath.density import DensityGrid
 from app.mapping.types import Grid, Soundings
 

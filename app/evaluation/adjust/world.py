@@ -7,7 +7,7 @@ import numpy as np
 from app.arrays import FloatArray, IntArray
 from app.estimation.adjustment import Fixes, TrackSoundings
 from app.evaluation.coverage.world import sounded
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 SPEED_MPS = 1.2
 ALTITUDE_M = 3.0

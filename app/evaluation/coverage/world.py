@@ -13,8 +13,8 @@ from app.exploration.swath.raster import Flying
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.holidays import holidays, open_ground, side_of
 from app.mapping.types import Grid
-from simulator.raycasting import depth_between, march
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
+from simulator.sonars.raycasting import depth_between, march
 
 FASTEST_MPS = 1.5
 CRUISE_M = 2.0

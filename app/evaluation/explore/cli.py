@@ -33,7 +33,7 @@ from app.evaluation.runs.jobs import run_jobs
 from app.exploration.communication.messages import MAX_ENTRIES
 from app.exploration.core.objective import TERMS
 from app.exploration.planner.options import PlannerOptions
-from simulator.terrain import TerrainError
+from simulator.floors.terrain import TerrainError
 
 EVERY_CELL = "all"
 

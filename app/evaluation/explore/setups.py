@@ -14,7 +14,7 @@ from app.evaluation.runs.jobs import Progress
 from app.exploration.core.objective import TERMS, Terms
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 HISTORY_EVERY = 5
 """Steps between the values of the history that is kept."""

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
 
 REAL = ("calibration_smooth", "monterey_coast_range", "fortbragg_gully", "leixoes_sharp_diagonal")
 """File names; the first two stand for the papers' Map #1 and Map #2, which were never published."""

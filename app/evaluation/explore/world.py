@@ -17,7 +17,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.objective import Objective, ObjectiveWeights, VehicleProgress, objective
 from app.exploration.core.problem import Belief
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 CLEARANCE = 0.05
 MAX_STEP = 0.05

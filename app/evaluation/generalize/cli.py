@@ -15,7 +15,7 @@ from app.evaluation.runs.cluster import ClusterError
 from app.evaluation.runs.command import Json, Scheduler, evaluate_app, progress_bar, seed_list
 from app.evaluation.runs.jobs import run_jobs
 from app.evaluation.runs.store import Results
-from simulator.unseen_floors import UNSEEN, floor_names
+from simulator.floors.unseen_floors import UNSEEN, floor_names
 
 FLOORS = 56
 COLUMNS = ("task", "floors", "mean", "ci95", "greatest", "kept", "worst")

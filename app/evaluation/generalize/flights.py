@@ -13,8 +13,8 @@ from app.evaluation.explore.run import ExploreRun, run_explore
 from app.evaluation.explore.world import CubeTerrain, ExploreScenario
 from app.evaluation.generalize.site import site_of
 from app.evaluation.generalize.trial import Recorder, Trial, rounded, thinned
-from app.evaluation.pcao.task import TrainingTask
-from app.evaluation.pcao.world import SeaFloor
+from app.evaluation.pcao.simulation.task import TrainingTask
+from app.evaluation.pcao.simulation.world import SeaFloor
 from app.evaluation.search.run import HOME_M
 from app.evaluation.search.world import RescueScenario, explored_pct, fully_explored, run_search
 from app.evaluation.survey.run import best_even_survey, even_coverage, fly_pattern, judge
@@ -24,7 +24,7 @@ from app.evaluation.track.world import TrackScenario
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.exploration.pcao.model import default_model
 from app.exploration.planner.options import PlannerOptions
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 Size = Literal["full", "quick"]
 Flight = Callable[[Terrain, int, Size], Trial]

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from app.evaluation.generalize.summary import Run, figure_of, worst_of
 from app.evaluation.generalize.tasks import Task
-from simulator.unseen_floors import unseen_floor
+from simulator.floors.unseen_floors import unseen_floor
 
 DPI = 60
 PANEL = 3.0

@@ -7,7 +7,7 @@ from app.evaluation.generalize.summary import Run, summary_of
 from app.evaluation.generalize.tasks import TASKS
 
 INTRODUCTION = """\
-Sea floors of families that no planner is developed on (`simulator/unseen_floors.py`), each drawn by its seed:
+Sea floors of families that no planner is developed on (`simulator/floors/unseen_floors.py`), each drawn by its seed:
 development looks at even seeds, odd ones are reported. Means ± half their 95 % interval (Student) over floors; less is
 better. *Figure* is the ratio to the yardstick where that was flown on the same floor, else what was left.
 *Difference* is ours less the yardstick's, floor by floor, in the unit of what is compared. *Within* counts the floors

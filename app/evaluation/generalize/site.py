@@ -4,8 +4,8 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter, label
 
 from app.arrays import BoolArray, FloatArray
-from simulator.obstacles import ObstacleWorld
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
+from simulator.obstacles.obstacles import ObstacleWorld
 
 RISING_PART = 0.18
 """Part of the floor that rises above the depth at which the site is searched."""

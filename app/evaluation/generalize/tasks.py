@@ -9,7 +9,7 @@ from app.estimation import RangeSensor, Scanner, Sensor, SingleBeam
 from app.evaluation.generalize import flights
 from app.evaluation.generalize.flights import Flight, Size
 from app.evaluation.runs.jobs import Progress
-from simulator.unseen_floors import unseen_floor
+from simulator.floors.unseen_floors import unseen_floor
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.evaluation.explore.run import OSARSES, run_explore
 from app.evaluation.explore.world import ExploreScenario
-from app.evaluation.pcao.optimisers import METHODS
-from app.evaluation.pcao.task import TrainingTask
-from app.evaluation.pcao.tried import FDSA, SE, SPSA, fly_tried, tries_per_step
-from app.evaluation.pcao.world import LANDMARKS, ROBOTS, STEPS, SeaFloor
+from app.evaluation.pcao.simulation.task import TrainingTask
+from app.evaluation.pcao.simulation.tried import FDSA, SE, SPSA, fly_tried, tries_per_step
+from app.evaluation.pcao.simulation.world import LANDMARKS, ROBOTS, STEPS, SeaFloor
+from app.evaluation.pcao.training.optimisers import METHODS
 from app.evaluation.runs.jobs import Job, Progress
 from app.exploration.pcao.model import PcaoModel
 from app.exploration.planner.options import PlannerOptions
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 HISTORY_EVERY = 10
 UNLIMITED = 10.0

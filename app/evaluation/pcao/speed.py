@@ -5,8 +5,8 @@ import time
 import numpy as np
 
 from app.evaluation.pcao.experiments import FlightJob
+from app.evaluation.pcao.simulation.world import LANDMARKS, ROBOTS, STEPS, UNIT
 from app.evaluation.pcao.terrains import sea_floor
-from app.evaluation.pcao.world import LANDMARKS, ROBOTS, STEPS, UNIT
 from app.exploration.pcao.controller import control, within_step
 from app.exploration.pcao.model import PcaoModel
 from app.exploration.pcao.state import reduced_state

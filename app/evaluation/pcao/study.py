@@ -12,7 +12,7 @@ from app.evaluation.pcao.experiments import MAPS, OTHERS, CurveJob, ExperimentJo
 from app.evaluation.pcao.report import Findings
 from app.evaluation.pcao.terrains import sea_floor
 from app.exploration.pcao.model import PcaoModel
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 Run = Mapping[str, Any]
 

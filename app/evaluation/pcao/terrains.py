@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from simulator.seafloors import FAMILIES, generate
-from simulator.terrain import Terrain, TerrainError
-from simulator.terrain_files import load_terrain
+from simulator.floors.seafloors import FAMILIES, generate
+from simulator.floors.terrain import Terrain, TerrainError
+from simulator.floors.terrain_files import load_terrain
 
 CELLS = 100.0
 SUFFIXES = (".npz", ".asc", ".tif", ".tiff", ".xyz", ".csv")

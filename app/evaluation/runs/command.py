@@ -19,8 +19,8 @@ from app.exploration.core.objective import TERMS
 from app.exploration.pcao.model import PcaoModel
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import missing
-from simulator.terrain import Terrain, TerrainError
-from simulator.terrain_files import load_terrain
+from simulator.floors.terrain import Terrain, TerrainError
+from simulator.floors.terrain_files import load_terrain
 
 evaluate_app = typer.Typer(help="Compare planners in closed loop, without a network.", no_args_is_help=True)
 

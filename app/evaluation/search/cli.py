@@ -22,8 +22,8 @@ from app.evaluation.search.run import RescueJob
 from app.evaluation.search.world import RescueScenario
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import SEARCHERS
-from simulator.car_parks import SCENARIOS, car_park, harbour_basin
-from simulator.obstacles import ObstacleWorld
+from simulator.obstacles.car_parks import SCENARIOS, car_park, harbour_basin
+from simulator.obstacles.obstacles import ObstacleWorld
 
 HARBOUR = "harbour"
 CLOCKS = ("way", "steps")

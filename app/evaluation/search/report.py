@@ -8,7 +8,7 @@ from app.evaluation.runs.summary import spread
 from app.evaluation.search.run import RescueJob
 from app.evaluation.search.world import RescueScenario
 from app.exploration.planner.options import PlannerOptions
-from simulator.car_parks import SCENARIOS, car_park
+from simulator.obstacles.car_parks import SCENARIOS, car_park
 
 Run = Mapping[str, Any]
 

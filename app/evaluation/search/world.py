@@ -16,7 +16,7 @@ from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
-from simulator.obstacles import ObstacleWorld
+from simulator.obstacles.obstacles import ObstacleWorld
 
 BODY_M = 0.35
 """Half the length of the robot: closer than that to an obstacle is a collision."""

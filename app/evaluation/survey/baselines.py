@@ -7,7 +7,7 @@ from app.evaluation.survey.flown import fly_lawnmower
 from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, default_map, rmse_m
 from app.exploration.core.constraints import Constraints
 from app.mapping.types import Grid
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,12 @@ from app.estimation import SingleBeam
 from app.evaluation.survey.flown import ARRIVAL_RADIUS_M, LEAST_SD_M
 from app.evaluation.survey.world import SPEED_MPS, Log, MapSoFar, SurveyScenario
 from app.exploration.core.problem import Belief, Planner, Situation
-from app.exploration.core.track import Place, along_leg
+from app.exploration.motion.on_leg import Place, along_leg
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.mapping.types import Soundings
 from simulator.equipment import Equipment
-from simulator.sensors import SonarNoise
+from simulator.sonars.sensors import SonarNoise
 from simulator.world import SimulatedVehicle
 
 TICK_S = 0.2

@@ -8,8 +8,8 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
 from simulator.equipment import Equipment
-from simulator.sensors import SonarNoise
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
+from simulator.sonars.sensors import SonarNoise
 from simulator.world import BeamReturn, SimulatedVehicle
 
 ARRIVAL_RADIUS_M = 3.0

@@ -5,9 +5,9 @@ from scipy.ndimage import gaussian_filter
 
 from app.arrays import FloatArray
 from app.evaluation.survey.world import Log, terrain_grid
-from app.mapping.gp import GaussianProcessMap
+from app.mapping.gaussian_process.gp import GaussianProcessMap
 from app.mapping.types import Soundings
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 FIRST_PART = 0.3
 ROUNDS = 10

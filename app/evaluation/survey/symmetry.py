@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.mapping.types import Soundings
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 SYMMETRIES = 8
 

@@ -13,10 +13,10 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.mapping.gp import GaussianProcessMap
-from app.mapping.outliers import OutlierReport
+from app.mapping.gaussian_process.gp import GaussianProcessMap
+from app.mapping.gross_errors.outliers import OutlierReport
 from app.mapping.types import BathymetricMap, Grid, Soundings
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 Sampling = Literal["step", "continuous"]
 Sounder = Literal["single", "dvl", "swath"]

@@ -24,8 +24,8 @@ from app.evaluation.runs.command import (
 from app.evaluation.track.run import TRACKERS
 from app.evaluation.track.world import TrackScenario
 from app.exploration.planner.options import PlannerOptions
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 SETUPS = ("med13", "ngcuv12")
 CELLS = 100.0

@@ -12,7 +12,7 @@ from app.evaluation.track.run import run_track
 from app.evaluation.track.trace_greedy import TRACE_GREEDY
 from app.evaluation.track.world import TrackScenario
 from app.exploration.planner.options import PlannerOptions
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 HISTORY_EVERY = 10
 """Steps between the values of the histories that are kept."""

@@ -11,7 +11,7 @@ from numba import njit
 from app.arrays import FloatArray
 from app.evaluation.track.world import TrackWorld
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.detours import neighbouring_moves
+from app.exploration.core.errands import neighbouring_moves
 from app.exploration.core.problem import Proposal, Situation
 
 TRACE_GREEDY = "ekf-trace"

@@ -38,7 +38,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.dynamic import Localization, Targets, dynamic_cost
 from app.exploration.core.objective import MED13_K, med13_objective
 from app.exploration.core.problem import Belief, Situation
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 SURFACED = 1e-9
 START_ABOVE = 0.05

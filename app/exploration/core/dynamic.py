@@ -36,7 +36,7 @@ class Targets:
     range_sd_m : float
         Part of the ranges' deviation that is the same at any distance.
     standoff_m : float
-        Vehicles on a detour come no closer to any target.
+        Vehicles on an errand come no closer to any target.
     """
 
     state: FloatArray

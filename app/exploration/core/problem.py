@@ -137,7 +137,7 @@ class Situation:
 class Proposal:
     """A planner's answer: the next team configuration, (n_vehicles, 3), and figures for the operator.
 
-    ``errands`` (detours) names vehicles that left the plan, with the number of their target; negative: the surface.
+    ``errands`` names vehicles that left the plan, with the number of their target; negative: the surface.
     ``done`` names vehicles for which nothing is left to do as things stand; they hold.
     """
 

@@ -12,7 +12,7 @@ from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.detours import Errand, Errands, errand_move
+from app.exploration.core.errands import Errand, Errands, errand_move
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.options import PlannerOptions
@@ -27,7 +27,7 @@ class PlannerBase(ABC):
     name: ClassVar[str]
 
     runs_errands: ClassVar[bool] = True
-    """Whether single vehicles leave the plan for targets and the surface; see :mod:`app.exploration.core.detours`."""
+    """Whether single vehicles leave the plan for targets and the surface; see :mod:`app.exploration.core.errands`."""
 
     plans_for_all: bool = False
     """Whether its plan needs to know of vehicles that get no leg now."""
@@ -61,9 +61,9 @@ class PlannerBase(ABC):
         return replace(proposal, positions=proposal.positions[inverse])
 
     def _with_errands(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
-        """Decide for the vehicles that follow the plan, then for those on detours."""
+        """Decide for the vehicles that follow the plan, then for those on errands."""
         self._whole = team
-        # Bathymeter missions rise along their legs instead; see app.missions.flight.decision.
+        # Bathymeter missions rise along their legs instead; see app.missions.flight.decisions.decision.
         localization = None if self._surveys else team.localization
         if not self.runs_errands or (team.targets is None and localization is None):
             return self._decide_for_moving(team, bottom, seed)

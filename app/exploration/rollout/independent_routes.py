@@ -150,7 +150,7 @@ def judge(
     Parameters
     ----------
     free_part : (n_vehicles,)
-        Of its time, what each is expected to have for its route; detours take the rest.
+        Of its time, what each is expected to have for its route; errands take the rest.
     waypoints : int
         How many the routes have together.
     left : (m,)

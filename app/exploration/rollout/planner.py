@@ -88,7 +88,7 @@ SWATH_EXCESS = 1.2
 """How far a team may exceed, on average, the landmarks in the swath that it sees."""
 
 BACK_SOON = -1
-"""In place of the number of steps planned so far: a vehicle left on a detour, or came back."""
+"""In place of the number of steps planned so far: a vehicle left on an errand, or came back."""
 
 FIRST_SEARCH = 1500
 LAST_SHARE = 4
@@ -98,7 +98,7 @@ FRESH_STARTS = 4
 FRESH_SEARCH = 60
 
 AWAY_STEPS = 40.0
-"""Steps over which the share of a vehicle's time on detours is averaged."""
+"""Steps over which the share of a vehicle's time on errands is averaged."""
 
 LEAST_FREE = 0.1
 
@@ -172,7 +172,7 @@ class RolloutPlanner(PlannerBase):
         if self._names != team.vehicles:
             if self._kept is not None:
                 self._kept = with_team(self._kept, self._names, team.vehicles)
-            # On a detour a vehicle is away for a while only: new sweeps may compete, with the usual effort.
+            # On an errand a vehicle is away for a while only: new sweeps may compete, with the usual effort.
             away = team.targets is not None or team.localization is not None
             self._names, self._planned = team.vehicles, BACK_SOON if away and self._planned else 0
         if self._free is None or not _same(self._free[0], team.constraints):
@@ -215,7 +215,7 @@ class RolloutPlanner(PlannerBase):
         return Proposal(positions, -best.score, terms)
 
     def _decide_apart(self, team: Situation, seed: int) -> Proposal:
-        """Decide where no links are needed: a route for each vehicle, those on detours included."""
+        """Decide where no links are needed: a route for each vehicle, those on errands included."""
         whole = team if self._whole is None else self._whole
         belief, sounded = team.belief, team.belief.sounded_m
         bottom = Bottom.from_landmarks(

@@ -9,10 +9,10 @@ import numpy as np
 import rasterio
 from rasterio.crs import CRS
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.geotiff import north_up_transform
 from app.mapping.types import BathymetricMap
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 NODATA = 1_000_000.0
 """What the format prescribes for cells without a value."""

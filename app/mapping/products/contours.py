@@ -9,7 +9,7 @@ import numpy as np
 from contourpy import LineType, contour_generator
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.types import BathymetricMap
 
 MAX_LEVELS = 500

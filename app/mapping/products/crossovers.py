@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.csv_cells import text_cell
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.quality.agreement import within
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, max_tvu_m

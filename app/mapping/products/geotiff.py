@@ -7,10 +7,10 @@ from affine import Affine
 from rasterio.crs import CRS
 from rasterio.io import MemoryFile
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import Layer
 from app.mapping.types import BathymetricMap
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 NODATA = -9999.0
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import orjson
 
-from app.mapping.georeference import LocalFrame
-from app.mapping.outlines import geographic_rings, outlines
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.outlines import geographic_rings, outlines
 from app.mapping.swath.holidays import Holiday
 
 

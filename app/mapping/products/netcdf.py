@@ -7,10 +7,10 @@ from datetime import datetime
 import numpy as np
 from netCDF4 import Dataset
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import INTERPOLATED, PRIOR, SOUNDED, Layer
 from app.mapping.types import BathymetricMap
-from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 
 _ONE_AT_A_TIME = threading.Lock()
 """The library underneath is not safe for several threads."""

@@ -11,11 +11,11 @@ import numpy as np
 import pyproj
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.utm import UtmCells, utm_cells
 from app.mapping.products.tracks import utc_text
 from app.mapping.types import BathymetricMap, Grid
-from app.mapping.utm import UtmCells, utm_cells
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 PRODUCT = "INT.IHO.S-102.3.0.0"
 FILL, NO_RECORD = 1_000_000.0, 0

@@ -5,7 +5,7 @@ import io
 import numpy as np
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.types import BathymetricMap, Soundings
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.arrays import BoolArray, IntArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.bag import NODATA, bag
 from app.mapping.tiers import coarsened, doublings
 from app.mapping.types import BathymetricMap
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 REFINED_CELLS = 32
 """Finest cells along a side of a coarse one, which is refined as a whole, unless the deepest tier asks for more."""

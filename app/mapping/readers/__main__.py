@@ -1,4 +1,4 @@
-"""Reads one file, locked in; see ``app.missions.operations.reading`` for the other side.
+"""Reads one file, locked in; see ``app.missions.operations.imports.reading`` for the other side.
 
 The file is standard input. Arguments: the task as JSON, and the number of the open file for the values found. What was
 found is said as JSON on standard output, in one line. Exit code 3: the file cannot be used, and why; 4: this system

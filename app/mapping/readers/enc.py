@@ -17,7 +17,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.types import MAX_CORNERS, MAX_SOUNDINGS, MAX_ZONES, MapExtent, Points, ReadError
 from app.mapping.s44 import NORMAL_95
 

@@ -5,7 +5,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings
 from app.mapping.readers.types import MapExtent, ReadOptions

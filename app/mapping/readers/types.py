@@ -9,7 +9,7 @@ from affine import Affine
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.types import Grid
 
 MAX_SOUNDINGS = 2_000_000

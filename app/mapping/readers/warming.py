@@ -14,7 +14,7 @@ import rasterio
 from affine import Affine
 from netCDF4 import Dataset
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.endings import ENC, GSF, KMALL, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_reference, place_soundings

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.types import BathymetricMap, Grid
 
 FINEST = 8

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray, IntArray
-from app.mapping.georeference import LocalFrame
-from app.mapping.sound_speed import SoundSpeedProfile
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.water.sound_speed import SoundSpeedProfile
 
 BeamArray = NDArray[np.float32]
 

@@ -20,10 +20,10 @@ from app.missions.alarms.raised import AlarmBoard, alarm_view, make_alarm
 from app.missions.alarms.ways import DeliveryError, Ways
 from app.missions.errors import AlarmNotFoundError, InvalidRequestError
 from app.missions.views.alarms import AlarmReport, AlarmState, DeliveryState, DeliveryView, Notice
-from app.storage import alarms as alarm_queries
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
 from app.storage.models import AlarmDeliveryRow, AlarmRow
-from app.storage.uncancellable import to_the_end
+from app.storage.queries import alarms as alarm_queries
 
 PERIOD_S = 1.0
 """How often is looked for what another process did, and for what is due."""

@@ -16,8 +16,8 @@ from app.missions.alarms import routes
 from app.missions.alarms.message import Message
 from app.missions.alarms.raised import alarm_view
 from app.missions.views.alarms import DeliveryState, Notice
-from app.storage import alarms as alarm_queries
 from app.storage.models import AlarmDeliveryRow, AlarmRow, MissionRow
+from app.storage.queries import alarms as alarm_queries
 
 AT_ONCE = 200
 """Alarms that are planned in one transaction, and deliveries that are looked at to be taken."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from imc_bridge.control.layers import ALONE, DepthLayer
-from simulator.obstacles import ObstacleWorld
+from simulator.obstacles.obstacles import ObstacleWorld
 
 
 class LinkState(StrEnum):

@@ -2,6 +2,6 @@
 
 In come the mission in memory and the hub; out go committed decisions and orders. ``runner`` takes a mission up and
 flies it: ``own_legs`` where vehicles fly on their own time, ``team_steps`` where they have to stay together. Both
-decide with ``deciding``, write down with ``commit`` and send with ``dispatch``. Others use ``runner.Runner``, and
-``decision.decide`` for flights that are only foretold.
+decide as ``decisions`` says, write down and send ``legs``, and look out as ``observation`` and ``way_home`` say. Others
+use ``runner.Runner``, and ``decisions.decision.decide`` for flights that are only foretold.
 """

@@ -20,8 +20,8 @@ from app.exploration.lines.flown_lines import flown_lines, length_m, line_now
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.clock import now
 from app.missions.errors import ConflictError
-from app.missions.flight.dispatch import Dispatch
-from app.missions.flight.range_left import RangeLeft
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.range_left import RangeLeft
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
 from app.missions.spec.orders import OPEN, OrderKind, OrderState
@@ -29,8 +29,8 @@ from app.missions.states import ENDED, MissionState
 from app.missions.team import Member, OperatorOrder
 from app.missions.views.mission import Level
 from app.missions.views.orders import OrderView
-from app.storage import orders as order_queries
 from app.storage.models import VehicleOrderRow
+from app.storage.queries import orders as order_queries
 
 LEGS_SEEN = 400
 """So many of a vehicle's last legs are looked at for its lines."""

@@ -13,16 +13,16 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.planners import COVERERS
-from app.missions.flight.commit import LegCommit
-from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decision import Decision, Leg, Place, planned_way_m
-from app.missions.flight.dispatch import Dispatch
-from app.missions.flight.exchange import LegExchange
+from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
+from app.missions.flight.decisions.decision import Decision, Leg, Place, planned_way_m
+from app.missions.flight.decisions.separation import too_close, ways_aside
+from app.missions.flight.decisions.step_maps import StepMaps
+from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.exchange import LegExchange
+from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
-from app.missions.flight.range_left import RangeLeft
-from app.missions.flight.separation import too_close, ways_aside
-from app.missions.flight.step_maps import StepMaps
-from app.missions.flight.waiting import Waiting
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
 from app.missions.team import Member

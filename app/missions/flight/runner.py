@@ -16,31 +16,31 @@ from app.exploration.planner.ordered import OrderedPlanner
 from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
-from app.missions.flight.commit import LegCommit, committed_leg
-from app.missions.flight.deciding import Decider
-from app.missions.flight.decision import make_constraints, make_planner
-from app.missions.flight.dispatch import Dispatch
-from app.missions.flight.elapsed_time import keep_time, save_elapsed
-from app.missions.flight.engagement import Engagement
-from app.missions.flight.failsafe_watch import FailsafeWatch
-from app.missions.flight.onboard_way import OnboardWays
+from app.missions.flight.decisions.deciding import Decider
+from app.missions.flight.decisions.decision import make_constraints, make_planner
+from app.missions.flight.decisions.step_maps import StepMaps
+from app.missions.flight.legs.commit import LegCommit, committed_leg
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
+from app.missions.flight.observation.engagement import Engagement
+from app.missions.flight.observation.telemetry_sampler import keep_telemetry
+from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import Flight, OrderBook
 from app.missions.flight.own_legs import OwnLegs
-from app.missions.flight.range_left import RangeLeft
 from app.missions.flight.search_hooks import SearchHooks
-from app.missions.flight.step_maps import StepMaps
 from app.missions.flight.team_steps import TeamSteps
-from app.missions.flight.telemetry_sampler import keep_telemetry
-from app.missions.flight.waiting import Waiting
-from app.missions.flight.withdrawals import Withdrawals
+from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
+from app.missions.flight.way_home.onboard_way import OnboardWays
+from app.missions.flight.way_home.withdrawals import Withdrawals
 from app.missions.flown import Phase
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
 from app.missions.spec.recovery import Homecoming
 from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
-from app.storage import missions as mission_queries
-from app.storage.uncancellable import to_the_end
+from app.storage.concurrency.uncancellable import to_the_end
+from app.storage.queries import missions as mission_queries
 
 
 class Runner:

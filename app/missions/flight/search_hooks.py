@@ -7,7 +7,7 @@ import numpy as np
 
 from app.exploration.site_search import SearchTask
 from app.missions.alarm_kinds import AlarmKind
-from app.missions.flight.decision import Decision
+from app.missions.flight.decisions.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.search.course import IDLE_STEPS, REST_S, Course
 from app.missions.team import Member

@@ -8,14 +8,14 @@ import asyncio
 import numpy as np
 
 from app.missions.fleet.interface import WaypointStatus
-from app.missions.flight.commit import LegCommit
-from app.missions.flight.deciding import DECIDE_AGAIN_S, Decider, place_ahead, place_of
-from app.missions.flight.decision import Decision, Place
-from app.missions.flight.dispatch import Dispatch
+from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, place_ahead, place_of
+from app.missions.flight.decisions.decision import Decision, Place
+from app.missions.flight.decisions.step_maps import StepMaps
+from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.stragglers import missed, step_allowed_s, tell_of
+from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.search_hooks import SearchHooks
-from app.missions.flight.step_maps import StepMaps
-from app.missions.flight.stragglers import missed, step_allowed_s, tell_of
-from app.missions.flight.waiting import Waiting
 from app.missions.live.mission import LiveMission
 from app.missions.team import Member
 

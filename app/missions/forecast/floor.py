@@ -8,12 +8,12 @@ from scipy.ndimage import distance_transform_edt
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
-from app.mapping.fusion import prior_map
+from app.mapping.gaussian_process.fusion import prior_map
 from app.mapping.types import Soundings
 from app.missions.maps.builder import make_grid
 from app.missions.spec.mission import MissionSpec
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 LEAST_GUESS_M = 10.0
 ROOM_M = 3.0

@@ -27,8 +27,7 @@ from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 from app.mapping.types import Grid
 from app.missions import safety
-from app.missions.flight.commit import home_of
-from app.missions.flight.decision import (
+from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
     make_constraints,
@@ -37,6 +36,7 @@ from app.missions.flight.decision import (
     turn_radius_m,
     without_zones,
 )
+from app.missions.flight.legs.commit import home_of
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
 from app.missions.forecast.simulate import fly
 from app.missions.forecast.swarm import Swarm
@@ -47,7 +47,7 @@ from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
 from app.missions.spec.mission import MissionSpec, PlannerSpec
 from app.missions.team import Member
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 WEIGHING = (CaoPlanner.name, RolloutPlanner.name)
 """Planners that compare many ways of laying lines before their first step."""

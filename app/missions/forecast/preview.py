@@ -11,7 +11,7 @@ from pydantic import Field
 
 from app.arrays import FloatArray
 from app.estimation import SingleBeam
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.compilation import Compilation
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.hub import FleetHub

@@ -15,7 +15,7 @@ from app.compute.compute import Compute
 from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
-from app.missions.flight.decision import make_constraints
+from app.missions.flight.decisions.decision import make_constraints
 from app.missions.forecast.ranges import ForecastRange
 from app.missions.forecast.simulate import Forecast, floors_under, fly_over, forecast
 from app.missions.forecast.swath_flight import sweeps
@@ -26,7 +26,7 @@ from app.missions.running.team_changes import refuse_ended
 from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.team import Member, Team
 from app.missions.views.base import View
-from app.storage import soundings as sounding_queries
+from app.storage.queries import soundings as sounding_queries
 
 NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"
 

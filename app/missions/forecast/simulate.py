@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.flight.decision import Knowledge, decide, make_constraints, make_planner
+from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints, make_planner
 from app.missions.flight.own_legs import LEAST_WAY_M
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.forecast.swarm import Flown, StepFlown, Swarm
@@ -21,7 +21,7 @@ from app.missions.forecast.swath_flight import sweep_over, sweeps
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec, Sensor
 from app.missions.team import Member
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 MAPS = 12
 LEARN_AT = (1, 4, 12)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
-from app.missions.flight.commit import STILL_M
-from app.missions.flight.decision import Place, planned_way_m, turn_radius_m
+from app.missions.flight.decisions.decision import Place, planned_way_m, turn_radius_m
+from app.missions.flight.legs.commit import STILL_M
 from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member

@@ -17,14 +17,21 @@ from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.motion.dubins import TURN, Way, poses_along
 from app.exploration.planners import COVERERS
-from app.missions.flight.decision import Knowledge, decide, make_constraints, make_planner, swath_sonar, swath_task
+from app.missions.flight.decisions.decision import (
+    Knowledge,
+    decide,
+    make_constraints,
+    make_planner,
+    swath_sonar,
+    swath_task,
+)
 from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.swarm import Flown, Swarm, WholeSurvey
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 MOST_CELLS = 20_000
 """Cells of such a forecast at most."""

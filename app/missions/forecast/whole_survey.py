@@ -8,7 +8,7 @@ from pydantic import Field
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.missions.flight.commit import home_of
+from app.missions.flight.legs.commit import home_of
 from app.missions.forecast.ranges import HIGH, LOW, ForecastRange
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s

@@ -5,11 +5,11 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 
-from app.mapping.tides import parse_tid
+from app.mapping.water.tides import parse_tid
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flown import Flown
-from app.missions.live.journal import Counts
+from app.missions.live.journals.journal import Counts
 from app.missions.live.mission import RISES, LiveMission, StoredMission, builder_of
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
@@ -18,15 +18,15 @@ from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.states import ENDED
 from app.missions.targets.filters import warm_up as tracking_warm_up
 from app.missions.team import Withdrawal
-from app.storage import events as event_queries
-from app.storage import missions as mission_queries
-from app.storage import scans as scan_queries
-from app.storage import soundings as sounding_queries
-from app.storage import stored_maps
-from app.storage import telemetry as telemetry_queries
 from app.storage.database import Database
 from app.storage.models import AdjustmentRow, MissionRow, PositionRow, TideTableRow
 from app.storage.ping_files import PingFiles
+from app.storage.queries import events as event_queries
+from app.storage.queries import missions as mission_queries
+from app.storage.queries import scans as scan_queries
+from app.storage.queries import soundings as sounding_queries
+from app.storage.queries import stored_maps
+from app.storage.queries import telemetry as telemetry_queries
 
 
 async def take_up(

@@ -16,9 +16,9 @@ from shapely.geometry import Polygon
 from app.arrays import FloatArray
 from app.compute.compute import Compute
 from app.estimation import Sensor, SingleBeam
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
-from app.mapping.tides import TideTable
+from app.mapping.water.tides import TideTable
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
@@ -37,17 +37,17 @@ from app.missions.fleet.interface import (
 )
 from app.missions.flown import Phase
 from app.missions.live.boundaries import Boundaries
-from app.missions.live.broadcast import Broadcaster
-from app.missions.live.feed import LiveFeed
-from app.missions.live.journal import Counts, Journal
-from app.missions.live.range_journal import RangeJournal
+from app.missions.live.journals.journal import Counts, Journal
+from app.missions.live.journals.range_journal import RangeJournal
+from app.missions.live.journals.swath_intake import SwathIntake
 from app.missions.live.remaining import remaining
 from app.missions.live.ships import ShipsAbout
 from app.missions.live.sounding_store import SoundingStore
-from app.missions.live.swath_intake import SwathIntake
 from app.missions.live.trails import Trails
-from app.missions.live.vehicles import VehicleViews, local_place
-from app.missions.live.waypoints import WaypointViews
+from app.missions.live.watchers.broadcast import Broadcaster
+from app.missions.live.watchers.feed import LiveFeed
+from app.missions.live.watchers.vehicles import VehicleViews, local_place
+from app.missions.live.watchers.waypoints import WaypointViews
 from app.missions.maps.builder import HEAVY, BuiltMap, MapBuilder
 from app.missions.maps.live_grid import map_of
 from app.missions.maps.snapshot import NOT_MADE, MapSnapshot, MissionFacts
@@ -73,12 +73,12 @@ from app.missions.views.messages import StateMessage
 from app.missions.views.mission import Level, MissionSummary, Progress
 from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
-from app.storage import events as event_queries
-from app.storage import soundings as sounding_queries
+from app.storage.concurrency.single_flight import Shared
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
-from app.storage.single_flight import Shared
+from app.storage.queries import events as event_queries
+from app.storage.queries import soundings as sounding_queries
 
 LONGEST_GAP_S = 60.0
 """What a vehicle flew in a longer silence is not known."""

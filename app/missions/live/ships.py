@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member, Team

@@ -9,17 +9,17 @@ import structlog
 from app.arrays import BoolArray, FloatArray
 from app.mapping.types import SoundingRows
 from app.missions.clock import now
-from app.missions.live.journal import Journal
+from app.missions.live.journals.journal import Journal
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.codec import pack, unpack
 from app.missions.maps.queue import Replacement
 from app.missions.maps.table import SoundingTable
-from app.storage import soundings as sounding_queries
-from app.storage import stored_maps
 from app.storage.bulk import read_numbers
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
-from app.storage.stored_maps import Stored
-from app.storage.uncancellable import to_the_end
+from app.storage.queries import soundings as sounding_queries
+from app.storage.queries import stored_maps
+from app.storage.queries.stored_maps import Stored
 
 WORTH_KEEPING = 20_000
 """While a mission runs its map is stored from so many soundings on: of fewer it is made anew in a moment."""

@@ -9,10 +9,10 @@ import shapely
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray
-from app.missions.live.journal import METRES_PER_DEGREE
-from app.storage import missions as mission_queries
+from app.missions.live.journals.journal import METRES_PER_DEGREE
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
+from app.storage.queries import missions as mission_queries
 
 TOLERANCE_M = 0.2
 """What is left out lies so near to what is drawn; vehicles know where they are less well than that."""

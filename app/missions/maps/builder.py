@@ -15,9 +15,9 @@ from app.arrays import BoolArray, FloatArray
 from app.estimation.uncertainty import SoundingErrors
 from app.exploration.core.coverage import Coverage
 from app.exploration.core.problem import Belief
-from app.mapping.fusion import fuse, prior_map
-from app.mapping.gp import GaussianProcessMap
-from app.mapping.surveys import judged, mapped
+from app.mapping.gaussian_process.fusion import fuse, prior_map
+from app.mapping.gaussian_process.gp import GaussianProcessMap
+from app.mapping.gaussian_process.surveys import judged, mapped
 from app.mapping.swath.ensonified import Ensonified, ensonified
 from app.mapping.swath.gridded import is_of_swaths, without_guesses
 from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings

@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from app.arrays import FloatArray
+from app.mapping.coordinates.map_windows import geographic_bounds
 from app.mapping.layers import ACCURATE, LAYERS, SOUNDED, VISIBLE
-from app.mapping.map_windows import geographic_bounds
-from app.mapping.products.tile_pictures import Pixels, coarser, coarser_grid, paint, paint_classes, shade
+from app.mapping.products.pictures.tile_pictures import Pixels, coarser, coarser_grid, paint, paint_classes, shade
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.types import Grid
 from app.missions.maps.snapshot import MapSnapshot

@@ -20,8 +20,8 @@ from app.mapping.products.geotiff import geotiff
 from app.mapping.products.holidays import holidays_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
 from app.mapping.products.netcdf import netcdf
-from app.mapping.products.overlay import overlay_png
-from app.mapping.products.picture import picture_png
+from app.mapping.products.pictures.overlay import overlay_png
+from app.mapping.products.pictures.picture import picture_png
 from app.mapping.products.s102 import SurveyFacts, file_name, s102
 from app.mapping.products.text import map_xyz, soundings_xyz
 from app.mapping.products.tracks import Track, tracks_geojson, tracks_gpx
@@ -35,7 +35,7 @@ from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
-from app.missions.views.soundings import Verdict
+from app.missions.views.measurements.soundings import Verdict
 from app.storage.models import SoundingRow
 
 MAP, SOUNDINGS, ACCEPTED, LINES, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import Fit, Layer
 from app.mapping.products.geotiff import geotiff
-from app.mapping.products.overlay import overlay_corners, overlay_png
-from app.mapping.products.picture import picture_png
+from app.mapping.products.pictures.overlay import overlay_corners, overlay_png
+from app.mapping.products.pictures.picture import picture_png
 from app.mapping.products.text import map_xyz
 from app.mapping.sites import Change, SiteModel, Survey, Volume
 from app.mapping.types import BathymetricMap, Grid
-from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.errors import MapNotReadyError
 from app.missions.maps.products import CSV, Product, slug
-from app.missions.views.sites import ChangesView, SiteMapView, SurveyName, VolumeView
+from app.missions.views.maps.sites import ChangesView, SiteMapView, SurveyName, VolumeView
 from imc_bridge.printable import printable
 
 DAY_S = 86_400.0

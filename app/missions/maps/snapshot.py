@@ -8,16 +8,16 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.compare import difference
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import Layer, LayerSource
-from app.mapping.products.overlay import overlay_corners
+from app.mapping.products.pictures.overlay import overlay_corners
 from app.mapping.s44 import Order, conformity
 from app.mapping.swath.ensonified import Ensonified, ensonified
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 from app.missions.maps.builder import BuiltMap
 from app.missions.maps.live_grid import LiveCells, LiveGrid
 from app.missions.spec.mission import MissionSpec
-from app.missions.views.map import ConformityView, DifferenceView, MapView, QualityView
+from app.missions.views.maps.map import ConformityView, DifferenceView, MapView, QualityView
 from imc_bridge.printable import printable
 
 NOT_MADE = 0

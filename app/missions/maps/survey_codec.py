@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.sites import Survey
 from app.mapping.types import Grid
 

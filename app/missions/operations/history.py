@@ -3,20 +3,20 @@
 from collections.abc import Sequence
 
 from app.missions.errors import TargetNotFoundError
-from app.missions.live.journal import event_view
+from app.missions.live.journals.journal import event_view
 from app.missions.live.mission import LiveMission
 from app.missions.maps.sounding_lines import COLUMNS, SoundingLines
+from app.missions.views.measurements.soundings import Verdict
 from app.missions.views.mission import EventView, Level, StepView, WaypointView
-from app.missions.views.soundings import Verdict
 from app.missions.views.targets import TargetRangePage, TargetRangeView
 from app.missions.views.telemetry import TelemetryView, telemetry_view
-from app.storage import events as event_queries
-from app.storage import missions as mission_queries
-from app.storage import soundings as sounding_queries
-from app.storage import target_ranges as range_queries
-from app.storage import telemetry as telemetry_queries
 from app.storage.bulk import read_in_pieces
 from app.storage.models import SoundingRow
+from app.storage.queries import events as event_queries
+from app.storage.queries import missions as mission_queries
+from app.storage.queries import soundings as sounding_queries
+from app.storage.queries import target_ranges as range_queries
+from app.storage.queries import telemetry as telemetry_queries
 
 
 async def steps_after(live: LiveMission, after: int = 0, limit: int = 1000) -> list[StepView]:

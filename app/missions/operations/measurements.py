@@ -12,7 +12,7 @@ import numpy as np
 import orjson
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import BeamGeometry, PingReport, Position, RangeReport, SoundingReport, VehicleReport
@@ -23,11 +23,11 @@ from app.missions.soundings.measurement import Measurement
 from app.missions.spec.mission import Sensor
 from app.missions.states import MissionState
 from app.missions.targets.filters import Arrived
-from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
-from app.storage import soundings as sounding_queries
-from app.storage.group_commit import Grouped
+from app.missions.views.measurements.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
+from app.storage.concurrency.group_commit import Grouped
 from app.storage.models import BatchRow
-from app.storage.soundings import LOG_KEY
+from app.storage.queries import soundings as sounding_queries
+from app.storage.queries.soundings import LOG_KEY
 from imc_bridge.telemetry.soundings import Beam, StateSample, footprint
 
 MAX_BATCH = 10_000

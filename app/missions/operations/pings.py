@@ -2,7 +2,7 @@
 
 from app.missions.errors import PingsNotFoundError
 from app.missions.live.mission import LiveMission
-from app.missions.views.pings import PingPartView, PingsView
+from app.missions.views.measurements.pings import PingPartView, PingsView
 
 
 async def pings_of(live: LiveMission) -> PingsView:

@@ -33,15 +33,15 @@ from app.missions.maps.products import (
 )
 from app.missions.maps.snapshot import MapSnapshot, quality_of
 from app.missions.maps.sounding_lines import SoundingLines
-from app.missions.operations.adjustment import adjustment_view
-from app.missions.operations.crossovers import FoundCheck, check_of, crossovers_view
+from app.missions.operations.corrections.adjustment import adjustment_view
+from app.missions.operations.corrections.crossovers import FoundCheck, check_of, crossovers_view
+from app.missions.operations.corrections.recorrection import corrections_view
+from app.missions.operations.corrections.review import soundings_page
+from app.missions.operations.corrections.uncertainty_budget import budget_from, travel_depth_m
 from app.missions.operations.history import sounding_lines
-from app.missions.operations.imports import imports_of, reference_of
-from app.missions.operations.mission_maps import newest_map, surveyed, track_lines
+from app.missions.operations.imports.imports import imports_of, reference_of
+from app.missions.operations.maps.mission_maps import newest_map, surveyed, track_lines
 from app.missions.operations.pings import pings_of
-from app.missions.operations.recorrection import corrections_view
-from app.missions.operations.review import soundings_page
-from app.missions.operations.uncertainty_budget import budget_from, travel_depth_m
 from app.missions.report.answers import Answers, Incident
 from app.missions.report.kinds import ReportKind
 from app.missions.report.sections import document_of
@@ -51,11 +51,11 @@ from app.missions.running.mission_views import mission_view
 from app.missions.settings import ProviderSettings
 from app.missions.states import AT_SEA
 from app.missions.views.base import View
+from app.missions.views.measurements.soundings import SoundingState
 from app.missions.views.mission import Level
-from app.missions.views.soundings import SoundingState
-from app.storage import events as event_queries
-from app.storage import soundings as sounding_queries
-from app.storage.single_flight import Shared
+from app.storage.concurrency.single_flight import Shared
+from app.storage.queries import events as event_queries
+from app.storage.queries import soundings as sounding_queries
 
 SUMMED = ("tif", "soundings.csv", "tracks.geojson", "crossovers.csv", "holidays.geojson")
 """Files whose checksums stand in reports: those that are quickly made, and the same each time they are."""

@@ -10,8 +10,8 @@ from app.missions.search.progress import grid_view
 from app.missions.search.scan_schema import Scan
 from app.missions.search.state import Search
 from app.missions.states import MissionState
+from app.missions.views.measurements.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 from app.missions.views.search import SearchGridView
-from app.missions.views.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 
 MAX_SCANS = 1000
 SCANS_AT_ONCE = 20

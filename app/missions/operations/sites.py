@@ -17,7 +17,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.arrays import FloatArray
 from app.mapping.sites import SiteFusion, Survey, compare, resample
 from app.mapping.types import SoundingRows
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 from app.missions.clock import now
 from app.missions.errors import (
     ConflictError,
@@ -31,17 +31,17 @@ from app.missions.live.mission import LiveMission
 from app.missions.maps.builder import make_grid
 from app.missions.maps.site_maps import SiteChange, SiteFacts, SiteMap, Surveyed, moment
 from app.missions.maps.survey_codec import unpack_survey
-from app.missions.operations.imports import Imports
+from app.missions.operations.imports.imports import Imports
 from app.missions.running.final_maps import FinalMaps
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.site import SiteChanges, SiteSpec, in_frame
 from app.missions.states import AT_SEA, ENDED
+from app.missions.views.maps.sites import SiteView, SurveyView
 from app.missions.views.mission import Level
-from app.missions.views.sites import SiteView, SurveyView
-from app.storage import sites as site_queries
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
 from app.storage.models import MissionRow, SiteRow, SiteSurveyRow
-from app.storage.uncancellable import to_the_end
+from app.storage.queries import sites as site_queries
 
 MOST_REMEMBERED_CELLS = 8_000_000
 """Of the models that are kept in memory."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import PingReport
 from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, impossible_place, not_finite
 

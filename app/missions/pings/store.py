@@ -22,13 +22,13 @@ from app.missions.large_batches import made_of
 from app.missions.pings.chunk_file import Block, read_chunk, write_chunk
 from app.missions.pings.codec import JudgedPings, columns_of, joined, pack, unpack
 from app.missions.pings.gate import PingGate, storable
-from app.missions.views.soundings import ItemVerdict, Verdict
-from app.storage import pings as ping_queries
+from app.missions.views.measurements.soundings import ItemVerdict, Verdict
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
 from app.storage.models import PingBlockRow, PingChunkRow
 from app.storage.ping_files import PingFileError, PingFiles, file_name
-from app.storage.pings import Totals
-from app.storage.uncancellable import to_the_end
+from app.storage.queries import pings as ping_queries
+from app.storage.queries.pings import Totals
 
 BEAMS_PER_ITEM = 20
 """So many beams are as much work as an item without."""

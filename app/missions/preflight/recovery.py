@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.missions.flight.commit import home_of
-from app.missions.flight.decision import make_constraints
+from app.missions.flight.decisions.decision import make_constraints
+from app.missions.flight.legs.commit import home_of
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import berth_spacing_m, farthest_m
 from app.missions.recovery.failsafes import with_reserve_s

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.exploration.site_search.ground import UNREACHED, Ground
 from app.missions.live.mission import LiveMission
-from app.missions.live.vehicles import local_place
+from app.missions.live.watchers.vehicles import local_place
 from app.missions.search.course import FIRST_PACE
 from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec

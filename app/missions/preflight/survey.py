@@ -10,7 +10,7 @@ from shapely.ops import unary_union
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState
 from app.missions.live.mission import LiveMission
-from app.missions.live.vehicles import local_place
+from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks

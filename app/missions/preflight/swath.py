@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from app.exploration.planners import COVERERS
-from app.missions.flight.decision import swath_sonar
+from app.missions.flight.decisions.decision import swath_sonar
 from app.missions.live.mission import LiveMission
 from app.missions.views.mission import CheckStatus, CheckView
 

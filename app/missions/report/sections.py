@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from app.mapping.layers import LAYERS, Fit, Layer, LayerKind
-from app.mapping.products.colours import depth_range
 from app.mapping.products.contours import usual_interval_m
-from app.mapping.products.hillshade import exaggeration, hillshade
-from app.mapping.products.sheet import Sheet, sheet_png
+from app.mapping.products.pictures.colours import depth_range
+from app.mapping.products.pictures.hillshade import exaggeration, hillshade
+from app.mapping.products.pictures.sheet import Sheet, sheet_png
 from app.missions.report.answers import Answers
 from app.missions.report.charts import by_angle, histogram, overview
 from app.missions.report.document import (

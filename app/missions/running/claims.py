@@ -12,9 +12,9 @@ from app.missions.live.mission import LiveMission
 from app.missions.search.site import simulated_world
 from app.missions.spec.mission import VehicleSpec
 from app.missions.states import AT_SEA
-from app.storage import processes
 from app.storage.database import Guard
-from simulator.obstacles import ObstacleWorld
+from app.storage.processes import processes
+from simulator.obstacles.obstacles import ObstacleWorld
 
 
 def free_elsewhere(live: LiveMission, vehicles: Sequence[VehicleSpec] | None = None) -> Guard:

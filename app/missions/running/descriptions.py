@@ -10,7 +10,7 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from app.missions.views.mission import Level
 from app.storage.models import ImportRow, MissionRow, MissionVehicleRow, ReferenceRow, TideTableRow
-from app.storage.sites import set_site
+from app.storage.queries.sites import set_site
 
 UNBEGUN = (MissionState.DRAFT, MissionState.READY)
 

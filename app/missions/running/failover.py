@@ -18,10 +18,10 @@ from app.missions.running.supervisor import MissionSupervisor
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.states import AT_SEA, MissionState
 from app.missions.views.mission import Level
-from app.storage import missions as mission_queries
 from app.storage.database import Database
-from app.storage.membership import MembershipLostError
 from app.storage.models import MissionRow
+from app.storage.processes.membership import MembershipLostError
+from app.storage.queries import missions as mission_queries
 
 log = structlog.get_logger(__name__)
 

@@ -9,7 +9,7 @@ from app.missions.spec.recovery import Homecoming
 from app.missions.states import AT_SEA, Action, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
-from app.storage import missions as mission_queries
+from app.storage.queries import missions as mission_queries
 
 
 def returns(live: LiveMission, action: Action, asked: bool | None) -> bool:

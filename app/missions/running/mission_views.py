@@ -8,13 +8,13 @@ from app import __version__
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import COVERERS, INSTALLED, PLANNERS
 from app.missions.fleet.interface import StopReceipt, VehicleInfo
-from app.missions.live.broadcast import Subscription
 from app.missions.live.mission import LiveMission
+from app.missions.live.watchers.broadcast import Subscription
 from app.missions.running.supervisor import receipt
 from app.missions.spec.mission import VehicleKind
 from app.missions.views.messages import LiveMessage, SnapshotMessage
 from app.missions.views.mission import ActionView, MissionView, PlannerView, StopView, VehicleView
-from app.storage import events as event_queries
+from app.storage.queries import events as event_queries
 
 
 def mission_view(live: LiveMission) -> MissionView:

@@ -16,10 +16,10 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.missions.clock import now
 from app.missions.errors import MissionElsewhereError
 from app.missions.states import AT_SEA
-from app.storage import processes
 from app.storage.database import Database, Guard
-from app.storage.membership import MembershipLostError, make_membership
 from app.storage.models import ProcessRow
+from app.storage.processes import processes
+from app.storage.processes.membership import MembershipLostError, make_membership
 
 PERIOD_S = 1.0
 """How often is looked whether other processes ended."""

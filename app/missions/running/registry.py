@@ -19,10 +19,10 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.states import AT_SEA, ENDED
 from app.missions.traffic.watch import Traffic
 from app.missions.views.mission import MissionSummary
-from app.storage import sites as site_queries
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
+from app.storage.queries import sites as site_queries
 
 ENDED_MISSIONS_IN_MEMORY = 8
 

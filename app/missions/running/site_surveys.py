@@ -10,10 +10,10 @@ from app.missions.clock import now
 from app.missions.live.mission import LiveMission
 from app.missions.maps.survey_codec import pack_survey
 from app.missions.states import ENDED
-from app.storage import pings as ping_queries
-from app.storage import sites as site_queries
-from app.storage import soundings as sounding_queries
-from app.storage.uncancellable import to_the_end
+from app.storage.concurrency.uncancellable import to_the_end
+from app.storage.queries import pings as ping_queries
+from app.storage.queries import sites as site_queries
+from app.storage.queries import soundings as sounding_queries
 
 
 def belongs_to_a_site(live: LiveMission) -> bool:

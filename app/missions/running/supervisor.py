@@ -15,16 +15,16 @@ from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
 from app.missions.flight.runner import Runner
-from app.missions.live.journal import ENDS, add_lines
+from app.missions.live.journals.journal import ENDS, add_lines
 from app.missions.live.mission import Ending, LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.final_maps import FinalMaps
 from app.missions.states import ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
-from app.storage import missions as mission_queries
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Guard
-from app.storage.uncancellable import to_the_end
+from app.storage.queries import missions as mission_queries
 
 PATIENCE_S = 0.5
 """How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""

@@ -16,8 +16,8 @@ from app.missions.spec.mission import VehicleSpec
 from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
-from app.storage import missions as mission_queries
 from app.storage.models import MissionVehicleRow
+from app.storage.queries import missions as mission_queries
 
 
 class TeamChanges:

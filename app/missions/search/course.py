@@ -8,7 +8,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.ground import Ground
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member

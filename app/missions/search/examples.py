@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely.geometry import Polygon, box
 
-from app.mapping.georeference import LocalFrame
-from app.mapping.outlines import outlines
-from simulator.car_parks import car_park, harbour_basin
-from simulator.obstacles import ObstacleWorld
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.outlines import outlines
+from simulator.obstacles.car_parks import car_park, harbour_basin
+from simulator.obstacles.obstacles import ObstacleWorld
 
 PLACE = (41.1848, -8.7062)
 """Latitude and longitude of the south-western corner."""

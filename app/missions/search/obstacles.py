@@ -3,8 +3,8 @@
 import orjson
 
 from app.estimation.occupancy import Cell
-from app.mapping.georeference import LocalFrame
-from app.mapping.outlines import geographic_rings, outlines
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.outlines import geographic_rings, outlines
 from app.missions.search.state import Search
 
 

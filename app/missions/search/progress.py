@@ -2,7 +2,7 @@
 
 import base64
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.search.state import Search
 from app.missions.team import Team
 from app.missions.views.search import SearchGridView, SearchProgress

@@ -8,9 +8,9 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, ScanReport
 from app.missions.search.state import Search
-from app.missions.views.soundings import ItemVerdict, Verdict
-from app.storage import scans as scan_queries
+from app.missions.views.measurements.soundings import ItemVerdict, Verdict
 from app.storage.models import ScanRow
+from app.storage.queries import scans as scan_queries
 
 
 async def take(

@@ -10,12 +10,12 @@ from shapely.geometry.base import BaseGeometry
 
 from app.arrays import BoolArray, FloatArray
 from app.estimation.occupancy import OccupancyGrid, Scanner
-from app.mapping.georeference import LocalFrame
-from app.mapping.outlines import touched
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.outlines import touched
 from app.missions.safety import widened
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.search import SearchSpec
-from simulator.obstacles import ObstacleWorld
+from simulator.obstacles.obstacles import ObstacleWorld
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from app.exploration.site_search import SearchTask
 from app.exploration.site_search.base import HOME_STEPS
 from app.exploration.site_search.criteria import in_contact
 from app.exploration.site_search.ground import Ground
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.interface import ScanReport
 from app.missions.search.site import Site, site_of

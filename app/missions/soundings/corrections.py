@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.mapping.georeference import LocalFrame
-from app.mapping.sound_speed import SoundSpeedProfile
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Footprints, Pings, placed
-from app.mapping.tides import TideTable
-from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.mapping.water.sound_speed import SoundSpeedProfile
+from app.mapping.water.tides import TideTable
+from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.fleet.interface import Position, SoundingReport
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide

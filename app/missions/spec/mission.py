@@ -17,9 +17,9 @@ from shapely.geometry.polygon import orient
 from app.estimation.uncertainty import SoundingErrors
 from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
-from app.mapping.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
+from app.mapping.water.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
 from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response

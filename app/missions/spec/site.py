@@ -8,7 +8,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.spec.base import Model, PolygonGeometry, cell_count
 
 MAX_SITE_CELLS = 4_000_000

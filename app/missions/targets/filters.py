@@ -1,7 +1,8 @@
 """The moving targets of one mission: ranges in, what is known of each out. Without a clock, a database or a link.
 
-Times are seconds of the service's own clock as vehicles count them; :mod:`app.missions.live.vehicle_times` makes them.
-The same ranges in the same order give the same filters, so that a restart takes them up exactly where they were.
+Times are seconds of the service's own clock as vehicles count them; :mod:`app.missions.live.journals.vehicle_times`
+makes them. The same ranges in the same order give the same filters, so that a restart takes them up exactly where they
+were.
 """
 
 import math
@@ -16,7 +17,7 @@ from app.estimation.sensors import RangeSensor
 from app.estimation.targets import TargetEstimator, TargetTrack, expected_range
 from app.exploration.core.dynamic import Targets
 from app.exploration.core.snapshot_codec import pack, unpack
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import RangeReport
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.targets import TargetSpec

@@ -8,7 +8,7 @@ from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation.targets import TargetTrack
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.targets.filters import TargetFilters, TargetKnowledge
 from app.missions.views.targets import EllipseView, TargetState, TargetView
 

@@ -7,7 +7,7 @@ import pytest
 from app.evaluation.adjust.run import AdjustJob
 from app.evaluation.adjust.world import DriftScenario, fly
 from app.evaluation.runs.summary import summarise
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 
 FLOOR = generate("rugged", 8, width_m=60.0, height_m=60.0)
 

@@ -12,7 +12,7 @@ from app.cli import app
 from app.estimation.swath import SwathSonar
 from app.evaluation.coverage.surveys import fly_dune_rows, fly_fixed, fly_from_edges, fly_ours
 from app.evaluation.coverage.world import CoverageScenario, Fleet, cell_by_depth_m, outcome
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 
 
 def inclined(shoal_m: float = 5.0, deep_m: float = 20.0, side: int = 90) -> Terrain:

@@ -10,8 +10,8 @@ from app.evaluation.explore.report import Report, markdown
 from app.evaluation.explore.setups import ReportSection, Setup, TableJob, jobs_of, run_key, sections
 from app.evaluation.explore.terrains import report_terrains
 from app.evaluation.runs.store import Results
-from simulator.seafloors import generate
-from simulator.terrain_files import save_npz
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain_files import save_npz
 
 QUICK = ("--seeds", "0:2", "--steps", "5", "--quick", "--only", "table1,planners")
 

@@ -9,8 +9,8 @@ from app.evaluation.explore.team_changes import TeamSchedule
 from app.evaluation.explore.world import CubeTerrain, ExploreScenario, World
 from app.exploration.core.constraints import inside_area
 from app.exploration.planner.options import PlannerOptions
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 NO_CHANGES = TeamSchedule()
 

@@ -8,8 +8,8 @@ from app.evaluation.explore.team_changes import TeamSchedule
 from app.evaluation.explore.teams import SILENT_AFTER, LimitedTeam, UnlimitedTeam
 from app.evaluation.explore.world import ExploreScenario, World
 from app.exploration.planner.options import PlannerOptions
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 
 @pytest.fixture(scope="module")

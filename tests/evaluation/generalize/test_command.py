@@ -13,7 +13,7 @@ from app.evaluation.generalize.site import site_of
 from app.evaluation.generalize.summary import figure_of, summary_of, worst_of
 from app.evaluation.generalize.tasks import TASKS
 from app.evaluation.runs.summary import first_step
-from simulator.unseen_floors import UNSEEN, unseen_floor
+from simulator.floors.unseen_floors import UNSEEN, unseen_floor
 
 
 def call(*arguments: str) -> Any:

@@ -11,11 +11,11 @@ import pytest
 from distributed import LocalCluster
 
 from app.evaluation.pcao.experiments import FlightJob
-from app.evaluation.pcao.scoring import DaskScorer, LocalScorer
-from app.evaluation.pcao.task import TrainingTask
+from app.evaluation.pcao.simulation.task import TrainingTask
+from app.evaluation.pcao.simulation.world import SeaFloor
 from app.evaluation.pcao.terrains import sea_floor
-from app.evaluation.pcao.training import Checkpoint, make_optimiser, train
-from app.evaluation.pcao.world import SeaFloor
+from app.evaluation.pcao.training.scoring import DaskScorer, LocalScorer
+from app.evaluation.pcao.training.training import Checkpoint, make_optimiser, train
 from app.evaluation.runs.cluster import Cluster, ClusterError
 from app.evaluation.runs.jobs import run_jobs
 from app.exploration.pcao.model import default_model

@@ -13,8 +13,8 @@ from app.evaluation.survey.run import best_even_survey, judge
 from app.evaluation.survey.world import SPEED_MPS, SurveyScenario
 from app.exploration.core.routes import Turns
 from app.exploration.planner.options import PlannerOptions
-from simulator.seafloors import generate
-from simulator.terrain_files import save_npz
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain_files import save_npz
 
 MINUTES = 1.5
 QUICK = PlannerOptions(search=50, candidates=16)

@@ -14,8 +14,8 @@ from app.evaluation.survey.flown import fly_lawnmower
 from app.evaluation.survey.run import best_even_survey, run_survey
 from app.evaluation.survey.world import SurveyScenario, along, default_map, fly_planner, rmse_m
 from app.exploration.planner.options import PlannerOptions
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 QUICK = PlannerOptions(search=40)
 

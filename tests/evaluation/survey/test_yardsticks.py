@@ -7,8 +7,8 @@ from app.evaluation.survey.oracle import oracle_soundings
 from app.evaluation.survey.symmetry import SYMMETRIES, turned, turned_soundings
 from app.evaluation.survey.world import SurveyScenario, default_map, rmse_m
 from app.mapping.types import Soundings
-from simulator.seafloors import generate
-from simulator.terrain import Terrain
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from app.evaluation.track.setups import TrackJob
 from app.evaluation.track.trace_greedy import foretold_trace
 from app.evaluation.track.world import TrackScenario, TrackWorld
 from app.exploration.planner.options import PlannerOptions
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 
 FLOOR = generate("rugged", 1, width_m=50.0, height_m=50.0)
 OPTIONS = PlannerOptions(rollouts=5, candidates=8)

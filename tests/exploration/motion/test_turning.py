@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.exploration.motion.turning import ahead_of_end, disc, turned_over
-from simulator.vehicle import Motion, SteeringTarget, Vehicle
+from simulator.vehicles.vehicle import Motion, SteeringTarget, Vehicle
 
 SPEED_MPS = 1.2
 RADIUS_M = SPEED_MPS / 0.35

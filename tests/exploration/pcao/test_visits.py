@@ -12,7 +12,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.pcao.visits import HEIGHT, LOOKS, PATIENCE, no_visits, visiting_move, watch
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from simulator.unseen_floors import unseen_floor
+from simulator.floors.unseen_floors import unseen_floor
 from tests.support.situations import SQUARE, make_belief, make_situation
 
 UNIT = 0.1

@@ -19,7 +19,7 @@ from app.exploration.site_search import SearchTask
 from app.exploration.site_search.criteria import Standstill, Supervisor, Weights, in_contact, nearness, terms
 from app.exploration.site_search.gains import Gains, gains, take
 from app.exploration.site_search.ground import STRAIGHT, UNREACHED, Ground
-from simulator.obstacles import ObstacleWorld
+from simulator.obstacles.obstacles import ObstacleWorld
 
 SIDE = 40
 SCANNER = Scanner(6.0, 1.0)

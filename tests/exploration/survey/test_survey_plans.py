@@ -19,7 +19,7 @@ from app.exploration.survey.backbone import backbone, packed
 from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_looks
 from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve, warm_up
 from app.exploration.survey.value import SurveyObjective, lower_to_route, lower_to_segment, make_nodes, plan_value
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 from tests.support.situations import make_belief, make_situation
 
 NO_TURNS = Turns(0.0, 0.0)

@@ -23,8 +23,8 @@ from imc_bridge.nodes.capacity import MAX_NODES, MAX_UNANNOUNCED, MAX_UNANNOUNCE
 from imc_bridge.nodes.newcomers import MAX_NEWCOMERS, MAX_NEWCOMERS_OF_HOST, Newcomers
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.roster import Roster
-from simulator import seafloors
 from simulator.dune import default_specs
+from simulator.floors import seafloors
 from tests.support.imc.sea import open_sea
 from tests.support.imc.speaker import Speaker
 from tests.support.ports import free_ports

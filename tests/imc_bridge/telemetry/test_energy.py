@@ -7,7 +7,7 @@ import pytest
 
 from imc_bridge import StateReport
 from imc_bridge.telemetry.energy import Energy, motion_left_s, read_fuel
-from simulator.battery import BatterySpec
+from simulator.vehicles.battery import BatterySpec
 from tests.support.imc.sea import open_sea
 from tests.support.waiting import until
 

@@ -19,7 +19,7 @@ import pytest
 import rasterio
 from compliance_checker.runner import CheckSuite, ComplianceChecker
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import NODATA, bag
 from app.mapping.products.contours import find_contours
@@ -28,7 +28,7 @@ from app.mapping.products.kml import contours_kml, tracks_kml
 from app.mapping.products.netcdf import netcdf
 from app.mapping.products.tracks import Track, TrackPoint, tracks_geojson, tracks_gpx
 from app.mapping.types import BathymetricMap, Grid
-from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 GRID = Grid(west_m=0.0, south_m=0.0, cell_m=2.0, rows=12, cols=17)

@@ -15,18 +15,18 @@ from rasterio.errors import NotGeoreferencedWarning
 from rasterio.io import MemoryFile
 from rasterio.warp import transform
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import Fit, LayerSource, file_layers
-from app.mapping.products.colours import depth_range, palette
 from app.mapping.products.contours import contours_geojson, find_contours
 from app.mapping.products.geotiff import NODATA, geotiff
-from app.mapping.products.overlay import overlay_corners, overlay_png
-from app.mapping.products.picture import picture_png
+from app.mapping.products.pictures.colours import depth_range, palette
+from app.mapping.products.pictures.overlay import overlay_corners, overlay_png
+from app.mapping.products.pictures.picture import picture_png
 from app.mapping.products.text import map_xyz, soundings_xyz
 from app.mapping.s44 import Order
 from app.mapping.swath.gridded import MODEL
 from app.mapping.types import BathymetricMap, Grid, Soundings
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 GRID = Grid(west_m=-10.0, south_m=20.0, cell_m=2.0, rows=30, cols=40)

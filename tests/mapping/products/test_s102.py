@@ -10,11 +10,11 @@ import pyproj
 import pytest
 import rasterio
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.utm import utm_cells
 from app.mapping.products.s102 import FILL, SurveyFacts, file_name, s102
 from app.mapping.types import BathymetricMap, Grid
-from app.mapping.utm import utm_cells
-from app.mapping.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
+from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 LAT = VerticalDatum(5861, "EPSG:5861 LAT depth")

@@ -10,14 +10,14 @@ import pytest
 import rasterio
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.bag import NODATA
 from app.mapping.products.vr_bag import REFINED_CELLS, vr_bag
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map
 from app.mapping.tiers import coarsened, doublings
 from app.mapping.types import BathymetricMap, Grid
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 LAT = VerticalDatum(5861, "EPSG:5861 LAT depth")

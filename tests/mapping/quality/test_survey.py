@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.quality.tracks import Tracks

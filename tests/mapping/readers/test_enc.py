@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.enc import NO_ZONE_POSITION_M, ZONES_OF_CONFIDENCE, Zone, read_enc, read_zones
 from app.mapping.readers.files import read_file
 from app.mapping.readers.placing import place_soundings

@@ -14,7 +14,7 @@ from affine import Affine
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.geotiff import geotiff
@@ -27,7 +27,7 @@ from app.mapping.readers.text import read_text
 from app.mapping.readers.types import MapExtent, Points, Raster, ReadError, ReadOptions
 from app.mapping.s44 import NORMAL_95, Order
 from app.mapping.types import BathymetricMap, Grid, Soundings
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 GRID = Grid(0.0, 0.0, 2.0, 20, 25)

@@ -8,13 +8,13 @@ import h5py
 import numpy as np
 import pytest
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.s102 import SurveyFacts, s102
 from app.mapping.readers.placing import place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES, read_s102
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import BathymetricMap, Grid
-from app.mapping.vertical import VerticalDatum
+from app.mapping.water.vertical import VerticalDatum
 
 FRAME = LocalFrame(41.1850, -8.7040)
 GRID = Grid(0.0, 0.0, 2.0, 20, 25)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.sites import Survey, resample, survey_of
 from app.mapping.types import BathymetricMap, Grid
 

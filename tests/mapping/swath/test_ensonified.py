@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.mapping.fusion import fuse, prior_map
+from app.mapping.coordinates.outlines import outlines
+from app.mapping.gaussian_process.fusion import fuse, prior_map
 from app.mapping.layers import LAYERS, LayerSource
-from app.mapping.outlines import outlines
 from app.mapping.swath.density import LEAST_SOUNDINGS, DensityGrid
 from app.mapping.swath.ensonified import ensonified
 from app.mapping.swath.gridded import gridded_map

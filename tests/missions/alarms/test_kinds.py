@@ -30,8 +30,8 @@ def test_every_other_kind_is_raised_somewhere() -> None:
 
 def test_no_line_of_level_alarm_is_written_past_the_table() -> None:
     made = [str(path.relative_to(PROJECT)) for path, text in SOURCES.items() if "Level.ALARM" in text]
-    assert made == ["app/missions/live/journal.py", "app/missions/operations/reports.py"]
-    [journal] = [text for path, text in SOURCES.items() if path.name == "journal.py" and path.parent.name == "live"]
+    assert made == ["app/missions/live/journals/journal.py", "app/missions/operations/reports.py"]
+    [journal] = [text for path, text in SOURCES.items() if path.name == "journal.py" and path.parent.name == "journals"]
     assert journal.count("Level.ALARM") == 1
 
 

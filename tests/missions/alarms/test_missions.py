@@ -9,7 +9,7 @@ from sqlalchemy import func, make_url, select
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarms import desk
-from app.missions.live import db_retry
+from app.missions.live.journals import db_retry
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import watched
 from app.missions.service import MissionService

@@ -29,10 +29,10 @@ from app.missions.fleet.links.sim import Launch, SimFleetLink
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor
 from imc_bridge import BridgeSettings
-from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState
-from simulator.terrain import Terrain
+from simulator.floors import seafloors
+from simulator.floors.terrain import Terrain
 from tests.support.missions.specs import LAT, LON
 from tests.support.ports import free_ports
 from tests.support.waiting import until

@@ -16,9 +16,9 @@ from sqlalchemy import select
 from app.missions import safety
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
-from app.missions.flight import deciding
-from app.missions.flight.commit import NO_LEG, LegCommit
-from app.missions.flight.decision import Decision, decide
+from app.missions.flight.decisions import deciding
+from app.missions.flight.decisions.decision import Decision, decide
+from app.missions.flight.legs.commit import NO_LEG, LegCommit
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after

@@ -7,13 +7,13 @@ import pytest
 
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleRefusedError
-from app.missions.flight import deciding
-from app.missions.flight.commit import LegCommit
-from app.missions.flight.decision import Decision, decide
+from app.missions.flight.decisions import deciding
+from app.missions.flight.decisions.decision import Decision, decide
+from app.missions.flight.legs.commit import LegCommit
 from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.states import MissionState
-from app.storage import missions as mission_queries
+from app.storage.queries import missions as mission_queries
 from tests.support.missions.harbour import act, sim_spec, until_state, view_of
 from tests.support.waiting import until
 

@@ -20,7 +20,7 @@ from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
-from simulator.terrain import Terrain
+from simulator.floors.terrain import Terrain
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
 
 NONE = np.zeros((0, 4))

@@ -5,7 +5,7 @@ import pytest
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.links.sim import Launch, SimFleetLink
-from app.missions.flight.decision import make_constraints
+from app.missions.flight.decisions.decision import make_constraints
 from app.missions.live.boundaries import Boundaries
 from app.missions.operations.history import events_after
 from app.missions.preflight.survey import preflight
@@ -15,8 +15,8 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor, VehicleKind
 from app.missions.views.mission import CheckStatus, EventView, Level
 from simulator.equipment import Equipment
-from simulator.seafloors import generate
-from simulator.sensors import SonarNoise
+from simulator.floors.seafloors import generate
+from simulator.sonars.sensors import SonarNoise
 from simulator.world import SimulatedVehicle
 from tests.support.missions.harbour import Rover, act, view_of
 from tests.support.missions.specs import LAT, LON, lon_lat, make_spec, rectangle

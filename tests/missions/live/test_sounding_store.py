@@ -9,11 +9,11 @@ from app.missions.live import sounding_store
 from app.missions.maps.builder import MapBuilder
 from app.missions.maps.codec import LAYERS, OPTIONAL, pack, unpack
 from app.missions.maps.queue import MapQueue, Replacement
+from app.missions.operations.corrections.review import rule, soundings_page
+from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.operations.measurements import measure
-from app.missions.operations.mission_maps import newest_map
-from app.missions.operations.review import rule, soundings_page
 from app.missions.service import MissionService
-from app.missions.views.soundings import Ruling, SoundingState
+from app.missions.views.measurements.soundings import Ruling, SoundingState
 from app.storage.database import Database
 from app.storage.models import StoredMapRow
 from tests.support.missions.harbour import Harbour, act, view_of

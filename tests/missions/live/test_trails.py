@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from app.missions.live.journal import METRES_PER_DEGREE
+from app.missions.live.journals.journal import METRES_PER_DEGREE
 from app.missions.live.trails import TOLERANCE_M, in_order, worth_drawing
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.mapping.claims import Survey, claims_of
-from simulator.seafloors import generate
+from simulator.floors.seafloors import generate
 
 SHORT = Survey(vehicles=2, steps=40, max_step_m=10.0, cell_m=2.0, spacing_m=1.0)
 

@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 import pytest
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.sites import Survey
 from app.mapping.types import Grid
 from app.missions.maps.survey_codec import pack_survey, unpack_survey

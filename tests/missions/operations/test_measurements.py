@@ -5,9 +5,9 @@ import asyncio
 import pytest
 
 from app.missions.operations.measurements import measure
-from app.missions.views.soundings import BatchVerdict, Verdict
+from app.missions.views.measurements.soundings import BatchVerdict, Verdict
 from app.storage.database import Database
-from app.storage.soundings import counts
+from app.storage.queries.soundings import counts
 from tests.support.missions.harbour import Harbour
 from tests.support.missions.measured import measured
 from tests.support.missions.specs import make_spec

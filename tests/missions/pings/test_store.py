@@ -13,10 +13,10 @@ from app.missions.fleet.interface import Position
 from app.missions.pings import store as module
 from app.missions.pings.codec import columns_of
 from app.missions.pings.store import PingStore
-from app.missions.views.soundings import Verdict
-from app.storage import pings as ping_queries
+from app.missions.views.measurements.soundings import Verdict
 from app.storage.database import Database
 from app.storage.ping_files import PingFiles
+from app.storage.queries import pings as ping_queries
 from tests.support.missions.pings import CLOCK_S, open_store, ping, same, take, times_of
 from tests.support.missions.specs import LAT, LON
 from tests.support.rows import mission

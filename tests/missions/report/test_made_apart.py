@@ -11,8 +11,8 @@ from app.missions.errors import MapNotReadyError, ProductUnavailableError
 from app.missions.live.mission import LiveMission
 from app.missions.maps import snapshot
 from app.missions.maps.products import Product, ProductOptions
+from app.missions.operations.maps.mission_maps import export
 from app.missions.operations.measurements import measure
-from app.missions.operations.mission_maps import export
 from app.missions.operations.reports import ReportOptions
 from app.missions.operations.work_processes import WorkProcess
 from app.missions.report.kinds import REPORTS

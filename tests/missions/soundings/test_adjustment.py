@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.missions.operations.adjustment import jumps
+from app.missions.operations.corrections.adjustment import jumps
 from app.missions.soundings.adjustment import TrackAdjustment
 
 NODES = np.array([[100.0, 0.0, 0.0], [120.0, 2.0, -1.0], [120.0, 0.0, 0.0], [140.0, 1.0, 1.0]])

@@ -14,8 +14,8 @@ from typing import Any
 import imcpy
 import pytest
 
-from simulator import seafloors
-from simulator.vehicle import VehicleLimits
+from simulator.floors import seafloors
+from simulator.vehicles.vehicle import VehicleLimits
 from tests.support.imc.dune_bench import CONSOLE, CONSOLE_ID, Bench
 from tests.support.paths import CAPTURES
 

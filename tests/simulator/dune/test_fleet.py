@@ -9,10 +9,10 @@ import imcpy
 import numpy as np
 import pytest
 
-from simulator import seafloors
 from simulator.clock import SimulationClock
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.node import FakeDune
+from simulator.floors import seafloors
 from simulator.network import NetworkFaults, UdpEndpoint
 from tests.support.imc.dune_bench import CONSOLE_ID, announce, rate_limiters, reference, start_request, stop_request
 from tests.support.ports import free_ports

@@ -12,11 +12,11 @@ import pytest
 from imc_bridge import BridgeSettings, SwathPing
 from imc_bridge.logs import VehicleLog
 from imc_bridge.telemetry.swaths import read_swath
-from simulator import seafloors
-from simulator.battery import BatterySpec
-from simulator.dune.contacts import service_addresses
-from simulator.dune.rates import RateLimiter, RateLimiterError, parse_limits
-from simulator.swath import SwathSonar
+from simulator.dune.transport.contacts import service_addresses
+from simulator.dune.transport.rates import RateLimiter, RateLimiterError, parse_limits
+from simulator.floors import seafloors
+from simulator.sonars.swath import SwathSonar
+from simulator.vehicles.battery import BatterySpec
 from tests.support.imc.dune_bench import CONSOLE, CONSOLE_ID, Bench, announce, rate_limiters, start_request
 
 OTHER = ("127.0.0.1", 6199)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.types import MapExtent
 from app.mapping.types import Grid
 
@@ -154,8 +154,8 @@ def huge_netcdf() -> bytes:
 def read(reader: str, path: Path) -> str:
     """What a file was refused with; empty when it was read."""
     if reader == "terrain":
-        from simulator.terrain import TerrainError
-        from simulator.terrain_files import load_terrain
+        from simulator.floors.terrain import TerrainError
+        from simulator.floors.terrain_files import load_terrain
 
         try:
             load_terrain(path)

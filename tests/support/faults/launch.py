@@ -30,7 +30,7 @@ class Shifted(datetime):
 if __name__ == "__main__":
     if "FAULTS_CLOCK" in os.environ:
         time.time = lambda: _true_time() + off_s()
-        from app.api import tokens
+        from app.api.accounts import tokens
         from app.missions import clock
 
         for module in (clock, tokens):

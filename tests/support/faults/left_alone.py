@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from shapely.geometry import LineString, Polygon, box
 
-from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.node import FakeDune
+from simulator.floors import seafloors
 from tests.support.faults.missions import FRAME, mission_of, started, steps_more
 from tests.support.faults.sea import IDS, LIMITS, NAMES, OURS, imc_vehicles
 from tests.support.faults.service import Service, service_in

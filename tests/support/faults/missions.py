@@ -10,7 +10,7 @@ import httpx
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from tests.support.faults.service import PATIENCE_S, Service
 from tests.support.missions.polling import PollingVehicle
 from tests.support.waiting import until

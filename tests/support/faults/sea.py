@@ -7,8 +7,8 @@ from typing import Any
 
 import imcpy
 
-from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
+from simulator.floors import seafloors
 from simulator.network import NetworkFaults
 from tests.support.faults.missions import FRAME, SIDE_M
 from tests.support.ports import free_ports

@@ -8,14 +8,14 @@ from typing import Any
 import imcpy
 import numpy as np
 
-from simulator import seafloors
-from simulator.battery import BatterySpec
 from simulator.clock import SimulationClock
 from simulator.dune.node import DuneOptions, FakeDune
 from simulator.equipment import Equipment
-from simulator.swath import SwathSonar
-from simulator.terrain import Terrain
-from simulator.vehicle import STEP_S
+from simulator.floors import seafloors
+from simulator.floors.terrain import Terrain
+from simulator.sonars.swath import SwathSonar
+from simulator.vehicles.battery import BatterySpec
+from simulator.vehicles.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
 CONSOLE_ID = 0x3F01

@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 import imcpy
 
 from imc_bridge import Bridge, BridgeEvent, BridgeSettings, NodeState, Waypoint, WaypointChange, WaypointStatus
-from simulator import seafloors
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.fleet import EQUIPMENT
+from simulator.floors import seafloors
+from simulator.floors.terrain import Terrain
 from simulator.network import NetworkFaults
-from simulator.terrain import Terrain
 from tests.support.ports import free_ports
 from tests.support.waiting import until
 

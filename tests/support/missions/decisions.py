@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from app.exploration.core.problem import Belief, Proposal, Situation
-from app.missions.flight.decision import Decision, Knowledge, Place, decide, make_constraints
+from app.missions.flight.decisions.decision import Decision, Knowledge, Place, decide, make_constraints
 from app.missions.spec.mission import MissionSpec
 from tests.support.missions.specs import make_spec
 

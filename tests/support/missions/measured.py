@@ -1,7 +1,7 @@
 """Soundings as a polling vehicle sends them, two of them wrong."""
 
 from app.missions.soundings.measurement import Measurement
-from app.missions.views.soundings import SoundingState
+from app.missions.views.measurements.soundings import SoundingState
 from tests.support.missions.harbour import CLOCK_S
 from tests.support.missions.specs import lon_lat
 

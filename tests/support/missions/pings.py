@@ -8,7 +8,7 @@ import numpy as np
 
 from app.mapping.swath.pings import Pings
 from app.missions.fleet.interface import PingReport, Position
-from app.missions.live.journal import Counts
+from app.missions.live.journals.journal import Counts
 from app.missions.pings.gate import PingGate
 from app.missions.pings.store import PingStore, TakenPings
 from app.storage.database import Database

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import httpx
 import numpy as np
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 
 RETRY_S = 0.05
 SOUNDING_SPACING_M = 2.0

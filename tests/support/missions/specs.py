@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.spec.mission import MissionSpec
 
 LAT, LON = 41.185, -8.705

@@ -4,10 +4,10 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.api.auth import console_log_in
-from app.api.limits import RequestLimits
-from app.api.peers import is_own_user
-from app.api.tokens import Role, TokenStore
+from app.api.access.auth import console_log_in
+from app.api.accounts.peers import is_own_user
+from app.api.accounts.rates import RequestLimits
+from app.api.accounts.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import gateway_settings
 from app.missions.operations.history import events_after
 from app.missions.service import MissionService

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from benchmarks.service.boats import running_service
 from tests.support.dashboard.service import Service
 from tests.support.qgis import environment

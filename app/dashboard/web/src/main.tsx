@@ -1,11 +1,11 @@
 import "./base.css";
 import "./print.css";
-import "./ui/common.css";
+import "./ui/parts/common.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
+import { findCharts } from "./state/device/tiles";
 import { startSession } from "./state/session";
 import { isDark, theme } from "./state/store";
-import { findCharts } from "./state/tiles";
 import { App } from "./ui/App";
 
 effect(() => {

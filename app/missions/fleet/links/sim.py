@@ -39,19 +39,19 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor
 from app.missions.spec.sonar import SwathSonarSpec
 from app.missions.spec.targets import TargetSpec
-from simulator.battery import Battery, BatterySpec
 from simulator.equipment import Equipment
-from simulator.obstacles import ObstacleWorld
-from simulator.raycasting import warm_up
-from simulator.scanning import Scan, Scanning
-from simulator.seafloors import generate
-from simulator.sensors import SensorKind, SonarNoise
-from simulator.swath import SwathSonar, SwathSounder
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
+from simulator.obstacles.obstacles import ObstacleWorld
+from simulator.obstacles.scanning import Scan, Scanning
+from simulator.sonars.raycasting import warm_up
+from simulator.sonars.sensors import SensorKind, SonarNoise
+from simulator.sonars.swath import SwathSonar, SwathSounder
 from simulator.targets import Ranging, RangingNoise, Target
 from simulator.targets import TargetSpec as SimulatedTarget
-from simulator.terrain import Terrain
-from simulator.terrain_files import load_terrain
-from simulator.vehicle import BOAT, STEP_S
+from simulator.vehicles.battery import Battery, BatterySpec
+from simulator.vehicles.vehicle import BOAT, STEP_S
 from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle, SwathPing
 
 TICK_S = 0.05

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.multibeam.beams import beams_of
 from app.mapping.readers.multibeam.types import FilePing
 from app.mapping.swath.pings import Pings, placed

@@ -14,7 +14,7 @@ from bluemvmt_gsf.libgsf import GsfFile as LibraryFile
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.files import read_file
 from app.mapping.readers.multibeam.gsf import PING, SINGLE_BEAM, GsfFile
 from app.mapping.readers.placing import place_soundings

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from KMALL.kmall import kmall
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.files import read_file
 from app.mapping.readers.multibeam.kmall import KmallFile
 from app.mapping.readers.placing import place_soundings

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.multibeam import table
 from app.mapping.readers.multibeam.table import SwathTable
 from app.mapping.readers.multibeam.types import FilePing

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
-from app.mapping.georeference import LocalFrame
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, placed
 from app.missions.fleet.interface import (
     FaultKind,
@@ -25,7 +25,7 @@ from app.missions.fleet.interface import (
 )
 from app.missions.fleet.links.imc import ImcFleetLink, make_imc_link
 from app.missions.settings import ImcSettings
-from simulator.swath import SwathSonar
+from simulator.sonars.swath import SwathSonar
 from tests.support.imc.sea import open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until

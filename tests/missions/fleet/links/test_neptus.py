@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.api.tokens import Role, TokenStore
+from app.api.accounts.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import GATHER_S, gateway_settings
 from app.missions.operations.history import soundings_of
-from app.missions.operations.mission_maps import newest_map
+from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.settings import NeptusSettings
 from app.missions.states import MissionState
 from tests.support.missions.harbour import act, view_of
@@ -220,7 +220,7 @@ async def _statuses(gateway: Gateway, mission_id: str, wanted: set[str]) -> bool
 
 
 async def _settled(gateway: Gateway, mission_id: str, step: int) -> set[str]:
-    from app.storage import missions as queries
+    from app.storage.queries import missions as queries
 
     found: set[str] = set()
 

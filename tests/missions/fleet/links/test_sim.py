@@ -25,9 +25,9 @@ from app.missions.fleet.links.sim import FORSAKEN_S, Launch, SimFleetLink
 from app.missions.settings import SimulationSettings
 from app.missions.spec.mission import Sensor, VehicleSpec
 from app.missions.spec.sonar import SwathSonarSpec
-from simulator import seafloors
-from simulator.battery import BatterySpec
-from simulator.swath import SwathSonar
+from simulator.floors import seafloors
+from simulator.sonars.swath import SwathSonar
+from simulator.vehicles.battery import BatterySpec
 from tests.support.missions.specs import LAT, LON
 from tests.support.waiting import until
 

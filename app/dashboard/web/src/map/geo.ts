@@ -1,7 +1,7 @@
 /** Geometry on the ellipsoid, small areas only. */
 
 import type { LngLat, Place, PolygonGeometry } from "../api/types";
-import { niceStep } from "./palette";
+import { niceStep } from "./picture/palette";
 
 const WGS84_A = 6_378_137;
 const WGS84_E2 = 6.694_379_990_14e-3;

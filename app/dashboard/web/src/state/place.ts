@@ -4,7 +4,7 @@ import { convert } from "geo-coordinates-parser";
 import SPEC from "../api/mission.json";
 import type { LngLat } from "../api/types";
 import { say } from "../words/say";
-import { isWithin } from "./missionFields";
+import { isWithin } from "./form/missionFields";
 
 export const placeSample = (): string => say("place.sample");
 

@@ -19,14 +19,14 @@ import type {
   WaypointView,
 } from "../api/types";
 import { kept } from "../kept";
-import { certaintyFor } from "../map/certainty";
 import type { Bounds } from "../map/geo";
-import { NORTH_WEST_DEG } from "../map/hillshade";
-import { fittingRange, type Range } from "../map/layers";
-import type { PlaceMark } from "../map/marks";
-import { type DepthPalette, vehicleColour } from "../map/palette";
-import type { SeaFloor } from "../map/seafloor";
-import type { Site } from "../map/site";
+import type { PlaceMark } from "../map/marks/marks";
+import type { Site } from "../map/marks/site";
+import { certaintyFor } from "../map/picture/certainty";
+import { NORTH_WEST_DEG } from "../map/picture/hillshade";
+import { fittingRange, type Range } from "../map/picture/layers";
+import { type DepthPalette, vehicleColour } from "../map/picture/palette";
+import type { SeaFloor } from "../map/picture/seafloor";
 import type { CoordinateFormat } from "./format";
 import { ageSeconds, EMPTY_VIEW, type LiveView } from "./live";
 

@@ -5,8 +5,8 @@ import { me, roleWords, signedOut, signIn, signOut, whyNotCommand } from "../sta
 import { said } from "../state/session";
 import { accountOpen } from "../state/store";
 import { say, sayWith } from "../words/say";
-import { Button, sets, Typed } from "./Controls";
-import { Dialog } from "./Dialog";
+import { Button, sets, Typed } from "./parts/Controls";
+import { Dialog } from "./parts/Dialog";
 
 /** Who uses the page, always in sight. */
 export function AccountButton() {

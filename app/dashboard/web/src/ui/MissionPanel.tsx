@@ -2,8 +2,8 @@ import "./MissionPanel.css";
 import { useSignal } from "@preact/signals";
 import type { MissionSummary, NewMission } from "../api/types";
 import { whyNotCommand } from "../state/access";
+import { fileNameOf, missionFile } from "../state/form/missionFile";
 import { dayAndTime } from "../state/format";
-import { fileNameOf, missionFile } from "../state/missionFile";
 import { deleteMission, selectMission } from "../state/session";
 import {
   copied,
@@ -17,11 +17,11 @@ import {
 } from "../state/store";
 import { capital, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { say, sayWith } from "../words/say";
-import { Button, sets } from "./Controls";
-import { Grip } from "./Grip";
-import { NewMissionForm } from "./NewMissionForm";
-import { panelWidth } from "./room";
-import { saveText } from "./saving";
+import { panelWidth } from "./chart/room";
+import { NewMissionForm } from "./form/NewMissionForm";
+import { Button, sets } from "./parts/Controls";
+import { Grip } from "./parts/Grip";
+import { saveText } from "./parts/saving";
 
 export function MissionPanel() {
   return (

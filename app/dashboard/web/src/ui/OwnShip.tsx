@@ -4,10 +4,10 @@ import { signal, useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../api/client";
 import type { LngLat } from "../api/types";
-import { minutes } from "../map/ships";
+import { minutes } from "../map/marks/ships";
 import { said } from "../state/session";
 import { say } from "../words/say";
-import { Button } from "./Controls";
+import { Button } from "./parts/Controls";
 
 /** Whether a receiver is set up; null while nobody asked. */
 const listens = signal<boolean | null>(null);

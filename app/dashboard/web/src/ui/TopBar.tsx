@@ -1,8 +1,9 @@
 import "./TopBar.css";
 import type { MissionAction } from "../api/types";
 import { whyNotCommand } from "../state/access";
+import { decidingFor } from "../state/alarms/waiting";
 import { age, clock, duration } from "../state/format";
-import { elapsedThen } from "../state/replay";
+import { elapsedThen } from "../state/past/replay";
 import { act, askAbort, busyWith } from "../state/session";
 import {
   abortDialogOpen,
@@ -19,11 +20,10 @@ import {
   vehicles,
   view,
 } from "../state/store";
-import { decidingFor } from "../state/waiting";
 import { isAllowed, MISSION_WORDS, missionSign, missionWords, type Tone } from "../state/words";
 import { say } from "../words/say";
 import { AccountButton } from "./Account";
-import { Button, flips, sets } from "./Controls";
+import { Button, flips, sets } from "./parts/Controls";
 
 export function TopBar() {
   const present = mission.value;

@@ -2,7 +2,7 @@ import "./Tour.css";
 import { signal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { kept } from "../kept";
-import { emptyDraft, toMission } from "../state/draft";
+import { emptyDraft, toMission } from "../state/form/draft";
 import { createMission } from "../state/session";
 import {
   layer,
@@ -17,7 +17,7 @@ import {
 } from "../state/store";
 import { stepAfter, TOUR } from "../state/tour";
 import { say } from "../words/say";
-import { Button } from "./Controls";
+import { Button } from "./parts/Controls";
 
 /** Where the guided mission stands on this device; null: nobody is guided. */
 const tour = kept<{ mission: string; step: number; held: boolean } | null>("tour", null);

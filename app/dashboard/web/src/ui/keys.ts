@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { whyNotCommand } from "../state/access";
-import { themeAfter } from "../state/looks";
+import { themeAfter } from "../state/device/looks";
 import { act, askAbort, busyWith } from "../state/session";
 import {
   describing,
@@ -24,7 +24,7 @@ import {
 } from "../state/store";
 import { isAllowed } from "../state/words";
 import type { Key } from "../words/say";
-import { takeAlarms } from "./taking";
+import { takeAlarms } from "./notices/taking";
 
 /** Grows when the whole area is asked for: the map follows. */
 export const fitAsked = signal(0);

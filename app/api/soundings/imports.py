@@ -1,0 +1,173 @@
+"""Files from elsewhere: soundings and maps to begin with, and a grid to compare the map with."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from starlette.requests import ClientDisconnect
+
+from app.api.access.auth import Operator, Reader
+from app.api.http.problems import ProblemError, problems
+from app.api.mission import Mission
+from app.api.schemas import API
+from app.api.state import EdgeState, Service, State
+from app.missions.live.mission import LiveMission
+from app.missions.operations.imports.imports import imports_of, kind_of, reference_of
+from app.missions.operations.imports.uploads import Upload
+from app.missions.views.measurements.imports import (
+    ImportOptions,
+    ImportView,
+    ProposedZonesView,
+    ReferenceView,
+    ZoneOptions,
+)
+
+router = APIRouter(
+    prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")
+)
+
+charts_router = APIRouter(prefix=API, tags=["imports"], responses=problems("unauthenticated", "forbidden"))
+
+_FILE: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "The file as it is, whatever its media type",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+_SENT = problems(
+    "malformed-body", "mission-not-found", "conflict", "body-too-large", "invalid-request", "import-unavailable"
+)
+_FOUND = problems("mission-not-found", "import-not-found", "invalid-request")
+
+ImportId = Annotated[str, Path(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", description="The import's id")]
+
+
+@asynccontextmanager
+async def _sent(
+    state: EdgeState, request: Request, mission: LiveMission, options: ImportOptions
+) -> AsyncIterator[tuple[LiveMission, Upload]]:
+    """Take a file in. What would be refused anyhow is not waited for.
+
+    Beside the file the mission comes as it is in memory now: that one may have left it meanwhile.
+    """
+    kind_of(options)
+    try:
+        async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
+            yield await state.service.get(mission.id), upload
+    except ClientDisconnect:
+        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+
+
+@router.post(
+    "/imports",
+    operation_id="importSoundings",
+    summary="Begin with soundings or a map from elsewhere",
+    status_code=201,
+    openapi_extra=_FILE,
+    responses=_SENT | {200: {"description": "The same file was imported before: nothing changed", "model": ImportView}},
+)
+async def import_soundings(
+    options: Annotated[ImportOptions, Query()],
+    request: Request,
+    response: Response,
+    state: State,
+    operator: Operator,
+    mission: Mission,
+) -> ImportView:
+    """Take all of a file's soundings near the area, or nothing when any of it is wrong.
+
+    They count in the map by their own uncertainty, and are told apart from the mission's own. Sending the same file
+    again changes nothing.
+    """
+    async with _sent(state, request, mission, options) as (mission, upload):
+        view = await state.service.imports.add(mission, upload, options, operator.name)
+    if view.replayed:
+        response.status_code = 200
+    return view
+
+
+@charts_router.post(
+    "/chart-zones",
+    operation_id="proposeZones",
+    summary="Propose keep-out zones from a chart",
+    openapi_extra=_FILE,
+    responses=problems("malformed-body", "body-too-large", "invalid-request", "import-unavailable"),
+)
+async def propose_zones(
+    options: Annotated[ZoneOptions, Query()], request: Request, state: State, operator: Operator
+) -> ProposedZonesView:
+    """Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
+
+    Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
+    looks at them and takes those that apply into `keep_out`.
+    """
+    try:
+        async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
+            return await state.service.imports.propose_zones(upload, options)
+    except ClientDisconnect:
+        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+
+
+@router.get(
+    "/imports",
+    operation_id="listImports",
+    summary="List what was imported",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def list_imports(reader: Reader, mission: Mission) -> list[ImportView]:
+    """Return what the mission began with, oldest first."""
+    return await imports_of(mission)
+
+
+@router.delete(
+    "/imports/{import_id}",
+    operation_id="deleteImport",
+    summary="Take an import back",
+    status_code=204,
+    responses=_FOUND,
+)
+async def delete_import(import_id: ImportId, service: Service, operator: Operator, mission: Mission) -> None:
+    """Leave the soundings of a file out of the map again."""
+    await service.imports.delete(mission, import_id, operator.name)
+
+
+@router.put(
+    "/reference",
+    operation_id="setReference",
+    summary="Compare the map with a grid",
+    openapi_extra=_FILE,
+    responses=_SENT,
+)
+async def set_reference(
+    options: Annotated[ImportOptions, Query()],
+    request: Request,
+    state: State,
+    operator: Operator,
+    mission: Mission,
+) -> ReferenceView:
+    """Sample a file's depths at the map's cells, to see how far off the map is.
+
+    Shown by `quality`, the layer `difference` and the GeoTIFF; never used for the map or for planning.
+    """
+    async with _sent(state, request, mission, options) as (mission, upload):
+        return await state.service.imports.set_reference(mission, upload, options, operator.name)
+
+
+@router.get("/reference", operation_id="getReference", summary="See what the map is compared with", responses=_FOUND)
+async def get_reference(reader: Reader, mission: Mission) -> ReferenceView:
+    """Return the reference grid in short."""
+    return await reference_of(mission)
+
+
+@router.delete(
+    "/reference",
+    operation_id="deleteReference",
+    summary="Compare the map with nothing",
+    status_code=204,
+    responses=_FOUND,
+)
+async def delete_reference(service: Service, operator: Operator, mission: Mission) -> None:
+    """Forget the reference grid."""
+    await service.imports.delete_reference(mission, operator.name)

@@ -1,0 +1,495 @@
+/** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
+
+import SPEC from "../../api/mission.json";
+import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSpec } from "../../api/types";
+import { areaFault, polygonOf, ringOf, sizeOf } from "../../map/area";
+import { rectangle, wayBetween } from "../../map/geo";
+import { say } from "../../words/say";
+import { placeOf, placeSample, typedPlace } from "../place";
+import {
+  FIELDS,
+  type FieldName,
+  fieldFault,
+  fieldsOf,
+  type LengthUnit,
+  type MissionKind,
+  numberFault,
+  ownPath,
+  put,
+  type Schema,
+  startOf,
+  startTexts,
+  type Texts,
+  type Tree,
+  textsOf,
+  VEHICLE_FIELDS,
+  type VehicleField,
+  valueAt,
+  vehicleFieldsOf,
+  withTexts,
+} from "./missionFields";
+
+/** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
+export type AreaSource = "typed" | "drawn";
+
+/** What one vehicle has of its own, as typed; `recovery_point` as "latitude, longitude". */
+export type Own = Partial<Record<VehicleField | "recovery_point", string>> & { sensor?: Sensor };
+
+/** As typed. */
+export interface Draft extends Texts {
+  name: string;
+  kind: MissionKind;
+  /** Id of the site that a survey belongs to; empty: to none. */
+  site: string;
+  length: LengthUnit;
+  /** How far apart lines over the whole area are to be, which is another way to give the length; empty: it is given. */
+  spacing_m: string;
+  /** As "latitude, longitude". */
+  goal: string;
+  entry: string;
+  obstacles: readonly (readonly LngLat[])[];
+  /** Where vehicles come home to, as "latitude, longitude"; empty: they stop where they are. */
+  recovery: string;
+  source: AreaSource;
+  ring: readonly LngLat[];
+  keepOut: readonly (readonly LngLat[])[];
+  latitude: string;
+  longitude: string;
+  east_m: string;
+  north_m: string;
+  tide_source: string;
+  tide_table: string;
+  planner: string;
+  options: PlannerOptions;
+  simulated: string;
+  /** Of the simulated vehicles that have no other of their own. */
+  sensor: Sensor;
+  /** Of the simulated vehicles, separated by commas; empty: sim-1, sim-2 and so on. */
+  names: string;
+  chosen: readonly VehicleSpec[];
+  /** By vehicle. */
+  own: Readonly<Record<string, Own>>;
+  /** What a mission that is copied has and the form does not show. */
+  base: Partial<NewMission>;
+}
+
+export type Faults = Partial<Record<keyof Draft, string>>;
+
+/** Planners in plain words, the sensible one first. */
+export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: string }>> = {
+  cao: {
+    get title() {
+      return say("draft.asSureAsTheTimeAllows");
+    },
+    get words() {
+      return say("draft.adaptiveBeginsEvenlyAndGoes");
+    },
+  },
+  lawnmower: {
+    get title() {
+      return say("draft.evenLines");
+    },
+    get words() {
+      return say("draft.parallelLinesOverTheWhole");
+    },
+  },
+  swath: {
+    get title() {
+      return say("draft.fullCoverage");
+    },
+    get words() {
+      return say("draft.linesAsFarApartAsThe");
+    },
+  },
+};
+
+/** What the service has no default for. */
+const SUGGESTED = { east_m: "100", north_m: "100", simulated: "2", sensor: "dvl" } as const;
+
+/** A draft whose area lies in the middle of what the map shows. */
+export function emptyDraft(middle: LngLat): Draft {
+  const draft: Draft = {
+    ...startTexts("survey"),
+    ...SUGGESTED,
+    name: "",
+    kind: "survey",
+    site: "",
+    length: "steps",
+    spacing_m: "",
+    goal: "",
+    entry: "",
+    obstacles: [],
+    recovery: "",
+    source: "typed",
+    ring: [],
+    keepOut: [],
+    latitude: "",
+    longitude: "",
+    tide_source: "",
+    tide_table: "",
+    planner: SPEC["planner.name"].default,
+    options: {},
+    names: "",
+    chosen: [],
+    own: {},
+    base: {},
+  };
+  return { ...draft, ...centred(draft, middle) };
+}
+
+/** A draft of a mission like one that there is, its vehicles as they are described there. */
+export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
+  const ring = ringOf(spec.area as NewMission["area"]);
+  const { tide, steps: _, ...base } = spec;
+  const { search } = base;
+  const places = search && {
+    goal: typedPlace(search.goal as LngLat),
+    entry: typedPlace(search.entry as LngLat),
+    obstacles: search.obstacles.map((one) => ringOf(one as NewMission["area"])),
+  };
+  const texts = textsOf(spec, spec.kind);
+  return {
+    ...emptyDraft(ring[0] ?? [0, 0]),
+    ...texts,
+    ...places,
+    name: say("draft.copy", { name }),
+    kind: spec.kind,
+    site: spec.site ?? "",
+    length: Object.keys(spec.budget)[0] as LengthUnit,
+    source: "drawn",
+    ring,
+    keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
+    tide_source: texts.tide_m === "" ? "" : tide.source,
+    planner: spec.planner.name,
+    options: spec.planner.options as PlannerOptions,
+    recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
+    simulated: "0",
+    chosen: spec.vehicles.map(
+      ({ speed_mps: _s, altitude_m: _a, endurance_min: _e, recovery_point: _p, sonar: _, ...vehicle }) =>
+        vehicle as VehicleSpec,
+    ),
+    own: Object.fromEntries(spec.vehicles.map((vehicle) => [vehicle.name, ownOf(vehicle as VehicleSpec)])),
+    base: base as Partial<NewMission>,
+  };
+}
+
+/** What a vehicle that is described has of its own. */
+function ownOf({ recovery_point, ...vehicle }: VehicleSpec): Own {
+  const numbers = Object.entries(VEHICLE_FIELDS).flatMap(([name, field]) => {
+    const value = valueAt(vehicle, ownPath(field));
+    return value == null ? [] : [[name, String(value)]];
+  });
+  return {
+    ...Object.fromEntries(numbers),
+    ...(recovery_point ? { recovery_point: typedPlace(recovery_point) } : {}),
+  };
+}
+
+/** What changes with the kind of mission: fields that nobody touched take that one's defaults. */
+export function turnedInto(kind: MissionKind, draft: Draft): Partial<Draft> {
+  const untouched = fieldsOf(kind, draft.length).filter(
+    ([name, field]) => draft[name] === startOf(field, draft.kind),
+  );
+  return { kind, ...Object.fromEntries(untouched.map(([name, field]) => [name, startOf(field, kind)])) };
+}
+
+/** Names of the simulated vehicles: those that were given, for the rest such as nobody else has. */
+export function simulatedNames(draft: Draft): string[] {
+  const wanted = Number(draft.simulated);
+  const given = draft.names
+    .split(",")
+    .map((name) => name.trim())
+    .filter((name) => name !== "");
+  const names = given.slice(0, wanted);
+  const taken = new Set([...draft.chosen.map((v) => v.name), ...names]);
+  for (let n = 1; names.length < wanted; n++) {
+    if (!taken.has(`sim-${n}`)) names.push(`sim-${n}`);
+  }
+  return names;
+}
+
+/** Names of all vehicles, those that were chosen first. */
+export const vehicleNames = (draft: Draft): string[] => [
+  ...draft.chosen.map((vehicle) => vehicle.name),
+  ...simulatedNames(draft),
+];
+
+/** How a vehicle of this name sounds the bottom. */
+export const sensorOf = (draft: Draft, name: string): Sensor =>
+  draft.own[name]?.sensor ?? draft.chosen.find((vehicle) => vehicle.name === name)?.sensor ?? draft.sensor;
+
+/** Whether a planner can lead these vehicles. */
+export const canPlan = (planner: string, draft: Draft): boolean =>
+  planner !== "swath" || vehicleNames(draft).every((name) => sensorOf(draft, name) === "multibeam");
+
+/** Where a typed area begins when a place is to be its middle; nothing while its size is no size. */
+export function centred(draft: Draft, [lng, lat]: LngLat): Partial<Draft> {
+  const area = areaOf({ ...draft, source: "typed", longitude: String(lng), latitude: String(lat) });
+  const northEast = area?.coordinates[0]?.[2];
+  if (!northEast) return {};
+  return {
+    longitude: (lng - (northEast[0] - lng) / 2).toFixed(6),
+    latitude: (lat - (northEast[1] - lat) / 2).toFixed(6),
+  };
+}
+
+const LONGITUDE: Schema = SPEC["area.coordinates.0"];
+const LATITUDE: Schema = SPEC["area.coordinates.1"];
+const SIZE: Schema = { type: "number", exclusiveMinimum: 0 };
+/** Numbers that are no value of a mission but what values are made of. */
+const corner = () =>
+  [
+    ["latitude", say("draft.latitude"), LATITUDE],
+    ["longitude", say("draft.longitude"), LONGITUDE],
+    ["east_m", say("draft.sizeToTheEast"), SIZE],
+    ["north_m", say("draft.sizeToTheNorth"), SIZE],
+  ] as const;
+const VEHICLES: Schema = { type: "integer", minimum: 0, maximum: SPEC.vehicles.maxItems };
+
+/** The draft with the length that its lines ask of each vehicle, where it is given by how far they are apart. */
+export function resolved(draft: Draft): Draft {
+  const spacing_m = Number(draft.spacing_m);
+  const vehicles = vehicleNames(draft).length;
+  const corners = cornersOf(draft);
+  if (!(spacing_m > 0) || vehicles === 0 || corners.length < 3) return draft;
+  const each_km = sizeOf(corners).area_m2 / (spacing_m * vehicles * 1000);
+  return { ...draft, length: "km_per_vehicle", km_per_vehicle: String(Number(each_km.toPrecision(3))) };
+}
+
+/** What a mission's length is said in. */
+export type LengthChoice = LengthUnit | "spacing_m";
+
+export const lengthChoiceOf = (draft: Draft): LengthChoice =>
+  draft.spacing_m.trim() === "" ? draft.length : "spacing_m";
+
+/** The length said in something else; lines begin as far apart as the length that there was would lay them. */
+export function withLength(choice: LengthChoice, draft: Draft): Partial<Draft> {
+  if (choice !== "spacing_m") return { length: choice, spacing_m: "" };
+  const corners = cornersOf(draft);
+  const now = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
+  return { spacing_m: now ? String(Number(now.spacing_m.toPrecision(2))) : "1" };
+}
+
+/** What is wrong with a draft, field by field, with what would be right. */
+export function faultsOf(described: Draft): Faults {
+  const faults: Faults = {};
+  const draft = resolved(described);
+  const note = (field: keyof Draft, fault: string) => {
+    if (fault) faults[field] = fault;
+  };
+  note("name", draft.name.trim() ? "" : say("draft.giveTheMissionAName"));
+  if (draft.spacing_m.trim() !== "")
+    note("spacing_m", numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE));
+  if (draft.source === "typed") {
+    for (const [field, label, schema] of corner()) note(field, numberFault(label, draft[field], schema));
+  }
+  for (const [name, field] of fieldsOf(draft.kind, draft.length)) {
+    if (field.part !== "recovery" || draft.recovery.trim() !== "") note(name, fieldFault(field, draft[name]));
+  }
+  if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
+    faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
+  }
+  note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
+  if (draft.source === "drawn") {
+    const fault = areaFault(draft.ring, faults.cell_m ? 0 : Number(draft.cell_m));
+    if (fault) faults.ring = draft.ring.length === 0 ? say("draft.drawTheAreaOrReadIt") : fault;
+  }
+  draft.keepOut.forEach((zone, i) => {
+    const fault = areaFault(zone, 0);
+    if (fault) faults.keepOut = say("draft.keepOutZone", { i: i + 1, fault: fault.toLowerCase() });
+  });
+  if (draft.kind === "search") {
+    for (const [field, words] of [
+      ["goal", say("draft.theGoal")],
+      ["entry", say("draft.theEntry")],
+    ] as const) {
+      if (!placeOf(draft[field]))
+        faults[field] = say("draft.pickOnTheMapOrType", { words, sample: placeSample() });
+    }
+    draft.obstacles.forEach((ring, i) => {
+      const fault = areaFault(ring, 0);
+      if (fault) faults.obstacles = say("draft.obstacle", { i: i + 1, fault: fault.toLowerCase() });
+    });
+  }
+  const shallowest = draft.kind === "survey" ? Number(draft.min_depth_m) : 0;
+  if (!faults.max_depth_m && !faults.min_depth_m && Number(draft.max_depth_m) < shallowest) {
+    faults.max_depth_m = say("draft.deepestTravelMustNotBeAbove");
+  }
+  if (!faults.simulated) {
+    const all = vehicleNames(draft);
+    const twice = all.find((name, i) => all.indexOf(name) !== i);
+    if (twice !== undefined)
+      faults.names = say("draft.twoVehiclesAreCalled", { twice: twice || say("draft.nothing") });
+  }
+  if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
+    faults.simulated = say("draft.chooseAtLeastOneVehicleOr");
+  }
+  for (const name of vehicleNames(draft)) note("own", ownFault(name, draft));
+  if (draft.kind === "survey" && !canPlan(draft.planner, draft)) {
+    faults.planner = say("draft.fullCoverageNeedsVehicles");
+  }
+  return faults;
+}
+
+/** What is wrong with what a vehicle has of its own. */
+function ownFault(name: string, draft: Draft): string {
+  const own = draft.own[name] ?? {};
+  const fault = vehicleFieldsOf(draft.kind, sensorOf(draft, name))
+    .map(([field, declared]) =>
+      fieldFault(
+        { ...declared, label: say("draft.of", { label: declared.label, name }), optional: true },
+        own[field] ?? "",
+      ),
+    )
+    .find((words) => words !== "");
+  const point = own.recovery_point?.trim() ?? "";
+  return (
+    fault ??
+    (point === "" || placeOf(point) ? "" : say("draft.recoveryPointOfType", { name, sample: placeSample() }))
+  );
+}
+
+/** The area that a draft describes; null while it describes none. */
+export function areaOf(draft: Draft) {
+  if (draft.source === "drawn") return draft.ring.length >= 3 ? polygonOf(draft.ring) : null;
+  if (corner().some(([field, label, schema]) => numberFault(label, draft[field], schema) !== "")) return null;
+  return rectangle(
+    [Number(draft.longitude), Number(draft.latitude)],
+    Number(draft.east_m),
+    Number(draft.north_m),
+  );
+}
+
+/** Corners of a draft's area, typed or drawn. */
+export function cornersOf(draft: Draft): LngLat[] {
+  const area = areaOf(draft);
+  return area ? ringOf(area) : [];
+}
+
+/** What to send for a draft without faults. */
+export function toMission(described: Draft): NewMission {
+  const draft = resolved(described);
+  const area = areaOf(draft);
+  if (!area) throw new Error("the draft has faults");
+  const { search, budget: _, recovery: before, site: _site, ...base } = draft.base;
+  const point = placeOf(draft.recovery);
+  const simulated = simulatedNames(draft).map(
+    (name): VehicleSpec => ({ name, kind: "sim", sensor: draft.sensor }),
+  );
+  const all = [...draft.chosen, ...simulated];
+  const vehicles = all.map((vehicle) => withOwn(vehicle, draft));
+  const mission = {
+    ...base,
+    name: draft.name.trim(),
+    kind: draft.kind,
+    area,
+    keep_out: draft.keepOut.map(polygonOf),
+    vehicles,
+    ...(draft.kind === "survey" && draft.site ? { site: draft.site } : {}),
+    ...(draft.tide_m.trim()
+      ? { tide: { source: draft.tide_source.trim() || say("draft.statedByTheOperator") } }
+      : {}),
+    ...(draft.kind === "search"
+      ? searchOf(draft, vehicles)
+      : { planner: { name: draft.planner, options: draft.options } }),
+  };
+  const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
+  const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
+  return { ...made, ...homing } as unknown as NewMission;
+}
+
+function withOwn(vehicle: VehicleSpec, draft: Draft): VehicleSpec {
+  const own = draft.own[vehicle.name] ?? {};
+  const sensor = sensorOf(draft, vehicle.name);
+  const made = vehicleFieldsOf(draft.kind, sensor).reduce<Tree>(
+    (described, [name, field]) => {
+      const text = own[name]?.trim();
+      return text ? put(described, ownPath(field), Number(text)) : described;
+    },
+    { ...vehicle, sensor },
+  );
+  const point = placeOf(own.recovery_point ?? "");
+  return { ...made, ...(point ? { recovery_point: point } : {}) } as VehicleSpec;
+}
+
+/** What only a search has: its places, and vehicles at the surface. Planner and length are left to the service. */
+function searchOf({ base, goal, entry, obstacles }: Draft, vehicles: readonly VehicleSpec[]) {
+  const places = { goal: placeOf(goal), entry: placeOf(entry) };
+  if (!places.goal || !places.entry) throw new Error("the draft has faults");
+  const search = { ...base.search, ...places, obstacles: obstacles.map(polygonOf) };
+  if (base.kind === "search") return { search, ...(base.budget ? { budget: base.budget } : {}) };
+  const depth_m = SPEC["vehicles.depth_m"].minimum;
+  return {
+    search,
+    limits: { ...base.limits, min_depth_m: SPEC["limits.min_depth_m"].minimum },
+    vehicles: vehicles.map((vehicle) => (vehicle.kind === "sim" ? { ...vehicle, depth_m } : vehicle)),
+  };
+}
+
+/** What one vehicle does at most: its way, its time, and how long its energy lasts; null: that is not known. */
+export interface Share {
+  name: string;
+  metres: number;
+  seconds: number;
+  endurance_s: number | null;
+}
+
+export interface Estimate {
+  seconds: number;
+  metres: number;
+  /** How far apart lines over the whole area would be. */
+  spacing_m: number;
+  shares: readonly Share[];
+  /** From the recovery point to the farthest corner of the area; null: there is none. */
+  farthest_m: number | null;
+}
+
+/** How long a mission takes at most and how far its vehicles go; null while that is not said. */
+export function estimate(described: Draft, area_m2: number): Estimate | null {
+  const draft = resolved(described);
+  const shares = vehicleNames(draft).map((name): Share => {
+    const own = draft.own[name];
+    const speed = Number(own?.speed_mps?.trim() || draft.speed_mps);
+    const metres = wayOf(draft, speed);
+    const endurance_s = Number(own?.endurance_min?.trim() ?? "") * 60;
+    return { name, metres, seconds: metres / speed, endurance_s: endurance_s > 0 ? endurance_s : null };
+  });
+  const metres = shares.reduce((sum, share) => sum + share.metres, 0);
+  const seconds = Math.max(...shares.map((share) => share.seconds));
+  if (!(metres > 0 && seconds > 0)) return null;
+  const home = placeOf(draft.recovery);
+  const farthest_m = home && Math.max(...cornersOf(draft).map((corner) => wayBetween(home, corner).metres));
+  return { seconds, metres, spacing_m: area_m2 / metres, shares, farthest_m };
+}
+
+/** How far a vehicle of this speed goes at most, metres. */
+function wayOf(draft: Draft, speed_mps: number): number {
+  const length = Number(draft[draft.length]);
+  if (draft.length === "minutes") return length * 60 * speed_mps;
+  return length * (draft.length === "steps" ? Number(draft.max_step_m) : 1000);
+}
+
+/** The form's fields for what is no plain value. */
+const OTHERS: [path: string, field: keyof Draft][] = [
+  ["search.goal", "goal"],
+  ["search.entry", "entry"],
+  ["search.obstacles", "obstacles"],
+  ["recovery", "recovery"],
+  ["planner", "planner"],
+  ["tide", "tide_m"],
+  ["vehicles.recovery_point", "own"],
+  ...Object.values(VEHICLE_FIELDS).map(({ path }): [string, keyof Draft] => [path, "own"]),
+  ["vehicles", "simulated"],
+  ["keep_out", "keepOut"],
+  ["area", "ring"],
+  ["name", "name"],
+  ["site", "site"],
+];
+
+/** Which of the form's fields a field of the service's refusal stands for. */
+export function fieldOf(serviceField: string): keyof Draft | null {
+  const plain = Object.entries(FIELDS).map(([name, { path }]) => [path, name as FieldName] as const);
+  const path = serviceField.replace(/^vehicles\.\d+/, "vehicles");
+  const found = [...plain, ...OTHERS].find(([known]) => `${path}.`.startsWith(`${known}.`));
+  return found?.[1] ?? null;
+}

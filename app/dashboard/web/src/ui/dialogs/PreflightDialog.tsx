@@ -1,0 +1,103 @@
+import "./PreflightDialog.css";
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { api } from "../../api/client";
+import type { CheckStatus, PreflightView } from "../../api/types";
+import { act, actionWords, busyWith, refusal, said } from "../../state/session";
+import { mission, preflightOpen, selectedId } from "../../state/store";
+import { say } from "../../words/say";
+import { Forecast } from "../forecast/Forecast";
+import { Button, sets } from "../parts/Controls";
+import { Dialog } from "../parts/Dialog";
+
+const SIGNS: Record<CheckStatus, string> = { ok: "✓", note: "•", warning: "▲", problem: "✕" };
+const TONES: Record<CheckStatus, string> = { ok: "good", note: "calm", warning: "warning", problem: "alarm" };
+const AGAIN_MS = 3000;
+
+/** The checklist before a start; starts the mission when nothing stands in its way. */
+export function PreflightDialog() {
+  const found = useSignal<PreflightView | null>(null);
+  const fault = useSignal("");
+  const open = preflightOpen.value;
+
+  useEffect(() => {
+    if (!open) return;
+    let stopped = false;
+    const look = async () => {
+      const id = selectedId.peek();
+      if (!id) return;
+      try {
+        const answer = await api.preflight(id);
+        if (!stopped) {
+          found.value = answer;
+          fault.value = "";
+        }
+      } catch (error) {
+        fault.value = said(error);
+      }
+    };
+    void look();
+    const timer = setInterval(look, AGAIN_MS);
+    return () => {
+      stopped = true;
+      clearInterval(timer);
+      found.value = null;
+    };
+  }, [open]);
+
+  const close = sets(preflightOpen, false);
+  const start = async () => {
+    if (await act("start")) close();
+  };
+  const view = found.value;
+  const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
+  const refused = refusal.value?.what === actionWords("start") ? refusal.value.error : null;
+  const starting = (
+    <Button
+      id="confirm-start"
+      kind="command primary"
+      commands
+      disabled={!view?.ready || busyWith.value !== null}
+      onClick={() => void start()}
+    >
+      {busyWith.value === "start"
+        ? say("preflight.starting")
+        : problems > 0
+          ? say("preflight.problemToSolveFirst", { problems })
+          : say("preflight.startMission")}
+    </Button>
+  );
+  return (
+    <Dialog
+      open={open}
+      onClose={close}
+      name="preflight"
+      id="preflight"
+      heading={say("preflight.start", { mission: mission.value?.name ?? say("abort.theMission") })}
+      fault={refused ? said(refused) : fault.value}
+      closing={say("preflight.notYet")}
+      actions={starting}
+      kind="preflight"
+      data={{ "data-ready": view?.ready ?? "unknown" }}
+    >
+      {view ? null : <p>{say("preflight.lookingAtTheVehicles")}</p>}
+      <ul class="checklist">
+        {view?.checks.map((check) => (
+          <li key={check.id} data-testid={`check-${check.id}`} data-status={check.status}>
+            <span class={`tone ${TONES[check.status]}`}>
+              <span aria-hidden="true">{SIGNS[check.status]}</span>
+              <span class="visually-hidden">{check.status}:</span>
+            </span>
+            <span>
+              <b>{check.title}</b> {check.message}
+              {check.remedy ? <span class={`remedy ${TONES[check.status]}`}> → {check.remedy}</span> : null}
+            </span>
+          </li>
+        ))}
+      </ul>
+      {open && selectedId.value && mission.value?.spec.kind !== "search" ? (
+        <Forecast of={selectedId.value} ask={(gone) => api.forecast(selectedId.peek() ?? "", gone)} />
+      ) : null}
+    </Dialog>
+  );
+}

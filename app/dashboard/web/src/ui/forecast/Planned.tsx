@@ -1,0 +1,175 @@
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { api, ServiceError } from "../../api/client";
+import type { NewMission, PlanView } from "../../api/types";
+import { vehicleColour } from "../../map/picture/palette";
+import type { Estimate, Share } from "../../state/form/draft";
+import { LatestAsker } from "../../state/form/planning";
+import { distance, duration, percent } from "../../state/format";
+import { said } from "../../state/session";
+import { fleet, planned } from "../../state/store";
+import { say } from "../../words/say";
+import { WholeSurvey } from "./WholeSurvey";
+
+const PERCENT = 100;
+const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
+
+/** Keeps the plan on the map in step with what is described, null while that is no mission; returns what is wrong. */
+export function usePlan(described: string | null): string {
+  const fault = useSignal("");
+  const asker = useRef<LatestAsker<PlanView> | null>(null);
+  asker.current ??= new LatestAsker<PlanView>(
+    (of, gone) => api.plan(JSON.parse(of) as NewMission, gone),
+    (answer, current) => {
+      if ("found" in answer) {
+        planned.value = { plan: answer.found, old: !current };
+        fault.value = "";
+      } else if (current) {
+        planned.value = null;
+        fault.value = reasonOf(answer.error);
+      }
+    },
+  );
+  useEffect(() => {
+    asker.current?.want(described);
+    fault.value = "";
+    const { plan } = planned.peek() ?? {};
+    planned.value = plan && described !== null ? { plan, old: true } : null;
+  }, [described]);
+  useEffect(
+    () => () => {
+      asker.current?.want(null);
+      planned.value = null;
+    },
+    [],
+  );
+  return fault.value;
+}
+
+/** What the service says is wrong with single fields, or with all. */
+function reasonOf(error: unknown): string {
+  const faults = error instanceof ServiceError ? error.faults : [];
+  return faults.length > 0 ? faults.map(({ message }) => message).join("; ") : said(error);
+}
+
+type Vehicle = PlanView["vehicles"][number];
+
+/** What each vehicle does by the plan, or at most while there is none, beside the energy that it has. */
+export function Planned({ of: { shares }, fault }: { of: Estimate; fault: string }) {
+  const { plan, old } = planned.value ?? { plan: null, old: false };
+  const state = plan === null ? "none" : old ? "old" : "new";
+  return (
+    <div class="planned" data-testid="planned" data-plan={state}>
+      {plan ? (
+        <p>
+          <b data-testid="planned-whole">
+            {say("planned.planned", {
+              length: distance(plan.distance_m),
+              time: between(plan.duration_s_range),
+            })}
+          </b>
+        </p>
+      ) : null}
+      {plan?.whole_survey ? <WholeSurvey whole={plan.whole_survey} /> : null}
+      <table class="shares" data-testid="shares">
+        <thead>
+          <tr>
+            {titles().map((title) => (
+              <th key={title} scope="col">
+                {title}
+              </th>
+            ))}
+          </tr>
+        </thead>
+        {shares.map((share, i) => (
+          <Rows
+            key={share.name}
+            share={share}
+            colour={vehicleColour(i)}
+            plan={plan?.vehicles.find((one) => one.vehicle === share.name)}
+          />
+        ))}
+      </table>
+      {fault ? (
+        <p class="reason" role="status" data-testid="plan-fault">
+          {say("planned.noPlan", { fault })}
+        </p>
+      ) : null}
+      {plan ? (
+        <details class="hint">
+          <summary>{say("planned.whatIsTakenToBeSo")}</summary>
+          <ul class="assumptions">
+            {plan.assumptions.map((words) => (
+              <li key={words}>{words}</li>
+            ))}
+          </ul>
+        </details>
+      ) : null}
+    </div>
+  );
+}
+
+const titles = () => [say("asked.time"), say("asked.length"), say("planned.wayHome"), say("asked.energy")];
+
+function Rows({ share, colour, plan }: { share: Share; colour: string; plan: Vehicle | undefined }) {
+  const { name } = share;
+  const { short, words } = energyOf(share, plan);
+  return (
+    <tbody data-testid={`share-${name}`} class={short ? "short" : ""}>
+      <tr>
+        <th scope="rowgroup" colSpan={4}>
+          {plan ? <span class="swatch" style={{ background: colour }} aria-hidden="true" /> : null}
+          {name}
+          {plan?.turn_back_m != null ? (
+            <span class="turn-back">
+              {" "}
+              {say("planned.turnsBackAfter", { way: distance(plan.turn_back_m) })}
+            </span>
+          ) : null}
+        </th>
+      </tr>
+      <tr>
+        <td>{plan ? between(plan.duration_s_range) : duration(share.seconds)}</td>
+        <td>
+          {plan
+            ? say("planned.ofAtMost", { planned: distance(plan.distance_m), most: distance(share.metres) })
+            : distance(share.metres)}
+        </td>
+        <td>{homeOf(plan)}</td>
+        <td>{words}</td>
+      </tr>
+    </tbody>
+  );
+}
+
+function homeOf(plan: Vehicle | undefined): string {
+  if (plan?.distance_home_m == null) return "–";
+  return say("planned.in", { way: distance(plan.distance_home_m), time: duration(plan.home_s) });
+}
+
+function energyOf(
+  { name, seconds, endurance_s }: Share,
+  plan: Vehicle | undefined,
+): { words: string; short: boolean } {
+  const needs_s = plan?.energy_needs_s ?? seconds;
+  const battery_pct = fleet.value.find((v) => v.name === name)?.battery_pct ?? null;
+  if (plan?.energy_left_s != null && (battery_pct !== null || endurance_s === null)) {
+    const short = needs_s > plan.energy_left_s;
+    const share = percent(shareOf(needs_s, plan.energy_left_s));
+    return { short, words: say("planned.ofItsBattery", { it: short ? "▲ " : "", share }) };
+  }
+  if (endurance_s !== null) {
+    const short = needs_s > (plan?.energy_left_s ?? endurance_s);
+    const share = percent(shareOf(needs_s, endurance_s));
+    return { short, words: say("asked.ofItsEndurance", { it: short ? "▲ " : "", seconds: share }) };
+  }
+  if (battery_pct !== null)
+    return { short: false, words: say("asked.battery", { batteryPct: percent(battery_pct) }) };
+  return { short: false, words: say("asked.notKnown") };
+}
+
+/** "low to high" where they differ as they are shown. */
+function between({ low, high }: { low: number; high: number }): string {
+  const [a, b] = [duration(low), duration(high)];
+  return a === b ? a : say("forecast.to", { low: a, high: b });
+}

@@ -1,0 +1,166 @@
+import "./AreaFields.css";
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import type { LngLat } from "../../api/types";
+import { areasIn, sizeOf } from "../../map/area";
+import { centred, cornersOf } from "../../state/form/draft";
+import { distance, fixed } from "../../state/format";
+import { type Drawing, drawing, drawingReady, editing, editingReady, mapCentre } from "../../state/store";
+import { say } from "../../words/say";
+import { Button, FileButton } from "../parts/Controls";
+import { Fault, Text, useForm } from "./Fields";
+
+/** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
+export function AreaFields() {
+  const { draft, faults, set } = useForm();
+  const note = useSignal("");
+  const others = useSignal<readonly (readonly LngLat[])[]>([]);
+  const corners = cornersOf(draft);
+  const size = corners.length > 2 ? sizeOf(corners) : null;
+  const dragged = useRef<readonly LngLat[] | null>(null);
+  const busy = drawing.value !== null;
+  useEffect(() => {
+    if (draft.source !== "drawn" || draft.ring.length < 3 || busy) editing.value = null;
+    else if (draft.ring !== dragged.current) {
+      editing.value = {
+        ring: draft.ring,
+        onChanged: (ring) => {
+          dragged.current = ring;
+          set({ ring });
+        },
+      };
+    }
+    if (busy) dragged.current = null;
+  }, [draft.source, draft.ring, busy]);
+  useEffect(
+    () => () => {
+      editing.value = null;
+    },
+    [],
+  );
+  const begin = (shape: Drawing["shape"], onDrawn: (ring: LngLat[]) => void) => {
+    drawing.value = { shape, onDrawn };
+  };
+  const take = (ring: LngLat[]) => {
+    note.value = "";
+    others.value = [];
+    set({ source: "drawn", ring });
+  };
+  const read = (name: string, text: string) => {
+    try {
+      const found = areasIn(name, text);
+      set({ source: "drawn", ring: found.area, keepOut: [...draft.keepOut, ...found.keepOut] });
+      note.value = found.note;
+      others.value = found.others;
+    } catch (error) {
+      note.value = error instanceof Error ? error.message : String(error);
+    }
+  };
+  return (
+    <fieldset>
+      <legend>{say("area.area")}</legend>
+      <div class="draw-buttons">
+        <Button
+          id="draw-polygon"
+          aria-pressed={drawing.value?.shape === "polygon"}
+          onClick={() => begin("polygon", take)}
+        >
+          {say("area.drawCorners")}
+        </Button>
+        <Button
+          id="draw-rectangle"
+          aria-pressed={drawing.value?.shape === "rectangle"}
+          onClick={() => begin("rectangle", take)}
+        >
+          {say("area.drawRectangle")}
+        </Button>
+        <FileButton accept=".geojson,.json,.kml" id="area-file" onText={read}>
+          {say("area.fromAFile")}
+        </FileButton>
+      </div>
+      {drawing.value ? (
+        <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>
+          {drawing.value.shape === "polygon"
+            ? say("area.clickCornerAfterCornerOnThe")
+            : say("area.clickOneCornerOnTheMap")}
+        </p>
+      ) : null}
+      {editing.value ? (
+        <p class="hint" role="status" data-testid="editing" data-ready={editingReady.value}>
+          {say("area.dragACornerOnTheMap")}
+        </p>
+      ) : null}
+      {note.value ? (
+        <p class="hint" role="status" data-testid="area-note">
+          {note.value}
+        </p>
+      ) : null}
+      {others.value.length > 0 ? (
+        <div class="other-areas">
+          {others.value.map((ring, i) => (
+            <Button
+              id={`other-area-${i + 1}`}
+              key={ring.join()}
+              onClick={() => {
+                others.value = others.value.map((one) => (one === ring ? draft.ring : one));
+                set({ source: "drawn", ring });
+              }}
+            >
+              {say("area.takeTheOneOfHa", { areaM2: fixed(sizeOf(ring).area_m2 / 1e4, 2) })}
+            </Button>
+          ))}
+        </div>
+      ) : null}
+      {draft.source === "typed" ? (
+        <>
+          <div class="pair">
+            <Text field="latitude" label={say("area.southWestCornerN")} numeric />
+            <Text field="longitude" label={say("area.southWestCornerE")} numeric />
+            <Text field="east_m" label={say("area.toTheEastM")} numeric />
+            <Text field="north_m" label={say("area.toTheNorthM")} numeric />
+          </div>
+          <Button kind="link-button" onClick={() => set(centred(draft, mapCentre.value))}>
+            {say("area.placeItInTheMiddleOf")}
+          </Button>
+        </>
+      ) : (
+        <Button kind="link-button" onClick={() => set({ source: "typed" })}>
+          {say("area.typeARectangleInstead")}
+        </Button>
+      )}
+      {size && !faults.ring ? (
+        <p class="hint" data-testid="area-size">
+          {say("area.xHa", {
+            eastM: distance(size.east_m),
+            northM: distance(size.north_m),
+            areaM2: fixed(size.area_m2 / 1e4, 2),
+            it: draft.source === "drawn" ? say("area.corners", { corners: corners.length }) : "",
+          })}
+        </p>
+      ) : null}
+      <Fault field="ring" />
+      <div class="zones">
+        <Button
+          id="draw-keep-out"
+          kind="link-button"
+          onClick={() => begin("polygon", (ring) => set({ keepOut: [...draft.keepOut, ring] }))}
+        >
+          {say("area.keepOutZone")}
+        </Button>
+        {draft.keepOut.map((zone, i) => (
+          <span key={zone.join()} class="zone">
+            {say("area.zone", { i: i + 1 })}
+            <Button
+              kind="tool small"
+              aria-label={say("area.removeKeepOutZone", { i: i + 1 })}
+              onClick={() => set({ keepOut: draft.keepOut.filter((_, k) => k !== i) })}
+            >
+              ✕
+            </Button>
+          </span>
+        ))}
+      </div>
+      <Fault field="keepOut" />
+    </fieldset>
+  );
+}

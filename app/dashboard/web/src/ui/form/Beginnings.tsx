@@ -1,0 +1,98 @@
+import { useSignal } from "@preact/signals";
+import type { NewMission } from "../../api/types";
+import { kept } from "../../kept";
+import { type Draft, faultsOf, toMission } from "../../state/form/draft";
+import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
+import { type Key, say } from "../../words/say";
+import { Button, Choice, FileButton, same, Trouble } from "../parts/Controls";
+import { saveText } from "../parts/saving";
+
+/** Templates that were kept on this device. */
+const templates = kept<readonly Template[]>("templates", []);
+
+/** What comes with the page: changes of a draft. */
+const BUILT_IN: Readonly<Partial<Record<Key, Partial<Draft>>>> = {
+  "beginnings.singleBeamsOrDvlAdaptive": { kind: "survey", planner: "cao", sensor: "dvl" },
+  "beginnings.multibeamFullCoverage": { kind: "survey", planner: "swath", sensor: "multibeam" },
+};
+
+/** What a new mission begins with: a template, or a file. */
+export function Beginnings({ draft, onBegin }: { draft: Draft; onBegin: (draft: Draft) => void }) {
+  const fault = useSignal("");
+  const read = (name: string, text: string) => {
+    try {
+      fault.value = "";
+      onBegin(draftIn(name, text));
+    } catch (error) {
+      fault.value = error instanceof Error ? error.message : String(error);
+    }
+  };
+  const choose = (name: string) => {
+    const own = templates.value.find((one) => one.name === name);
+    if (own) onBegin(withTemplate(own.mission, draft));
+    else onBegin({ ...draft, ...BUILT_IN[name as Key] });
+  };
+  const builtIn = (Object.keys(BUILT_IN) as Key[]).map(
+    (key) => [key, say(key as "beginnings.multibeamFullCoverage")] as const,
+  );
+  return (
+    <div class="beginnings">
+      <Choice
+        value=""
+        label={say("beginnings.beginWithATemplate")}
+        options={[
+          ["", say("beginnings.beginWithATemplate2")],
+          ...builtIn,
+          ...same(templates.value.map(({ name }) => name)),
+        ]}
+        id="template"
+        onChoose={choose}
+      />
+      <FileButton accept=".json" id="mission-file" onText={read}>
+        {say("beginnings.import")}
+      </FileButton>
+      <Trouble words={fault.value} />
+    </div>
+  );
+}
+
+/** Keeps what is described: as a file, or as a template for missions elsewhere. */
+export function Keeping({ draft }: { draft: Draft }) {
+  const whole = Object.keys(faultsOf(draft)).length === 0;
+  const why = whole ? "" : say("beginnings.onlyADescriptionWithout");
+  const described = (): NewMission => toMission(draft);
+  const mine = templates.value.find(({ name }) => name === draft.name.trim());
+  return (
+    <div class="keeping">
+      <Button
+        id="export-draft"
+        disabled={!whole}
+        title={why}
+        onClick={() => saveText(fileNameOf(draft.name), missionFile(described(), draft.tide_table))}
+      >
+        {say("beginnings.export")}
+      </Button>
+      <Button
+        id="keep-template"
+        disabled={!whole}
+        title={why || say("beginnings.keepsAllButThePlacesOn")}
+        onClick={() => {
+          const others = templates.value.filter((one) => one !== mine);
+          templates.value = [...others, { name: draft.name.trim(), mission: described() }];
+        }}
+      >
+        {mine ? say("beginnings.renewTheTemplate") : say("beginnings.keepAsTemplate")}
+      </Button>
+      {mine ? (
+        <Button
+          id="forget-template"
+          onClick={() => {
+            templates.value = templates.value.filter((one) => one !== mine);
+          }}
+        >
+          {say("beginnings.forgetTheTemplate")}
+        </Button>
+      ) : null}
+    </div>
+  );
+}

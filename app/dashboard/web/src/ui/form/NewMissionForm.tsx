@@ -1,0 +1,267 @@
+import "./NewMissionForm.css";
+import { useSignal, useSignalEffect } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { api, ServiceError } from "../../api/client";
+import { polygonOf } from "../../map/area";
+import type { PlaceMark } from "../../map/marks/marks";
+import { recoveryMarks } from "../../map/marks/recovery";
+import {
+  areaOf,
+  copyOf,
+  type Draft,
+  emptyDraft,
+  type Faults,
+  faultsOf,
+  fieldOf,
+  toMission,
+  turnedInto,
+  vehicleNames,
+} from "../../state/form/draft";
+import { placeOf } from "../../state/place";
+import { createMission, describeMission, said } from "../../state/session";
+import {
+  copied,
+  describing,
+  draftShapes,
+  drawing,
+  editedMission,
+  mapCentre,
+  picking,
+} from "../../state/store";
+import { say } from "../../words/say";
+import { Button, FileButton, useEscape } from "../parts/Controls";
+import { AreaFields } from "./AreaFields";
+import { AskedFields } from "./AskedFields";
+import { Beginnings, Keeping } from "./Beginnings";
+import { ExpertFields } from "./ExpertFields";
+import { Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
+import { SearchFields } from "./SearchFields";
+import { SiteFields } from "./SiteFields";
+import { VehicleFields } from "./VehicleFields";
+
+export function NewMissionForm() {
+  const original = copied.peek();
+  const edited = editedMission.peek();
+  const draft = useSignal(
+    edited
+      ? { ...copyOf(edited), name: edited.name }
+      : original
+        ? copyOf(original)
+        : emptyDraft(mapCentre.peek()),
+  );
+  const faults = useSignal<Faults>({});
+  const refused = useSignal<ServiceError | null>(null);
+  const sending = useSignal(false);
+
+  useSignalEffect(() => {
+    draftShapes.value = {
+      area: areaOf(draft.value),
+      keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
+      marks: draftMarks(draft.value),
+    };
+  });
+  useEscape(drawing);
+  useEscape(picking);
+  useEffect(
+    () => () => {
+      draftShapes.value = null;
+    },
+    [],
+  );
+
+  const close = () => {
+    describing.value = false;
+    copied.value = null;
+    editedMission.value = null;
+  };
+  /** Begins with what a file or a template says. */
+  const begin = (next: Draft) => {
+    draft.value = next;
+    faults.value = {};
+    refused.value = null;
+  };
+  const set: FormState["set"] = (how) => {
+    const change = typeof how === "function" ? how(draft.value) : how;
+    draft.value = { ...draft.value, ...change };
+    const found = faultsOf(draft.value);
+    // What was drawn is judged at once, typed fields only after the first try.
+    if (Object.keys(faults.value).length > 0) faults.value = found;
+    else if (change.ring || change.keepOut) {
+      const { ring, keepOut } = found;
+      faults.value = { ...(ring ? { ring } : {}), ...(keepOut ? { keepOut } : {}) };
+    }
+  };
+  const submit = async (event: SubmitEvent) => {
+    event.preventDefault();
+    faults.value = faultsOf(draft.value);
+    refused.value = null;
+    if (Object.keys(faults.value).length > 0) return;
+    sending.value = true;
+    try {
+      const described = toMission(draft.value);
+      if (edited) await describeMission(edited.id, described);
+      const id = edited?.id ?? (await createMission(described));
+      if (draft.value.tide_table) {
+        await api.setTide(id, {
+          table: draft.value.tide_table,
+          source: draft.value.tide_source || say("mission.tideTable"),
+        });
+      }
+      close();
+    } catch (error) {
+      if (!(error instanceof ServiceError)) throw error;
+      refused.value = error;
+      for (const { field, message, expected } of error.faults) {
+        const own = fieldOf(field);
+        if (own)
+          faults.value = {
+            ...faults.value,
+            [own]: [message, expected].filter(Boolean).join(say("mission.expected")),
+          };
+      }
+    } finally {
+      sending.value = false;
+    }
+  };
+  return (
+    <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
+      <form
+        class="new-mission"
+        onSubmit={(event) => void submit(event)}
+        noValidate
+        data-testid="mission-form"
+      >
+        <header class="panel-head">
+          <h2>
+            {edited
+              ? say("mission.editAMission")
+              : original
+                ? say("missions.sameAgain")
+                : say("mission.newMission")}
+          </h2>
+          <Button onClick={close}>{say("mission.cancel")}</Button>
+        </header>
+        {edited ? (
+          <p class="hint">{say("mission.itKeepsItsNumber")}</p>
+        ) : (
+          <Beginnings draft={draft.value} onBegin={begin} />
+        )}
+        <Text field="name" label={say("mission.name")} placeholder={say("mission.leixEsQuay")} />
+        <Kind />
+        {draft.value.kind === "survey" ? <AskedFields /> : null}
+        <AreaFields />
+        {draft.value.kind === "survey" ? <SiteFields /> : null}
+        {draft.value.kind === "search" ? <SearchFields /> : null}
+        <VehicleFields />
+        <RecoveryFields />
+        <ExpertFields />
+        <details>
+          <summary>{say("mission.tide")}</summary>
+          <div class="pair">
+            <Part of="tide" />
+            <Text field="tide_source" label={say("mission.fromWhere")} placeholder={say("mission.gauge")} />
+          </div>
+          <FileButton
+            accept=".tid,.txt"
+            id="tide-file"
+            onText={(name, text) => set({ tide_table: text, tide_source: name })}
+          >
+            {draft.value.tide_table
+              ? say("mission.table", { tideSource: draft.value.tide_source })
+              : say("mission.tableTid")}
+          </FileButton>
+          <p class="hint">{say("mission.tidesCanBeSetAndChanged")}</p>
+        </details>
+        {refused.value ? (
+          <p class="reason alarm" role="alert">
+            {said(refused.value)}
+          </p>
+        ) : null}
+        <button
+          type="submit"
+          class="command primary wide"
+          disabled={sending.value}
+          data-testid="create-mission"
+        >
+          {sending.value
+            ? say("mission.oneMoment")
+            : edited
+              ? say("mission.saveMission")
+              : say("mission.createMission")}
+        </button>
+        <Keeping draft={draft.value} />
+      </form>
+    </Form.Provider>
+  );
+}
+
+/** To map the sea floor, or to look for something among obstacles. */
+function Kind() {
+  const { draft, set } = useForm();
+  const choice = (kind: Draft["kind"], title: string, words: string) => (
+    <label class="preset">
+      <input
+        type="radio"
+        name="kind"
+        checked={draft.kind === kind}
+        data-testid={`kind-${kind}`}
+        onChange={() => set(turnedInto(kind, draft))}
+      />
+      <span>
+        <b>{title}</b> <small>{words}</small>
+      </span>
+    </label>
+  );
+  return (
+    <fieldset class="planner">
+      <legend>{say("mission.whatFor")}</legend>
+      {choice("survey", say("mission.survey"), say("mission.mapTheSeaFloorOfThe"))}
+      {choice("search", say("mission.search"), say("mission.lookForSomethingInAPartly"))}
+    </fieldset>
+  );
+}
+
+/** Places of a mission that is being described, as far as they are given. */
+function draftMarks(draft: Draft): PlaceMark[] {
+  const length_m = (text: string) => (Number(text) > 0 ? Number(text) : 0);
+  const [goal, entry, point] = [placeOf(draft.goal), placeOf(draft.entry), placeOf(draft.recovery)];
+  const radius_m = length_m(draft.recovery_radius_m);
+  const vehicles = vehicleNames(draft).map((name) => ({
+    name,
+    recovery_point: placeOf(draft.own[name]?.recovery_point ?? ""),
+  }));
+  const homes = recoveryMarks({ recovery: point && { point, radius_m }, vehicles }, radius_m);
+  if (draft.kind !== "search") return homes;
+  return [
+    ...homes,
+    ...(goal
+      ? [
+          {
+            words: say("mission.goal"),
+            sign: "goal" as const,
+            at: goal,
+            radius_m: length_m(draft.goal_radius_m),
+          },
+        ]
+      : []),
+    ...(entry ? [{ words: say("mission.entry"), sign: "entry" as const, at: entry, radius_m: 0 }] : []),
+  ];
+}
+
+/** Where vehicles come home to, and what sends them there. */
+function RecoveryFields() {
+  const { draft } = useForm();
+  return (
+    <fieldset>
+      <legend>{say("mission.recovery")}</legend>
+      <PlaceField field="recovery" label={say("mission.recoveryPoint")} />
+      {draft.recovery.trim() === "" ? (
+        <p class="hint">{say("mission.withoutOneVehiclesStopAnd")}</p>
+      ) : (
+        <div class="pair">
+          <Part of="recovery" />
+        </div>
+      )}
+    </fieldset>
+  );
+}

@@ -1,0 +1,53 @@
+import { useSignal } from "@preact/signals";
+import { areasIn } from "../../map/area";
+import { say } from "../../words/say";
+import { Button, FileButton } from "../parts/Controls";
+import { Fault, Part, PlaceField, useForm } from "./Fields";
+
+/** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
+export function SearchFields() {
+  const { draft, set } = useForm();
+  const note = useSignal("");
+  const read = (name: string, text: string) => {
+    try {
+      const { area, keepOut, others } = areasIn(name, text);
+      const obstacles = [area, ...keepOut, ...others];
+      set({ obstacles: [...draft.obstacles, ...obstacles] });
+      note.value = say("search.obstacle", { name, obstacles: obstacles.length });
+    } catch (error) {
+      note.value = error instanceof Error ? error.message : String(error);
+    }
+  };
+  return (
+    <fieldset>
+      <legend>{say("mission.search")}</legend>
+      <PlaceField field="goal" label={say("mission.goal")} />
+      <PlaceField field="entry" label={say("search.entryAndExit")} />
+      <div class="pair">
+        <Part of="search" />
+        <Part of="quality" />
+      </div>
+      <FileButton accept=".geojson,.json,.kml" id="obstacles-file" onText={read}>
+        {say("search.knownObstaclesFromAFile")}
+      </FileButton>
+      {draft.obstacles.length > 0 ? (
+        <span class="zone">
+          {say("search.known", { obstacles: draft.obstacles.length })}
+          <Button
+            kind="tool small"
+            aria-label={say("search.forgetTheKnownObstacles")}
+            onClick={() => set({ obstacles: [] })}
+          >
+            ✕
+          </Button>
+        </span>
+      ) : null}
+      {note.value ? (
+        <p class="hint" role="status">
+          {note.value}
+        </p>
+      ) : null}
+      <Fault field="obstacles" />
+    </fieldset>
+  );
+}

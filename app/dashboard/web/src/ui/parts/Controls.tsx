@@ -1,0 +1,162 @@
+/** Controls that several parts of the page have. */
+
+import type { Signal } from "@preact/signals";
+import type { AriaAttributes, ComponentChildren } from "preact";
+import { useEffect } from "preact/hooks";
+import { whyNotCommand } from "../../state/access";
+
+/** Handlers that give a signal this value, the opposite of what it has, or what they are called with. */
+export const sets =
+  <T,>(signal: Signal<T>, value: T) =>
+  () => {
+    signal.value = value;
+  };
+export const flips = (signal: Signal<boolean>) => () => {
+  signal.value = !signal.value;
+};
+export const into =
+  <T,>(signal: Signal<T>) =>
+  (value: T) => {
+    signal.value = value;
+  };
+
+interface ButtonProps extends AriaAttributes {
+  id?: string;
+  /** Its class. */
+  kind?: string;
+  /** Whether it commands: it says why where this user may not. */
+  commands?: boolean;
+  disabled?: boolean;
+  title?: string;
+  onClick: (event: MouseEvent) => void;
+  children: ComponentChildren;
+}
+
+export function Button({ id, kind = "command", commands = false, disabled, title, ...rest }: ButtonProps) {
+  const why = commands ? whyNotCommand.value : "";
+  return (
+    <button
+      type="button"
+      class={kind}
+      data-testid={id}
+      disabled={disabled || why !== ""}
+      title={why || title}
+      {...rest}
+    />
+  );
+}
+
+interface ChoiceProps<T extends string> {
+  value: T;
+  /** Values with their words. */
+  options: readonly (readonly [value: T, words: string])[];
+  onChoose: (value: T) => void;
+  label?: string;
+  title?: string;
+  id?: string;
+}
+
+/** One of several. */
+export function Choice<T extends string>({ value, options, onChoose, label, title, id }: ChoiceProps<T>) {
+  return (
+    <select
+      value={value}
+      aria-label={label}
+      title={title}
+      data-testid={id}
+      onChange={(event) => onChoose(event.currentTarget.value as T)}
+    >
+      {options.map(([name, words]) => (
+        <option key={name} value={name}>
+          {words}
+        </option>
+      ))}
+    </select>
+  );
+}
+
+/** What a table of titles offers. */
+export const titles = <T extends string>(table: Readonly<Record<T, { title: string }>>) =>
+  Object.entries<{ title: string }>(table).map(([name, { title }]) => [name as T, title] as const);
+
+/** Values that are their own words. */
+export const same = <T extends string>(values: readonly T[]) =>
+  values.map((value) => [value, value] as const);
+
+interface TypedProps {
+  text: Signal<string>;
+  label?: string;
+  id: string;
+  type?: "text" | "search" | "password";
+  placeholder?: string;
+  maxLength?: number;
+  autocomplete?: string;
+}
+
+/** A line of text, kept in a signal. */
+export function Typed({ text, label, id, type = "text", ...rest }: TypedProps) {
+  return (
+    <input
+      // The element's attributes depend on its type; these belong to every line of text.
+      type={type as "text"}
+      aria-label={label}
+      value={text.value}
+      data-testid={id}
+      onInput={(event) => {
+        text.value = event.currentTarget.value;
+      }}
+      {...rest}
+    />
+  );
+}
+
+interface FileButtonProps {
+  accept: string;
+  id: string;
+  onText: (name: string, text: string) => void;
+  children: ComponentChildren;
+}
+
+/** Reads a file; the same one can be chosen again. */
+export function FileButton({ accept, id, onText, children }: FileButtonProps) {
+  const read = async (file: File | undefined) => {
+    if (file) onText(file.name, await file.text());
+  };
+  return (
+    <label class="command file">
+      {children}
+      <input
+        type="file"
+        accept={accept}
+        data-testid={id}
+        onChange={(event) => {
+          void read(event.currentTarget.files?.[0]);
+          event.currentTarget.value = "";
+        }}
+      />
+    </label>
+  );
+}
+
+/** What went wrong, beside what was tried; nothing when all is well. */
+export function Trouble({ words }: { words: string }) {
+  return words ? (
+    <p class="reason alarm" role="alert">
+      {words}
+    </p>
+  ) : null;
+}
+
+/** Lets Escape, and the end of the part that waits, take back what is waited for. */
+export function useEscape<T>(waiting: Signal<T | null>): void {
+  useEffect(() => {
+    const stop = (event: KeyboardEvent) => {
+      if (event.key === "Escape") waiting.value = null;
+    };
+    window.addEventListener("keydown", stop);
+    return () => {
+      window.removeEventListener("keydown", stop);
+      waiting.value = null;
+    };
+  }, []);
+}

@@ -1,0 +1,156 @@
+import "./EventLog.css";
+import { useComputed, useSignal } from "@preact/signals";
+import { api } from "../../api/client";
+import type { EventView, Level } from "../../api/types";
+import { whyNotCommand } from "../../state/access";
+import { clock } from "../../state/format";
+import { vehicleOf } from "../../state/past/placeThen";
+import { showEvent } from "../../state/past/whereabouts";
+import { said } from "../../state/session";
+import { selectedId, view } from "../../state/store";
+import { say } from "../../words/say";
+import { Button, Choice, into, same, Typed } from "../parts/Controls";
+
+const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
+const MOST_SHOWN = 300;
+/** Which lines are shown. */
+const choices = () =>
+  [
+    ["all", say("log.allLines")],
+    ["important", say("log.warningsAndAlarms")],
+    ["notes", say("log.notes")],
+  ] as const;
+
+/** The mission's log, newest first, with a field for what the next watch should know. */
+export function EventLog() {
+  const least = useSignal<ReturnType<typeof choices>[number][0]>("all");
+  const kind = useSignal("");
+  const words = useSignal("");
+  const vehicle = useSignal("");
+  const named = useComputed(() => [...new Set(view.value.events.flatMap((e) => vehicleOf(e) ?? []))].sort());
+  const kinds = useComputed(() => [...new Set(view.value.events.map((e) => e.kind))].sort());
+  const wanted = words.value.trim().toLowerCase();
+  const lines = view.value.events
+    .filter((e) => least.value !== "important" || e.level !== "info")
+    .filter((e) => least.value !== "notes" || e.kind === "note")
+    .filter((e) => kind.value === "" || e.kind === kind.value)
+    .filter((e) => vehicle.value === "" || vehicleOf(e) === vehicle.value)
+    .filter((e) => wanted === "" || `${e.message} ${e.kind}`.toLowerCase().includes(wanted))
+    .slice(-MOST_SHOWN);
+  return (
+    <div class="log" data-testid="log">
+      <NoteForm />
+      <div class="filters">
+        <Choice
+          label={say("log.whichLines")}
+          value={least.value}
+          options={choices()}
+          id="log-level"
+          onChoose={into(least)}
+        />
+        <Choice
+          label={say("log.kindOfLine")}
+          value={kind.value}
+          options={[["", say("log.everyKind")], ...same(kinds.value)]}
+          onChoose={into(kind)}
+        />
+        <Choice
+          label={say("log.vehicle")}
+          value={vehicle.value}
+          options={[["", say("log.everyVehicle")], ...same(named.value)]}
+          id="log-vehicle"
+          onChoose={into(vehicle)}
+        />
+        <Typed
+          text={words}
+          type="search"
+          label={say("log.wordsInTheLine")}
+          placeholder={say("log.words")}
+          id="log-words"
+        />
+      </div>
+      {lines.length === 0 ? <p class="empty">{say("log.noLineIsLikeThat")}</p> : null}
+      <ol aria-label={say("log.logNewestFirst")}>
+        {lines.reverse().map((event) => (
+          <li key={event.id} class={`${event.level}${event.kind === "note" ? " note" : ""}`}>
+            <time
+              dateTime={event.time}
+              title={say("log.local", { it: clock(new Date(event.time), "local") })}
+            >
+              {clock(new Date(event.time), "utc")}
+            </time>
+            <span aria-hidden="true">{SIGNS[event.level]}</span>
+            <span class="kind">{event.kind}</span>
+            <span class="message">
+              {hasPlace(event) ? (
+                <Button
+                  kind="log-line"
+                  id={`where-${event.id}`}
+                  title={say("log.showOnTheMap")}
+                  onClick={() => void showEvent(event)}
+                >
+                  {event.message}
+                </Button>
+              ) : (
+                event.message
+              )}
+              {event.kind === "note" && event.data.actor ? <small> {String(event.data.actor)}</small> : null}
+            </span>
+          </li>
+        ))}
+      </ol>
+    </div>
+  );
+}
+
+const hasPlace = (event: EventView) => vehicleOf(event) !== null || typeof event.data.lat_deg === "number";
+
+function NoteForm() {
+  const text = useSignal("");
+  const fault = useSignal("");
+  const sending = useSignal(false);
+  const write = async () => {
+    const id = selectedId.value;
+    if (!id || text.value.trim() === "") return;
+    sending.value = true;
+    try {
+      await api.note(id, text.value.trim());
+      text.value = "";
+      fault.value = "";
+    } catch (error) {
+      fault.value = said(error);
+    } finally {
+      sending.value = false;
+    }
+  };
+  return (
+    <form
+      class="note-form"
+      onSubmit={(event) => {
+        event.preventDefault();
+        void write();
+      }}
+    >
+      <Typed
+        text={text}
+        label={say("log.noteForTheLog")}
+        placeholder={say("log.noteForTheNextWatch")}
+        maxLength={2000}
+        id="note"
+      />
+      <button
+        type="submit"
+        class="command"
+        disabled={sending.value || text.value.trim() === "" || whyNotCommand.value !== ""}
+        title={whyNotCommand.value}
+      >
+        {say("log.writeDown")}
+      </button>
+      {fault.value ? (
+        <span class="fault" role="alert">
+          {fault.value}
+        </span>
+      ) : null}
+    </form>
+  );
+}

@@ -1,0 +1,1 @@
+"""How controllers are trained: optimisers, where their scores are computed, curves."""

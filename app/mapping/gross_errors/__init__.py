@@ -1,0 +1,1 @@
+"""Gross errors among soundings: fish, multiple echoes. Others use ``outliers``."""

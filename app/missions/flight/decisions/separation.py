@@ -1,0 +1,106 @@
+"""Keeps vehicles that fly on their own time apart: whole planned motions are held against each other, in time."""
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
+from app.exploration.motion.timeline import Approach, Timeline, closest_approach
+from app.missions.flight.decisions.decision import Decision
+from app.missions.live.mission import LiveMission
+from app.missions.spec.mission import Limits, MissionSpec
+from app.missions.team import Member
+
+DIRECTIONS = 16
+PARTS = (1.0, 0.5)
+"""Of the longest leg."""
+
+
+def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[str, str]:
+    """Return the vehicles whose new leg would bring them too close to another one, and how close.
+
+    A vehicle is taken to fly its committed legs at its speed and to stay where the last one ends. Of those with a new
+    leg the one that is too close to most others does without it, then the next, until nobody is too close.
+    """
+    limits = spec.limits
+    if limits.min_separation_m <= 0.0:
+        return {}
+    before = {m.name: _motion(m, live, spec) for m in live.team if m.present}
+    new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
+    speeds = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}
+    refused: dict[str, str] = {}
+    while True:
+        moving = {name: _continued(before[name], end, speeds[name]) for name, end in new.items()}
+        close = [
+            (name, other, approach)
+            for name in sorted(moving)
+            for other, motion in (before | moving).items()
+            if other != name
+            if (approach := _approach(moving[name], float(before[name].time_s[-1]), motion, limits)) is not None
+        ]
+        if not close:
+            return refused
+        involved = [name for name, other, _ in close] + [other for _, other, _ in close if other in moving]
+        waits = max(sorted(set(involved) & moving.keys()), key=involved.count)
+        other, approach = next(
+            (other if name == waits else name, approach) for name, other, approach in close if waits in (name, other)
+        )
+        refused[waits] = (
+            f"its next leg passes {other} at {approach.distance_m:.1f} m, closer than {limits.min_separation_m:g} m, "
+            f"{approach.time_s:.0f} s from now"
+        )
+        del new[waits]
+
+
+def ways_aside(start: FloatArray, target: FloatArray, constraints: Constraints, bottom: Bottom) -> FloatArray:
+    """Return where a vehicle may go in place of its target, (k, 3): in all directions, the nearest to the target first.
+
+    Parameters
+    ----------
+    start, target : (3,)
+        East, north and depth of travel.
+    bottom
+        Pessimistic sea floor.
+    """
+    course = np.arange(0.0, 2 * np.pi, 2 * np.pi / DIRECTIONS)
+    unit = np.column_stack([np.sin(course), np.cos(course), np.zeros(DIRECTIONS)])
+    reach_m = constraints.max_step_m * (1 - 1e-9)
+    ends = np.concatenate([start + part * reach_m * unit for part in PARTS])
+    free = ends[constraints.feasible(start[None], ends[:, None], bottom)]
+    return np.asarray(free[np.argsort(np.hypot(*(free - target)[:, :2].T), kind="stable")])
+
+
+def _approach(leg: Timeline, begins_s: float, other: Timeline, limits: Limits) -> Approach | None:
+    """Return how close a vehicle's last leg comes to another motion, if that is too close."""
+    nearest = closest_approach(_from(leg, begins_s), other, limits.min_vertical_separation_m)
+    if nearest.distance_m >= limits.min_separation_m:
+        return None
+    # Whoever is too close already may go farther away.
+    apart = leg.at(np.array([begins_s]))[0] - other.at(np.array([begins_s]))[0]
+    return nearest if nearest.distance_m < float(np.hypot(*apart[:2])) - 1e-6 else None
+
+
+def _motion(member: Member, live: LiveMission, spec: MissionSpec) -> Timeline:
+    """Return a vehicle's motion from now to the end of its last committed leg."""
+    depth_m = member.cruise_depth_m(spec.limits) if member.report is None else member.report.position.depth_m
+    motion = Timeline(np.zeros(1), np.append(member.place_m(live.frame), depth_m)[None])
+    speed_mps = spec.speed_of(member.spec)
+    if member.order is not None and member.target_m is not None and member.busy:
+        end = np.append(member.target_m, member.order.position.depth_m)
+        motion = _continued(motion, end, speed_mps)
+    for leg in member.ahead:
+        motion = _continued(motion, np.append(leg.target_m, leg.position.depth_m), speed_mps)
+    return motion
+
+
+def _continued(motion: Timeline, target_m: np.ndarray, speed_mps: float) -> Timeline:
+    length_m = float(np.linalg.norm(target_m - motion.place_m[-1]))
+    arrives_s = motion.time_s[-1] + max(length_m / speed_mps, 1e-3)
+    return Timeline(np.append(motion.time_s, arrives_s), np.vstack([motion.place_m, target_m]))
+
+
+def _from(motion: Timeline, begin_s: float) -> Timeline:
+    """Return the part of a motion from a time on."""
+    later = motion.time_s > begin_s
+    start = motion.at(np.array([begin_s]))
+    return Timeline(np.append(begin_s, motion.time_s[later]), np.vstack([start, motion.place_m[later]]))

@@ -1,0 +1,212 @@
+"""Sends vehicles the legs that are committed for them, each vehicle on its own time."""
+
+import asyncio
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import structlog
+
+from app.arrays import FloatArray
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
+from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.stragglers import late_at_s, leg_allowed_s, missed, tell_of
+from app.missions.live.mission import LiveMission
+from app.missions.team import Member
+from app.missions.views.mission import Level
+
+HOLD_AFTER_S = 1.0
+"""How long a vehicle that has no leg flies straight on, by its clock, before it is sent to circle somewhere."""
+
+MOST_REFUSALS = 5
+"""How often a vehicle may refuse the same leg before the next one is tried."""
+
+log = structlog.get_logger(__name__)
+
+
+class Dispatch:
+    """Makes legs ahead orders, sends them, and judges those that take too long.
+
+    Parameters
+    ----------
+    live, hub
+    committing
+        Makes a leg an order.
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    persistent
+        Whether a vehicle that refuses its leg is sent it again; else the leg is over for it.
+    """
+
+    def __init__(
+        self, live: LiveMission, hub: FleetHub, committing: LegCommit, time_scale: float, *, persistent: bool
+    ) -> None:
+        self._persistent = persistent
+        self._live = live
+        self._hub = hub
+        self._committing = committing
+        self._time_scale = time_scale
+        self._idle_since_s: dict[str, float] = {}
+        """Since when vehicles have had nothing to fly, the event loop's time; inf once they hold."""
+        self.given_up: dict[str, list[FloatArray]] = {}
+        """Where legs were to end that vehicles did not fly, each (2,), until somebody takes note of it."""
+        self.dropped: dict[str, list[FloatArray]] = {}
+        """Where legs were to end that something barred, each (2,), until the planner is told to lead round that."""
+        self.turned_down: dict[str, int] = {}
+        """How often vehicles refused the order that they have."""
+
+    async def keep(self) -> None:
+        """Keep every vehicle flying its own legs until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await self.begin()
+            for member in self._live.team:
+                if member.ordered and not member.busy:
+                    member.leg_began_s = loop.time()  # it is out of reach
+            under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy}
+            late = await self.settle_late()
+            holds_s = await self._hold_idle()
+            if late or (self._waiting and not self._live.halted):
+                continue
+            self._live.changed.clear()
+            try:
+                async with asyncio.timeout_at(min([*under_way.values(), *holds_s], default=None)):
+                    await self._live.changed.wait()
+            except TimeoutError:
+                continue
+
+    async def settle_late(self, of: Iterable[Member] | None = None) -> list[Member]:
+        """End the legs that take too long, of some vehicles or of all; returns their vehicles."""
+        now_s = asyncio.get_running_loop().time()
+        asked = self._live.team if of is None else of
+        late = [member for member in asked if member.busy and late_at_s(member, self._time_scale) <= now_s]
+        # All at once: while a line of the log is written, others may be sent on to their next legs.
+        numbers = [self._settle_late(member) for member in late]
+        for member, number in zip(late, numbers, strict=True):
+            message = f"{member.name} did not get to the end of its leg {number}: it goes on with the next"
+            await tell_of(self._live, [member], message, number)
+        return late
+
+    @property
+    def _waiting(self) -> bool:
+        return any(member.ahead and not member.ordered for member in self._live.team)
+
+    async def _hold_idle(self) -> list[float]:
+        """Send vehicles that have flown all their legs to circles; when the next are due, the event loop's time."""
+        now_s, due_s = asyncio.get_running_loop().time(), []
+        for member in self._live.team:
+            flies = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
+            idle = flies and member.surveys and member.legs and not member.ordered and not member.ahead
+            if not idle or self._live.halted:
+                self._idle_since_s.pop(member.name, None)
+                continue
+            hold_s = self._idle_since_s.setdefault(member.name, now_s) + HOLD_AFTER_S / self._time_scale
+            if now_s < hold_s < math.inf:
+                due_s.append(hold_s)
+            elif hold_s <= now_s:
+                self._idle_since_s[member.name] = math.inf
+                await self.hold(member)
+        return due_s
+
+    async def hold(self, member: Member) -> None:
+        """Send a vehicle to where it may circle, inside the area, clear of zones and of the others, if there is room.
+
+        That is no leg: what the vehicle tells of it is of no interest.
+        """
+        order = self._committing.holding(member)
+        if order is not None:
+            await self.stay(member, order)
+
+    async def stay(self, member: Member, order: WaypointOrder) -> None:
+        """Send a vehicle where it is to stay; that is no leg."""
+        try:
+            await self._hub.order(member.key, order)
+        except VehicleRefusedError as error:
+            log.info("a vehicle would not hold", vehicle=member.name, error=str(error))
+            return
+        east, north = self._live.frame.to_local(order.position.lat_deg, order.position.lon_deg)
+        member.waits_m = np.array([float(east), float(north)])
+        self._live.publish_summary()
+
+    async def begin(self) -> None:
+        """Send every vehicle that flies nothing its next leg, unless something bars that from where it is now."""
+        beginning = []
+        for member in self._live.team:
+            if self._live.halted or member.ordered or not member.ahead:
+                continue
+            barred = self._committing.barred(member)
+            if barred:
+                await self.drop_ahead(member, f"from where it is {barred}")
+                continue
+            self._committing.begin_next(member)
+            member.leg_began_s = asyncio.get_running_loop().time()
+            member.leg_allowed_s = leg_allowed_s(self._live, member)
+            self.turned_down.pop(member.name, None)
+            if member.engaged:
+                beginning.append(self.send(member))
+        await asyncio.gather(*beginning)
+
+    async def send(self, member: Member) -> None:
+        """Send a vehicle its order; one that refuses is asked to follow anew, and then sent it again."""
+        if member.order is None or self._live.halted:
+            return
+        try:
+            await self._hub.order(member.key, member.order)
+        except VehicleRefusedError as error:
+            member.engaged = False
+            before = self.turned_down.get(member.name, 0)
+            self.turned_down[member.name] = before + 1
+            if not before:
+                await self._live.journal.log(Level.WARNING, "vehicle", str(error), vehicle=member.name)
+            if not self._persistent or (before + 1 >= MOST_REFUSALS and member.ahead):
+                self.settle(member, WaypointStatus.REFUSED, str(error))
+
+    def settle(self, member: Member, status: WaypointStatus, reason: str) -> None:
+        """End a vehicle's leg."""
+        if member.order is not None:
+            report = WaypointReport(member.name, member.order.mission_id, member.order.step, status, reason)
+            self._live.receive(report)
+
+    def give_up_legs(self, member: Member, reason: str) -> list[FloatArray]:
+        """End the leg that a vehicle flies, and those after it; returns where they were to end, each (2,)."""
+        ends = [member.target_m] if member.ordered and member.target_m is not None else []
+        misses = member.misses
+        self.settle(member, WaypointStatus.MISSED, reason)
+        member.misses = misses  # it would have got there
+        legs, member.ahead[:] = list(member.ahead), []
+        for leg in legs:
+            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            self._live.journal.waypoint(report)
+        return self._note_given_up(member, [*ends, *(leg.target_m for leg in legs)])
+
+    def _note_given_up(self, member: Member, ends_m: list[FloatArray]) -> list[FloatArray]:
+        if member.asked is not None:
+            self.given_up.setdefault(member.name, []).extend(ends_m)
+        return ends_m
+
+    async def drop_ahead(self, member: Member, reason: str) -> None:
+        """Give up the legs that a vehicle has not begun."""
+        legs, member.ahead[:] = list(member.ahead), []
+        ends_m = [leg.target_m for leg in legs]
+        if self._persistent and member.asked is None and member.withdrawal is None:
+            self.dropped.setdefault(member.name, []).extend(ends_m)
+        self._note_given_up(member, ends_m)
+        for leg in legs:
+            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            self._live.journal.waypoint(report)
+        await self._live.journal.log(
+            Level.WARNING,
+            "vehicle",
+            f"{member.name} does not fly its next leg: {reason}; it gets another one",
+            vehicle=member.name,
+        )
+        self._live.changed.set()
+
+    def _settle_late(self, member: Member) -> int:
+        """End a vehicle's leg and return its number."""
+        number = member.order.step if member.order is not None else member.legs
+        if member.target_m is not None:
+            self._note_given_up(member, [member.target_m])
+        self.settle(member, WaypointStatus.MISSED, missed(member.leg_allowed_s))
+        return number

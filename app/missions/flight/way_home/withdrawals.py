@@ -1,0 +1,233 @@
+"""Leads vehicles that survey no more: home, up, or to a stop."""
+
+import asyncio
+from typing import Any
+
+import numpy as np
+import structlog
+
+from app.missions.alarm_kinds import AlarmKind
+from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.interface import WaypointStatus
+from app.missions.flight.legs.commit import LegCommit, home_of, point_of
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.observation.waiting import until_next_look
+from app.missions.live.mission import LiveMission, phase_of
+from app.missions.live.watchers.vehicles import energy_left_pct
+from app.missions.recovery.failsafes import LINK_LOST_S
+from app.missions.spec.failsafes import Failsafe, Response
+from app.missions.team import Member, Withdrawal
+from app.missions.views.mission import Level
+from app.storage.concurrency.uncancellable import to_the_end
+from app.storage.queries import missions as mission_queries
+
+PATIENCE_S = 0.5
+"""How long vehicles wait for the disk."""
+
+RISING_S = 120.0
+"""How long a vehicle that is home is waited for to come up, seconds of the vehicles' time."""
+
+DEEP_M = 1.0
+"""Who is not deeper is at the surface."""
+
+
+log = structlog.get_logger(__name__)
+
+
+class Withdrawals:
+    """Brings the vehicles of one running mission to where their withdrawals lead, and no vehicle back."""
+
+    def __init__(
+        self,
+        live: LiveMission,
+        hub: FleetHub,
+        committing: LegCommit,
+        dispatch: Dispatch,
+        range_left: RangeLeft,
+        time_scale: float,
+    ) -> None:
+        self._live = live
+        self._hub = hub
+        self._committing = committing
+        self._dispatch = dispatch
+        self._range = range_left
+        self._time_scale = time_scale
+        self._stranded: set[str] = set()
+        self._ending: set[str] = set()
+        """Vehicles that are just being stopped where they were to go."""
+        self._rising_since_s: dict[str, float] = {}
+        """Since when vehicles have been sent up at home, the event loop's time."""
+        for member in live.team:
+            if member.withdrawal is not None:
+                member.withdrawal.led = False
+
+    async def keep(self) -> None:
+        """Go on until cancelled."""
+        while True:
+            for member in self._live.team:
+                if member.withdrawal is not None and not member.withdrawal.over and not self._live.halted:
+                    try:
+                        await self._lead(member, member.withdrawal)
+                    except Exception:
+                        # Whatever keeps one from being led now keeps nobody else, and is tried again.
+                        log.exception("a vehicle could not be led", vehicle=member.name)
+            await self._dispatch.settle_late([m for m in self._live.team if m.withdrawal is not None])
+            await until_next_look(self._time_scale)
+
+    async def finished(self) -> None:
+        """Wait until every vehicle that was called home is there, or is out of reach for long."""
+        silent_since_s: dict[str, float] = {}
+        while True:
+            now_s = asyncio.get_running_loop().time()
+            away = [m for m in self._live.team if m.withdrawal is not None and not self._is_done(m)]
+            silent_since_s = {m.name: silent_since_s.get(m.name, now_s) for m in away if not m.present}
+            lost = [m for m in away if now_s - silent_since_s.get(m.name, now_s) >= LINK_LOST_S / self._time_scale]
+            if len(lost) == len(away):
+                for member in lost:
+                    words = f"{member.name} did not come home: it cannot be reached"
+                    await self._live.journal.alarm(AlarmKind.NOT_COME_HOME, words, vehicle=member.name)
+                return
+            await until_next_look(self._time_scale)
+
+    def _is_done(self, member: Member) -> bool:
+        withdrawal = member.withdrawal
+        if member.name in self._ending:
+            return False
+        return withdrawal is None or withdrawal.over or withdrawal.response is Response.HOLD
+
+    async def _lead(self, member: Member, withdrawal: Withdrawal) -> None:
+        if not withdrawal.led:
+            await self._begin(member, withdrawal)
+        if withdrawal.response is Response.STOP:
+            await self._end(member, withdrawal, f"{member.name} is stopped")
+        elif (
+            not member.present
+            or withdrawal.response is Response.HOLD
+            or await self._waits_below(member, withdrawal)
+            or member.ordered
+        ):
+            return
+        elif member.ahead:
+            await self._dispatch.begin()
+        elif withdrawal.response is Response.SURFACE:
+            await self._surface(member, withdrawal)
+        else:
+            await self._go_home(member, withdrawal)
+
+    async def _waits_below(self, member: Member, withdrawal: Withdrawal) -> bool:
+        """Whether a vehicle on its way home stays below for ships to pass where it would come up now."""
+        held = any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in member.failsafes)
+        if not held or withdrawal.response is not Response.RETURN or self._at_surface(member):
+            withdrawal.below = False
+            return False
+        if withdrawal.below:
+            return True
+        rises = member.ordered and member.order is not None and member.order.position.depth_m <= DEEP_M
+        will_rise = not member.ordered and bool(member.ahead) and member.ahead[0].position.depth_m <= DEEP_M
+        if not rises and not will_rise:
+            return False
+        withdrawal.below = True
+        order = self._committing.waiting_below(member)
+        if rises:
+            self._dispatch.settle(member, WaypointStatus.MISSED, "ships are about")
+        if order is not None:
+            await self._dispatch.stay(member, order)
+        words = f"{member.name} waits below for ships to pass"
+        await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name)
+        return True
+
+    async def _begin(self, member: Member, withdrawal: Withdrawal) -> None:
+        """Write a withdrawal down and give up the vehicle's legs."""
+        withdrawal.led = True
+        await self._keep(member, withdrawal)
+        self._dispatch.give_up_legs(member, withdrawal.why)
+        does = {
+            Response.HOLD: "holds",
+            Response.RETURN: "goes home",
+            Response.SURFACE: "comes up where it is",
+            Response.STOP: "is stopped",
+        }
+        words = f"{member.name} {does[withdrawal.response]}: {withdrawal.why}"
+        facts = {"response": withdrawal.response, "energy_left_pct": energy_left_pct(member)}
+        await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name, **facts)
+        if withdrawal.response is Response.HOLD and member.present:
+            await self._dispatch.hold(member)
+
+    async def _surface(self, member: Member, withdrawal: Withdrawal) -> None:
+        if self._at_surface(member) or member.name in self._stranded:
+            await self._end(member, withdrawal, f"{member.name} is at the surface")
+            return
+        self._stranded.add(member.name)
+        self._committing.lead_home(member, [(member.place_m(self._live.frame), 0.0)])
+        await self._dispatch.begin()
+
+    async def _go_home(self, member: Member, withdrawal: Withdrawal) -> None:
+        """Send a vehicle home from where it is, at its depth, and up there."""
+        spec = self._live.spec
+        recovery, home_m = spec.recovery_of(member.spec), home_of(member, spec)
+        here_m = member.place_m(self._live.frame)
+        if recovery is None or home_m is None:
+            await self._end(member, withdrawal, f"{member.name} has no recovery point and stops where it is")
+            return
+        away_m = float(np.hypot(*(home_m - here_m)))
+        if away_m <= recovery.radius_m and (self._at_surface(member) or self._waited_to_rise(member)):
+            from_point_m = float(np.hypot(*(point_of(recovery, spec) - here_m)))
+            facts = {"from_point_m": round(from_point_m, 1), "energy_left_pct": energy_left_pct(member)}
+            await self._end(member, withdrawal, f"{member.name} is home, {away_m:.0f} m from its place", **facts)
+            return
+        if away_m <= recovery.radius_m and member.name in self._rising_since_s:
+            return
+        way_m = self._range.way_from(here_m, home_m)
+        if way_m is None:
+            words = "no way leads home that keeps clear of zones: it comes up where it is"
+            await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
+            member.withdrawal = Withdrawal(Response.SURFACE, words)
+            return
+        depths_m = self._range.depths_m(member, here_m, way_m)
+        self._committing.lead_home(member, [*zip(way_m, depths_m, strict=True), (home_m, 0.0)])
+        await self._dispatch.begin()
+
+    def _waited_to_rise(self, member: Member) -> bool:
+        """Whether a vehicle was sent up at home, and had time for that."""
+        if member.status is not WaypointStatus.REACHED:
+            return False
+        now_s = asyncio.get_running_loop().time()
+        return now_s - self._rising_since_s.setdefault(member.name, now_s) >= RISING_S / self._time_scale
+
+    def _at_surface(self, member: Member) -> bool:
+        return member.report is not None and member.report.position.depth_m <= DEEP_M
+
+    async def _end(self, member: Member, withdrawal: Withdrawal, words: str, **facts: Any) -> None:
+        """Stop a vehicle that is where it was to go."""
+        self._ending.add(member.name)
+        withdrawal.over = True
+        member.engaged = False
+        member.ahead.clear()
+        member.set_order(None)
+        self._rising_since_s.pop(member.name, None)
+        self._stranded.discard(member.name)
+        member.flown.phase = phase_of(withdrawal)
+        try:
+            stop = await self._hub.stop(member.key)
+            await self._keep(member, withdrawal)
+            said, facts = f"{words}; {stop.detail}", {"vehicle": member.name} | facts
+            if stop.acknowledged:
+                await self._live.journal.log(Level.INFO, "recovery", said, **facts)
+            else:
+                await self._live.journal.alarm(AlarmKind.STOP_NOT_ACKNOWLEDGED, said, event="recovery", **facts)
+        finally:
+            self._ending.discard(member.name)
+        self._live.changed.set()
+        self._live.publish_summary()
+
+    async def _keep(self, member: Member, withdrawal: Withdrawal) -> None:
+        """Write a withdrawal down; a vehicle waits for that no longer than a moment."""
+        written = asyncio.ensure_future(
+            self._live.journal.storage.done(lambda: to_the_end(self._store(member.name, withdrawal)))
+        )
+        await asyncio.wait([written], timeout=PATIENCE_S)
+
+    async def _store(self, name: str, withdrawal: Withdrawal) -> None:
+        async with self._live.database.writing() as session:
+            await mission_queries.keep_withdrawal(session, self._live.id, name, withdrawal.remember())

@@ -1,0 +1,4 @@
+"""What a mission writes down as it goes, gathered for a moment and committed in one transaction.
+
+Others use ``journal.Journal``.
+"""

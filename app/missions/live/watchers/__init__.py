@@ -1,0 +1,1 @@
+"""What everyone who watches a mission is sent, and at what pace."""

@@ -1,0 +1,66 @@
+"""The alarms of a mission that nobody has acknowledged, as everyone who watches it sees them."""
+
+from collections.abc import Collection
+from datetime import datetime
+
+from app.missions.alarms.raised import AlarmWatch, alarm_view
+from app.missions.live.watchers.broadcast import Broadcaster
+from app.missions.views.alarms import AlarmState, AlarmView
+from app.missions.views.messages import AlarmMessage
+from app.storage.models import AlarmRow
+
+MOST_SHOWN = 500
+"""Of more than so many the oldest are not shown; all are in the list of the service."""
+
+
+class MissionAlarms:
+    """Shows alarms as they are raised and acknowledged, also those that cannot be stored at the moment.
+
+    Attributes
+    ----------
+    watch
+        Told of every alarm; None in a process that tells nobody.
+    """
+
+    def __init__(self, mission_id: str, broadcaster: Broadcaster) -> None:
+        self.mission_id = mission_id
+        self.watch: AlarmWatch | None = None
+        self._broadcaster = broadcaster
+        self._open: dict[str, AlarmView] = {}
+
+    @property
+    def open(self) -> list[AlarmView]:
+        """Those that nobody has acknowledged, oldest first."""
+        return sorted(self._open.values(), key=lambda alarm: alarm.raised_at)
+
+    def noted(self, row: AlarmRow) -> None:
+        """Show an alarm that will be stored when that is possible."""
+        self.show(alarm_view(row))
+        if self.watch is not None:
+            self.watch.noted(row)
+
+    def stored(self, row: AlarmRow) -> None:
+        """Show an alarm that was stored."""
+        self.show(alarm_view(row))
+        if self.watch is not None:
+            self.watch.stored(row)
+
+    def ended(self, kinds: Collection[str], vehicle: str | None, at: datetime) -> None:
+        """Show that what raised the alarms of some kinds is over; they stay until they are acknowledged."""
+        for alarm in self.open:
+            if alarm.kind in kinds and alarm.vehicle == vehicle and alarm.ended_at is None:
+                self.show(alarm.model_copy(update={"ended_at": at}))
+
+    def show(self, alarm: AlarmView) -> None:
+        """Show an alarm as it is now; whoever sees it so already is told nothing."""
+        known = self._open.get(alarm.id)
+        if alarm.state is AlarmState.OPEN:
+            self._open[alarm.id] = alarm
+            while len(self._open) > MOST_SHOWN:
+                self._open.pop(next(iter(self._open)))
+        elif known is None:
+            return
+        else:
+            del self._open[alarm.id]
+        if alarm != known:
+            self._broadcaster.publish(AlarmMessage(alarm=alarm))

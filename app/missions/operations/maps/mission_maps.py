@@ -1,0 +1,167 @@
+"""A mission's map as it is asked for: the newest, the one of a step, what changed in it, and the files made of it."""
+
+import asyncio
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.compute.compute import Compute
+from app.mapping.products.tracks import Track, TrackPoint
+from app.mapping.types import SoundingRows
+from app.missions.clock import now
+from app.missions.errors import MapNotReadyError
+from app.missions.live.mission import LiveMission
+from app.missions.live.sounding_store import accepted
+from app.missions.maps.builder import BuiltMap
+from app.missions.maps.products import (
+    ACCEPTED,
+    CROSSOVERS,
+    LINES,
+    MAP,
+    SEARCH,
+    SOUNDINGS,
+    SURVEY,
+    TRACKS,
+    Material,
+    Product,
+    ProductOptions,
+    Surveyed,
+    make_product,
+    product_kind,
+)
+from app.missions.maps.snapshot import MapSnapshot
+from app.missions.maps.sounding_lines import SoundingLines
+from app.missions.operations.corrections.crossovers import check_of
+from app.missions.operations.history import sounding_lines, soundings_of
+from app.missions.operations.scans import search_of
+from app.missions.running.final_maps import FinalMaps
+from app.missions.settings import ProviderSettings
+from app.missions.views.measurements.soundings import Verdict
+from app.storage.queries import missions as mission_queries
+from app.storage.queries import pings as ping_queries
+from app.storage.queries import soundings as sounding_queries
+
+NONE: SoundingRows = np.zeros((0, 4))
+
+
+async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True) -> MapSnapshot:
+    """Return the newest map. Raises MapNotReadyError when there is no sounding yet.
+
+    Without being ``patient``: an older one, if there is one, while a newer one is being made.
+    """
+    built = live.builder.newest
+    if not patient and built is not None and maps.busy(live.id):
+        return live.snapshot(built)
+    await maps.last(live.id)
+    await live.notice_imports()
+    built = live.builder.newest
+    if built is None or (live.map_is_missing and not live.running):
+        built = await live.build_map()
+    if built is None:
+        raise MapNotReadyError(
+            "no sounding was accepted yet, so there is no map", "start the mission or post measurements"
+        )
+    return live.snapshot(built)
+
+
+async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
+    """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
+    if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
+        await live.build_map()
+    found = await accepted(live.database, live.id, 0, until_step=step)
+    newest = live.builder.newest
+    if newest is None:
+        raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
+    try:
+        bathymetry = await live.mapped(live.builder.as_of, found.table)
+    except ValueError:
+        raise MapNotReadyError(
+            f"no sounding was accepted until the end of step {step}", "choose a later step"
+        ) from None
+    built = BuiltMap(newest.version, len(found.table), bathymetry, newest.digest)
+    return MapSnapshot(live.facts, built, step, live.reference_m, live.revision)
+
+
+async def map_tiles(
+    live: LiveMission, maps: FinalMaps, run: str, since: str, further: Sequence[str] = (), step: int | None = None
+) -> bytes:
+    """Return what changed in the map; see ``TileCache.changes``. ``step``: the map as it was at that step's end.
+
+    ``run`` tells this process from others, whose versions begin at 1, too.
+    """
+    snapshot = None
+    if step is not None:
+        snapshot = await map_at_step(live, step)
+    elif live.running:
+        # Not with the planning threads, which a decision may keep for seconds.
+        snapshot = await asyncio.to_thread(live.live_snapshot)
+    if snapshot is None:
+        snapshot = await newest_map(live, maps, patient=False)
+    tag = f"{run}.{snapshot.tag}" + ("" if step is None else f"@{step}")
+    return await live.tiles.answer(snapshot, tag, since, tuple(sorted(set(further))))
+
+
+async def export(
+    live: LiveMission,
+    maps: FinalMaps,
+    provider: ProviderSettings,
+    compute: Compute,
+    name: str,
+    options: ProductOptions | None = None,
+) -> Product:
+    """Return a product file of the mission, a key of ``PRODUCTS``.
+
+    Raises
+    ------
+    InvalidRequestError, MapNotReadyError, ConflictError
+        For an unknown kind or options that cannot be; where the map is needed and there is none yet; where the
+        mission would have to be a search.
+    ProductUnavailableError
+        When the process that makes files of large maps was ended.
+    """
+    needs = product_kind(name).needs
+    snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
+    material = Material(
+        facts=live.facts,
+        created=now(),
+        provider=provider.named(),
+        map=None if snapshot is None else snapshot.without_live(),
+        soundings=await soundings_of(live) if SOUNDINGS in needs else (),
+        accepted=await _accepted_of(live) if ACCEPTED in needs else NONE,
+        lines=await sounding_lines(live) if LINES in needs else SoundingLines(),
+        tracks=await track_lines(live) if TRACKS in needs else (),
+        search=search_of(live) if SEARCH in needs else None,
+        surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
+        crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
+    )
+    chosen = options or ProductOptions()
+    if snapshot is not None and snapshot.large:
+        return await compute.make(make_product, name, material, chosen)
+    return await live.in_thread(make_product, name, material, chosen)
+
+
+async def _accepted_of(live: LiveMission) -> SoundingRows:
+    """Return the accepted soundings, (n, 4)."""
+    await live.journal.flush()
+    return (await accepted(live.database, live.id, live.journal.counts.accepted)).table
+
+
+async def surveyed(live: LiveMission) -> Surveyed:
+    """Return when a mission's soundings and pings were made."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        extent = await sounding_queries.extent(session, live.id, Verdict.ACCEPTED)
+        period = await ping_queries.period(session, live.id)
+    if extent is None:
+        return Surveyed() if period is None else Surveyed(*period)
+    if period is None:
+        return Surveyed(extent.first_time_s, extent.last_time_s, extent.position_sd_m)
+    return Surveyed(min(extent.first_time_s, period[0]), max(extent.last_time_s, period[1]))
+
+
+async def track_lines(live: LiveMission) -> list[Track]:
+    """Return where the vehicles were."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        found = await mission_queries.track_points(session, live.id)
+    return [Track(name, [TrackPoint(*point) for point in points]) for name, points in found.items()]

@@ -1,0 +1,1 @@
+"""What is answered about maps, lines across them, and sites."""

@@ -1,0 +1,1 @@
+"""What is answered about what was measured: soundings, pings, imports, corrections, agreement, uncertainty."""

@@ -1,0 +1,275 @@
+"""Copies of a database while others write to it, checked, and put back in its place."""
+
+import dataclasses
+import os
+import shutil
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from sqlalchemy import URL, make_url
+
+from app.storage import private
+from app.storage.ping_files import PingFileError, PingFiles, digest_in
+from app.storage.upkeep import migrate, postgres_archive
+from app.storage.upkeep.postgres_archive import BackupError as BackupError
+
+SQLITE_MAGIC = b"SQLite format 3\0"
+ARCHIVE_MAGIC = b"PGDMP"
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a backup holds: its schema's revision and the rows of every table; both empty for pg_dump's archives.
+
+    ``ping_files`` is how many files of pings are beside it.
+    """
+
+    size_bytes: int
+    revision: str
+    rows: dict[str, int]
+    ping_files: int = 0
+
+
+def files_beside(backup: Path) -> PingFiles:
+    """Return the files of pings that belong to a backup."""
+    return PingFiles(str(backup.with_name(f"{backup.name}-pings").resolve()))
+
+
+def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Path, Contents]:
+    """Copy the database to a file, or into a folder under a name with the time; returns the file and what it holds.
+
+    SQLite's is one consistent state, however much is written meanwhile. The file appears under its name only when it
+    was checked and is on the disk; only its owner may read it. Files of pings go into a folder beside it.
+
+    Parameters
+    ----------
+    pings
+        Where files of pings are; None: in the usual place.
+
+    Raises
+    ------
+    BackupError
+    """
+    parsed = make_url(url)
+    suffix = "db" if parsed.get_backend_name() == "sqlite" else "dump"
+    if target.is_dir() or not target.suffix:
+        target /= f"bathyfleet-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.{suffix}"
+    if target.exists():
+        raise BackupError(f"{target} exists", "Name another file: backups are not overwritten")
+    part, copies = target.with_name(target.name + ".part"), files_beside(target)
+    try:
+        private.make_folder(target.parent)
+        os.close(os.open(part, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o600))
+        if suffix == "db":
+            expected = _copy_sqlite(parsed, part)
+            contents = _database_of(part)
+            if contents.rows != expected:
+                raise BackupError(f"the copy has other rows than the database: {contents.rows}, not {expected}")
+        else:
+            postgres_archive.dump(parsed, part)
+            contents = _database_of(part)
+        # Whatever is in the copy has had its file before.
+        source = pings or PingFiles.beside(url)
+        copied = source.copy_to(copies, source.names() if suffix == "dump" else _ping_files(part))
+        contents = dataclasses.replace(contents, ping_files=copied)
+        _to_disk(part)
+        part.rename(target)
+    except PingFileError as error:
+        raise BackupError(str(error), "Bring it back from an older backup, or set pings_url to where it is") from None
+    except (OSError, sqlite3.Error) as error:
+        raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
+    finally:
+        part.unlink(missing_ok=True)
+        if not target.exists() and copies.folder is not None:
+            shutil.rmtree(copies.folder, ignore_errors=True)
+    return target, contents
+
+
+def contents_of(file: Path) -> Contents:
+    """Check a backup from end to end, with the files of pings beside it; returns what it holds. Raises BackupError."""
+    contents, beside = _database_of(file), files_beside(file)
+    names = _ping_files(file) if contents.revision else beside.names()
+    try:
+        for name in names:
+            beside.read(name, digest_in(name))
+    except PingFileError as error:
+        raise BackupError(str(error), "Use an older backup") from None
+    return dataclasses.replace(contents, ping_files=len(names))
+
+
+def _database_of(file: Path) -> Contents:
+    """Check a backup without the files beside it. Raises BackupError."""
+    with file.open("rb") as opened:
+        begin = opened.read(len(SQLITE_MAGIC))
+    if begin.startswith(ARCHIVE_MAGIC):
+        postgres_archive.check(file)
+        return Contents(file.stat().st_size, "", {})
+    if begin != SQLITE_MAGIC:
+        raise BackupError(f"{file} is neither an SQLite database nor an archive of pg_dump")
+    try:
+        # Opened as something that does not change, so that nothing is left beside it.
+        with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+            faults = [row[0] for row in connection.execute("PRAGMA integrity_check(5)") if row[0] != "ok"]
+            orphans = connection.execute("PRAGMA foreign_key_check").fetchmany(5)
+            faults += [f"{table} row {row} belongs to no {parent}" for table, row, parent, _ in orphans]
+            if faults:
+                raise BackupError(f"{file} is damaged: {'; '.join(faults)}", "Use an older backup")
+            rows = _count(connection)
+            if "alembic_version" not in rows:
+                raise BackupError(f"{file} is an SQLite database, but not one of bathyfleet")
+            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone() or ("",)
+    except sqlite3.Error as error:
+        raise BackupError(f"{file} is damaged: {error}", "Use an older backup") from None
+    return Contents(file.stat().st_size, revision, rows)
+
+
+def _ping_files(file: Path) -> list[str]:
+    """Return the names of the files of pings that belong to an SQLite database that nobody has open."""
+    with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+        if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'ping_chunks'").fetchone():
+            return []  # of a version that had none
+        return [name for (name,) in connection.execute("SELECT name FROM ping_chunks ORDER BY id")]
+
+
+def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None = None) -> tuple[Contents, Path | None]:
+    """Put a checked backup in the database's place; returns what it holds, and where what was there before is now.
+
+    ``pings`` are the files of pings, those of the backup are put there; None: in the usual place. What is there
+    already goes aside with the database.
+
+    Raises
+    ------
+    BackupError
+        When the backup is damaged, of another kind or of a newer version, or there is a database already and
+        ``replace`` is False, or somebody has it open.
+    """
+    contents = contents_of(file)
+    revision = contents.revision if contents.rows else postgres_archive.revision(file)
+    if not revision:
+        raise BackupError(f"{file} holds no database of bathyfleet")
+    if not migrate.is_known(revision):
+        raise BackupError(
+            f"{file} is at revision {revision}, which this version does not know (its newest is {migrate.head()})",
+            "Restore it with the version that wrote it; nothing was changed",
+        )
+    parsed = make_url(url)
+    files, beside = pings or PingFiles.beside(url), files_beside(file)
+    before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    if parsed.get_backend_name() != "sqlite":
+        if contents.revision:
+            raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
+        with _put_back(files, beside, beside.names(), before if replace else ""):
+            postgres_archive.put_back(parsed, file, replace=replace)
+        return contents, None
+    if not contents.revision:
+        raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
+    path = _path(parsed)
+    aside = None
+    if path.exists():
+        if not replace:
+            raise BackupError(f"{path} exists", "--replace moves it aside")
+        _close_for_good(path)
+        aside = path.with_name(f"{path.name}.{before}")
+        path.rename(aside)
+        private.mend([aside])
+    private.make_folder(path.parent)
+    part = path.with_name(path.name + ".part")
+    try:
+        with _put_back(files, beside, _ping_files(file), before if aside else ""):
+            with file.open("rb") as source, private.open_new(part, "wb") as copy:
+                shutil.copyfileobj(source, copy)
+            _to_disk(part)
+            part.rename(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        if aside is not None:
+            aside.rename(path)
+        raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
+    return contents, aside
+
+
+@contextmanager
+def _put_back(files: PingFiles, beside: PingFiles, names: Sequence[str], aside: str) -> Iterator[None]:
+    """Put files of pings in their place before what refers to them is put in its own.
+
+    What is there already goes ``aside`` under a name with this; when the rest fails it comes back.
+    """
+    moved = files.move_aside(aside) if aside else None
+    try:
+        beside.copy_to(files, names)
+        yield
+    except BaseException:
+        if moved is not None and files.folder is not None:
+            shutil.rmtree(files.folder, ignore_errors=True)
+            moved.rename(files.folder)
+        raise
+
+
+def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:
+    """Copy what one reading transaction sees; returns the rows of every table in it."""
+    path = _path(url)
+    if not path.is_file():
+        raise BackupError(f"there is no database {path}", "Name it with --database")
+    with closing(sqlite3.connect(path, timeout=30)) as source, closing(sqlite3.connect(target)) as copy:
+        source.isolation_level = None
+        source.execute("BEGIN")
+        rows = _count(source)
+        source.backup(copy)
+        source.execute("ROLLBACK")
+        if "processes" in rows:
+            # By the secret of a process that lives its holder could speak in anybody's name.
+            copy.execute("PRAGMA secure_delete=ON")
+            copy.execute("UPDATE processes SET secret = ''")
+            copy.commit()
+        # One file, whole in itself: no journal has to go with it.
+        copy.execute("PRAGMA journal_mode=DELETE")
+    return rows
+
+
+def _count(connection: sqlite3.Connection) -> dict[str, int]:
+    names = "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%' ORDER BY name"
+    tables = [name for (name,) in connection.execute(names)]
+    counted = {}
+    for table in tables:
+        quoted = table.replace('"', '""')
+        ((counted[table],),) = connection.execute(f'SELECT count(*) FROM "{quoted}"')  # noqa: S608 - the names are its own
+    return counted
+
+
+def _close_for_good(path: Path) -> None:
+    """Bring what stands in the journals into the file and remove them. Raises BackupError when somebody has it open."""
+    try:
+        with closing(sqlite3.connect(path, timeout=1)) as connection:
+            connection.execute("PRAGMA locking_mode=EXCLUSIVE")
+            mode = connection.execute("PRAGMA journal_mode=DELETE").fetchone()[0]
+            connection.execute("BEGIN EXCLUSIVE")
+            connection.execute("COMMIT")
+        if mode != "delete":
+            raise BackupError(f"{path} is in use", "Stop the service first")
+    except sqlite3.OperationalError:
+        raise BackupError(f"{path} is in use", "Stop the service first") from None
+    except sqlite3.DatabaseError:
+        pass  # damaged, which is why it is replaced; its journals go aside with it
+    for suffix in ("-wal", "-shm"):
+        journal = path.with_name(path.name + suffix)
+        if journal.exists():
+            journal.rename(path.with_name(f"{path.name}.before{suffix}"))
+
+
+def _path(url: URL) -> Path:
+    if not url.database or url.database == ":memory:":
+        raise BackupError("a database in memory cannot be copied to a file")
+    return Path(url.database)
+
+
+def _to_disk(path: Path) -> None:
+    for place in (path, path.parent):
+        descriptor = os.open(place, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

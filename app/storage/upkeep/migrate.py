@@ -1,0 +1,90 @@
+"""Running the migrations from code, on whatever database a URL names."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, inspect
+from sqlalchemy.exc import IntegrityError
+
+from app.storage.database import make_engine
+
+# The migrations lie beside the package in a checkout as in an installation.
+MIGRATIONS = Path(__file__).resolve().parents[3] / "migrations"
+
+
+def _config(connection: Connection | None = None) -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
+    config.attributes["connection"] = connection
+    return config
+
+
+def head() -> str:
+    """Return the newest revision known to this version of the program."""
+    revision = ScriptDirectory.from_config(_config()).get_current_head()
+    if revision is None:
+        raise RuntimeError(f"no migrations in {MIGRATIONS}: the installation is incomplete")
+    return revision
+
+
+def is_known(revision: str) -> bool:
+    """Tell whether this version of the program knows a revision."""
+    return revision in {script.revision for script in ScriptDirectory.from_config(_config()).walk_revisions()}
+
+
+async def tables(url: str) -> list[str]:
+    """Return the names of all tables in a database."""
+    engine = make_engine(url)
+    try:
+        async with engine.connect() as connection:
+            return await connection.run_sync(lambda sync: sorted(inspect(sync).get_table_names()))
+    finally:
+        await engine.dispose()
+
+
+async def current(url: str) -> str | None:
+    """Return the revision that a database is at; None when it is empty."""
+    engine = make_engine(url)
+    try:
+        async with engine.connect() as connection:
+            return await connection.run_sync(lambda sync: MigrationContext.configure(sync).get_current_revision())
+    finally:
+        await engine.dispose()
+
+
+async def upgrade(url: str, revision: str = "head") -> None:
+    """Bring a database up to ``revision``. Waits for another process that is doing the same."""
+    await _run(url, lambda config: command.upgrade(config, revision))
+
+
+async def downgrade(url: str, revision: str) -> None:
+    """Take a database back to ``revision`` (``base``: empty)."""
+    await _run(url, lambda config: command.downgrade(config, revision))
+
+
+async def _run(url: str, action: Callable[[Config], None]) -> None:
+    engine = make_engine(url)
+    try:
+        async with engine.connect() as connection:
+            await connection.execution_options(bathyfleet_writes=True)
+            if engine.dialect.name == "sqlite":
+                # Some changes of a table replace it: when the old one is dropped, what refers to it must not go along.
+                raw = (await connection.get_raw_connection()).driver_connection
+                assert raw is not None  # noqa: S101 - a connection that was opened has one
+                await raw.execute("PRAGMA foreign_keys=OFF")
+            async with connection.begin():
+                await connection.run_sync(lambda sync: action(_config(sync)))
+                if engine.dialect.name == "sqlite":
+                    await connection.run_sync(_check_references)
+    finally:
+        await engine.dispose()
+
+
+def _check_references(connection: Connection) -> None:
+    orphans = connection.exec_driver_sql("PRAGMA foreign_key_check").fetchmany(3)
+    if orphans:
+        raise IntegrityError("PRAGMA foreign_key_check", None, ValueError(f"rows that belong to nothing: {orphans}"))

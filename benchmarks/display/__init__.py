@@ -1,0 +1,1 @@
+"""How soon and at what cost what is measured is seen: by the page, by many viewers, in tiles and QGIS."""

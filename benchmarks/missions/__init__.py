@@ -1,0 +1,1 @@
+"""Missions as the service flies them."""

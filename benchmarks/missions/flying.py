@@ -1,0 +1,241 @@
+"""How much of what vehicles fly was planned: ``python -m benchmarks.missions.flying [--vehicles 4 --side 200]``.
+
+A mission of the service with its simulated vehicles, in process or, with ``--kind imc``, over IMC as fake DUNE nodes in
+processes of their own. Of the tracks as they were stored is told, by vehicle and in all: ``flown_m``; ``on_plan_pct``,
+the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
+``waiting_pct``, the part of the time spent in them; and how many legs were not reached. ``--slow-decisions 5`` makes
+each decision take that many seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a
+page.
+"""
+
+import argparse
+import asyncio
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.flight.decisions import deciding
+from app.missions.flight.decisions.decision import decide
+from app.missions.running.mission_views import mission_view
+from app.missions.service import MissionService
+from app.missions.settings import ImcSettings, ServiceSettings
+from app.missions.spec.mission import MissionSpec
+from app.missions.states import ENDED, Action
+from app.storage.database import Database
+from app.storage.queries.missions import track_points, waypoints_between
+from app.storage.upkeep.prepare import prepare_database
+from benchmarks.common.report import FLIGHT, make_parser, write_section
+from benchmarks.imc.mission import ANNOUNCE_PORTS, NAMES, ORIGIN, PORT
+
+ASIDE_M = 4.0
+COURSE_RAD = np.deg2rad(45.0)
+LOOP_WITHIN_M = 80.0
+"""A turn of 330 degrees to one side within so many metres that ends where it began is a closed loop."""
+LOOP_RAD = np.deg2rad(330.0)
+CLOSED_M = 6.0
+RESAMPLED_M = 1.0
+PORTS_APART = 10
+
+
+def mission(options: argparse.Namespace) -> MissionSpec:
+    """Vehicles that survey a square."""
+    frame, side = LocalFrame(*ORIGIN), options.side
+    corners = [(0, 0), (side, 0), (side, side), (0, side), (0, 0)]
+    ring = [[float(x) for x in reversed(frame.to_geographic(float(e), float(n)))] for e, n in corners]
+    speeds = options.speeds or []
+    vehicles = [
+        {
+            "name": name,
+            "kind": options.kind,
+            "depth_m": 2.0 + k,
+            **({"speed_mps": speeds[k]} if k < len(speeds) else {}),
+        }
+        for k, name in enumerate(NAMES[: options.vehicles])
+    ]
+    return MissionSpec.model_validate(
+        {
+            "name": "flying",
+            "area": {"type": "Polygon", "coordinates": [ring]},
+            "vehicles": vehicles,
+            "budget": {"minutes": options.minutes} if options.minutes else {"steps": options.steps},
+            "cell_m": max(1.0, side / 100.0),
+            "speed_mps": options.speed,
+            "limits": {"max_step_m": options.leg, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
+            "planner": {"name": options.planner},
+            "seed": options.seed,
+        }
+    )
+
+
+async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Fly the mission; what its tracks tell."""
+    url = f"sqlite+aiosqlite:///{folder / 'mission.db'}"
+    imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
+    await prepare_database(url, may_upgrade=True)
+    database = Database(url)
+    service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=options.time_scale), database)
+    if options.slow_decisions:
+        slow_down(options.slow_decisions / options.time_scale)
+    crafts = [await craft(number, options) for number in range(options.vehicles)] if options.kind == "imc" else []
+    await service.startup()
+    begun = time.monotonic()
+    try:
+        identity = (await service.create(mission(options))).id
+        while crafts and sum(view.link == "ready" for view in await service.vehicles()) < options.vehicles:  # noqa: ASYNC110
+            await asyncio.sleep(0.1)
+        await service.act(await service.get(identity), Action.START, actor="benchmark")
+        while (view := mission_view(await service.get(identity))).state not in ENDED:  # noqa: ASYNC110
+            await asyncio.sleep(0.5)
+        async with database.reading() as session:
+            tracks = await track_points(session, identity)
+            waypoints = await waypoints_between(session, identity, 1, 1_000_000)
+    finally:
+        await service.shutdown()
+        for process in crafts:
+            process.terminate()
+            await process.wait()
+    frame = LocalFrame(*ORIGIN)
+    by_vehicle: dict[str, dict[str, Any]] = {}
+    drawn: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for name, points in tracks.items():
+        lon, lat, _, seconds = np.array(points).T
+        track = np.column_stack(frame.to_local(lat, lon))
+        ends = np.array([[row.east_m, row.north_m] for row in waypoints if row.vehicle == name]).reshape(-1, 2)
+        by_vehicle[name], drawn[name] = judged(track, seconds, ends), (track, ends)
+    if options.picture is not None:
+        draw(options.picture, drawn)
+    flown = sum(found["flown_m"] for found in by_vehicle.values())
+    return {
+        "state": str(view.state),
+        "wall_s": round(time.monotonic() - begun, 1),
+        "flown_m": round(flown, 1),
+        "planned_m": round(sum(found["planned_m"] for found in by_vehicle.values()), 1),
+        "on_plan_pct": round(sum(f["on_plan_pct"] * f["flown_m"] for f in by_vehicle.values()) / max(flown, 1e-9), 1),
+        "loops": sum(found["loops"] for found in by_vehicle.values()),
+        "waiting_pct": round(float(np.mean([found["waiting_pct"] for found in by_vehicle.values()])), 2),
+        "missed": sum(row.status != "reached" for row in waypoints),
+        "by_vehicle": by_vehicle,
+    }
+
+
+async def craft(number: int, options: argparse.Namespace) -> asyncio.subprocess.Process:
+    """Start a fake DUNE in a process of its own."""
+    start = f"{options.side * (number + 1) / (options.vehicles + 1.0):.1f},5.0"
+    return await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "simulator", "--vehicles", "1", "--names", NAMES[number], "--ids", f"{0x1E + number}"),
+        *("--family", "smooth", "--size", f"{options.side:g}", "--origin", ",".join(map(str, ORIGIN))),
+        *("--base-port", f"{32220 + PORTS_APART * number}", "--speed", f"{options.time_scale:g}", "--start", start),
+        *("--announce-ports", f"{ANNOUNCE_PORTS[0]}-{ANNOUNCE_PORTS[-1]}"),
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+
+
+def slow_down(seconds: float) -> None:
+    """Make every decision take so much longer."""
+
+    def slow(*arguments: Any, **named: Any) -> Any:
+        time.sleep(seconds)
+        return decide(*arguments, **named)
+
+    setattr(deciding, "decide", slow)  # noqa: B010 - it is not the module's to export
+
+
+def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str, Any]:
+    """Return what a track (n, 2), flown at times (n,), has in common with its legs, whose ends are (k, 2)."""
+    pieces = np.hypot(*np.diff(track, axis=0).T)
+    flown = float(pieces.sum())
+    if len(ends) == 0 or flown == 0.0:
+        return {"flown_m": flown, "planned_m": 0.0, "on_plan_pct": 0.0, "loops": 0, "waiting_pct": 0.0}
+    corners = np.vstack([track[:1], ends])
+    legs = np.diff(corners, axis=0)
+    legs_m = np.hypot(*legs.T)
+    along = np.concatenate([[0.0], np.cumsum(pieces)])
+    places_m = np.arange(0.0, flown, RESAMPLED_M)
+    path = np.column_stack([np.interp(places_m, along, column) for column in track.T])
+    times = np.interp(places_m, along, seconds)
+    step = np.diff(path, axis=0)
+    course = np.arctan2(*step.T)
+    on_plan = np.zeros(len(step), dtype=bool)
+    for a, leg, length in zip(corners, legs, legs_m, strict=False):
+        if length < 0.1:
+            continue
+        unit = leg / length
+        offset = path[:-1] - a
+        inside = (offset @ unit > -ASIDE_M) & (offset @ unit < length + ASIDE_M)
+        aside = np.abs(offset @ np.array([-unit[1], unit[0]])) <= ASIDE_M
+        turned = np.abs((course - np.arctan2(*unit) + np.pi) % (2 * np.pi) - np.pi)
+        on_plan |= inside & aside & (turned <= COURSE_RAD)
+    turns = (np.diff(course) + np.pi) % (2 * np.pi) - np.pi
+    turned = np.concatenate([[0.0], np.cumsum(turns)])
+    window = int(LOOP_WITHIN_M / RESAMPLED_M)
+    circling, loops, k = np.zeros(len(step), dtype=bool), 0, 0
+    while k < len(turned):
+        ahead = np.abs(turned[k : k + window] - turned[k])
+        back = np.hypot(*(path[k : k + len(ahead)] - path[k]).T) <= CLOSED_M
+        closed = (ahead >= LOOP_RAD) & back
+        if closed.any():
+            end = k + int(np.argmax(closed))
+            circling[k:end] = True
+            loops, k = loops + 1, end
+        k += 1
+    spent = np.diff(times)
+    return {
+        "flown_m": round(flown, 1),
+        "planned_m": round(float(legs_m.sum()), 1),
+        "on_plan_pct": round(100.0 * float(on_plan.mean()), 1),
+        "loops": loops,
+        "waiting_pct": round(100.0 * float(spent[circling].sum() / max(spent.sum(), 1e-9)), 2),
+    }
+
+
+def draw(file: Path, drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:
+    """Draw tracks (n, 2) over the ends (k, 2) of legs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 9), layout="constrained")
+    axes = figure.subplots()
+    for k, (track, ends) in enumerate(drawn.values()):
+        axes.plot(*ends.T, "-", color=f"C{k}", linewidth=0.5)
+        axes.plot(*ends.T, ".", color=f"C{k}", markersize=4)
+        axes.plot(*track.T, color=f"C{k}", linewidth=1.5, alpha=0.6)
+    axes.set_aspect("equal")
+    figure.savefig(file, dpi=110)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Fly and print."""
+    parser = make_parser(__doc__, FLIGHT)
+    parser.add_argument("--vehicles", type=int, default=4)
+    parser.add_argument("--kind", choices=["sim", "imc"], default="sim")
+    parser.add_argument("--side", type=float, default=200.0, help="of the square, metres")
+    parser.add_argument("--steps", type=int, default=60)
+    parser.add_argument("--minutes", type=float, help="in place of steps")
+    parser.add_argument("--leg", type=float, default=10.0, help="longest leg, metres")
+    parser.add_argument("--speed", type=float, default=1.3, help="of the vehicles, m/s")
+    parser.add_argument("--speeds", type=float, nargs="*", help="of each vehicle, m/s")
+    parser.add_argument("--time-scale", type=float, default=5.0)
+    parser.add_argument("--planner", default="cao")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--slow-decisions", type=float, default=0.0, help="seconds of the vehicles' time")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the tracks into this file")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory(prefix="bathyfleet-flying-") as folder:
+        found = asyncio.run(fly(options, Path(folder)))
+    print(json.dumps(found, indent=1))
+    figures = {key: value for key, value in found.items() if key != "by_vehicle"}
+    length = f"{options.minutes:g} min in" if options.minutes else f"{options.steps}"
+    title = f"{options.vehicles} vehicles ({options.kind}), {options.side:g} m, {length} legs of {options.leg:g} m"
+    write_section(options.write, FLIGHT, title, figures, seeds=[options.seed])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The maneuvers of a DUNE node."""

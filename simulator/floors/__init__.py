@@ -1,0 +1,1 @@
+"""Sea floors: generated, unseen, or read from terrain files. Others use ``terrain.Terrain``."""

@@ -1,0 +1,1 @@
+"""Sonars that look at the sea floor: few beams, swaths, and the compiled rays of both."""

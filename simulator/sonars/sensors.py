@@ -1,0 +1,202 @@
+"""Sonars that look at the sea floor with few beams: single beam, four-beam DVL.
+
+Swaths: :mod:`simulator.sonars.swath`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from simulator.arrays import FloatArray
+from simulator.floors.terrain import Terrain
+from simulator.sonars.raycasting import march
+from simulator.vehicles.vehicle import Motion
+
+DVL_TILT_RAD = math.radians(22.5)
+
+
+class SensorKind(StrEnum):
+    """The sonars a vehicle can carry."""
+
+    SINGLE = "single"
+    DVL = "dvl"
+    MULTIBEAM = "multibeam"
+
+
+@dataclass(frozen=True, slots=True)
+class Beams:
+    """Directions of a sonar's beams in the vehicle's body, each array of shape (n,).
+
+    A beam leaves the vertical body axis by ``tilt_rad`` towards ``azimuth_rad`` (clockwise from the bow).
+    """
+
+    tilt_rad: FloatArray
+    azimuth_rad: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.tilt_rad)
+
+    @property
+    def body(self) -> FloatArray:
+        """Unit vectors (forward, starboard, down), shape (n, 3)."""
+        sin = np.sin(self.tilt_rad)
+        return np.column_stack([sin * np.cos(self.azimuth_rad), sin * np.sin(self.azimuth_rad), np.cos(self.tilt_rad)])
+
+
+@dataclass(frozen=True, slots=True)
+class SonarNoise:
+    """Errors of a sonar.
+
+    Attributes
+    ----------
+    relative_sd
+        Standard deviation of xi in ``y = r (1 + xi)`` (MED13, AURO15).
+    outlier_rate
+        Probability that a return is false: half of them come short (fish, bubbles), half as a double echo.
+    dropout_rate
+        Probability that there is no return.
+    """
+
+    relative_sd: float = 0.0
+    outlier_rate: float = 0.0
+    dropout_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value, most in (
+            ("relative_sd", self.relative_sd, 1.0),
+            ("outlier_rate", self.outlier_rate, 1.0),
+            ("dropout_rate", self.dropout_rate, 1.0),
+        ):
+            if not 0.0 <= value <= most:
+                raise ValueError(f"sonar noise: {name} is {value}; it must be within 0 to {most:g}")
+
+
+def beams_of(kind: SensorKind) -> Beams:
+    """The beams of a single beam sonar or a DVL.
+
+    The DVL's beams 0 to 3 point to heading +0, 90, 180, 270 degrees, 22.5 degrees off the vertical.
+    """
+    if kind is SensorKind.SINGLE:
+        return Beams(np.zeros(1), np.zeros(1))
+    if kind is SensorKind.DVL:
+        return Beams(np.full(4, DVL_TILT_RAD), np.radians([0.0, 90.0, 180.0, 270.0]))
+    raise ValueError(f"sonar: kind is {kind}; it must be single or dvl")
+
+
+def to_local_frame(body: FloatArray, heading_rad: float, pitch_rad: float, roll_rad: float) -> FloatArray:
+    """Turn body vectors (forward, starboard, down) into (east, north, down), shape (n, 3) each."""
+    cr, sr = math.cos(roll_rad), math.sin(roll_rad)
+    cp, sp = math.cos(pitch_rad), math.sin(pitch_rad)
+    ch, sh = math.cos(heading_rad), math.sin(heading_rad)
+    x, y, z = body[:, 0], body[:, 1], body[:, 2]
+    y, z = cr * y - sr * z, sr * y + cr * z
+    x, z = cp * x + sp * z, -sp * x + cp * z
+    return np.column_stack([sh * x + ch * y, ch * x - sh * y, z])
+
+
+def cast_rays(
+    terrain: Terrain,
+    east_m: float,
+    north_m: float,
+    depth_m: float,
+    directions: FloatArray,
+    max_range_m: float,
+) -> FloatArray:
+    """Distance along each ray to the sea floor.
+
+    Marches in steps of half a cell to the first sample below the floor, then bisects to a millimetre. A ray
+    that grazes a crest over less than half a cell may pass it.
+
+    Parameters
+    ----------
+    directions
+        Unit vectors (east, north, down), shape (n, 3).
+
+    Returns
+    -------
+    Ranges in metres, shape (n,), NaN where nothing is hit within the range or the floor is unknown.
+    """
+    shoalest, deepest = terrain.min_depth_m, terrain.max_depth_m
+    return march(terrain.z_m, terrain.cell_m, east_m, north_m, depth_m, directions, shoalest, deepest, max_range_m)
+
+
+class Sonar:
+    """One sonar of few beams on one vehicle.
+
+    Parameters
+    ----------
+    kind
+        Which one: single beam or DVL.
+    noise
+        Its errors.
+    rng
+        Source of the errors.
+    ping_period_s
+        Simulated time between two pings.
+    max_range_m, min_range_m
+        Outside of which nothing is returned.
+    """
+
+    def __init__(
+        self,
+        kind: SensorKind,
+        noise: SonarNoise,
+        rng: np.random.Generator,
+        *,
+        ping_period_s: float = 0.2,
+        max_range_m: float = 100.0,
+        min_range_m: float = 0.1,
+    ) -> None:
+        if not ping_period_s > 0.0:
+            raise ValueError(f"sonar: ping_period_s is {ping_period_s}; it must be positive")
+        self.kind = kind
+        self.noise = noise
+        self.beams = beams_of(kind)
+        self.ping_period_s = ping_period_s
+        self.max_range_m = max_range_m
+        self.min_range_m = min_range_m
+        self._rng = rng
+        self._body = self.beams.body
+
+    def true_ranges(self, terrain: Terrain, motion: Motion) -> FloatArray:
+        """Ranges without any error, shape (n_beams,), NaN for no return."""
+        if self.kind is SensorKind.SINGLE:
+            return np.array([_altitude_m(terrain, motion)])
+        directions = to_local_frame(self._body, motion.heading_rad, motion.pitch_rad, motion.roll_rad)
+        return cast_rays(terrain, motion.east_m, motion.north_m, motion.depth_m, directions, self.max_range_m)
+
+    def ping_below(self, terrain: Terrain, motion: Motion) -> float:
+        """The same as :meth:`ping` for a single beam, without numpy's overhead per call."""
+        noise = self.noise
+        if noise.outlier_rate > 0.0 or noise.dropout_rate > 0.0:
+            return float(self.ping(terrain, motion)[0])
+        measured = _altitude_m(terrain, motion)
+        if noise.relative_sd > 0.0:
+            measured *= 1.0 + noise.relative_sd * self._rng.standard_normal()
+        return measured if self.min_range_m <= measured <= self.max_range_m else math.nan
+
+    def ping(self, terrain: Terrain, motion: Motion) -> FloatArray:
+        """Measured ranges, shape (n_beams,), NaN for no return."""
+        ranges = self.true_ranges(terrain, motion)
+        n, noise = len(ranges), self.noise
+        if noise.relative_sd > 0.0:
+            ranges = ranges * (1.0 + noise.relative_sd * self._rng.standard_normal(n))
+        if noise.outlier_rate > 0.0:
+            false = self._rng.random(n) < noise.outlier_rate
+            short = self._rng.random(n) < 0.5
+            wrong = np.where(short, ranges * self._rng.uniform(0.1, 0.9, n), 2.0 * ranges)
+            ranges = np.where(false, wrong, ranges)
+        if noise.dropout_rate > 0.0:
+            ranges = np.where(self._rng.random(n) < noise.dropout_rate, np.nan, ranges)
+        with np.errstate(invalid="ignore"):
+            inside = (ranges >= self.min_range_m) & (ranges <= self.max_range_m)
+        return np.where(inside, ranges, np.nan)
+
+
+def _altitude_m(terrain: Terrain, motion: Motion) -> float:
+    """What an altimeter has below it: its cone is wider than the pitch of flight, so that counts, as in DUNE."""
+    return terrain.depth_at_point(motion.east_m, motion.north_m) - motion.depth_m

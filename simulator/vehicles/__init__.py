@@ -1,0 +1,1 @@
+"""Simulated vehicles: how they move, where they believe to be, how long their battery lasts."""

@@ -1,0 +1,65 @@
+"""Deviations against what really happens."""
+
+import numpy as np
+import pytest
+
+from app.mapping.compare import interval_coverage
+from app.mapping.gaussian_process.calibration import Calibration, HeldOut, checked_log_scale, error_ratio, mixed
+from app.mapping.gaussian_process.gp import GaussianProcessMap
+from app.mapping.kriging.fields import Field
+from app.mapping.types import Grid, Soundings
+
+COARSE = Grid(0.0, 0.0, 10.0, 4, 4)
+NEUTRAL = Calibration(Field(COARSE, np.zeros((2, 4, 4))), Field(COARSE, np.ones((1, 4, 4))), 0.0, 0.0)
+
+
+def held_out(true_factor: float, own_sd: float, n: int = 2000) -> HeldOut:
+    """Predictions that are ``true_factor`` times as far off as they say."""
+    rng = np.random.default_rng(0)
+    sd = rng.uniform(0.5, 2.0, n)
+    error = true_factor * sd * rng.standard_normal(n) + own_sd * rng.standard_normal(n)
+    return HeldOut(rng.uniform(0, 40, (n, 2)), error, np.full(n, own_sd**2), sd**2)
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.0, 1.7])
+def test_the_factor_on_deviations_is_found(factor: float) -> None:
+    neutral = checked_log_scale(NEUTRAL, held_out(1.0, 0.1))
+    assert np.exp(checked_log_scale(NEUTRAL, held_out(factor, 0.1)) - neutral) == pytest.approx(factor, rel=0.08)
+
+
+def test_soundings_too_noisy_to_tell_change_nothing() -> None:
+    nothing = HeldOut(np.zeros((0, 2)), *np.zeros((3, 0)))
+    assert checked_log_scale(NEUTRAL, held_out(3.0, 100.0, n=300)) == pytest.approx(
+        checked_log_scale(NEUTRAL, nothing), abs=0.01
+    )
+
+
+def test_each_place_has_the_factor_of_where_it_is() -> None:
+    support = np.tile([1.0, 1.0, 0.0, 0.0], (1, 4, 1))
+    calibration = Calibration(NEUTRAL.field, Field(COARSE, support), np.log(2.0), np.log(3.0))
+    np.testing.assert_allclose(calibration.deviation(COARSE, np.ones((4, 4))), np.tile([2.0, 2.0, 3.0, 3.0], (4, 1)))
+
+
+def test_mixing_lies_between_and_counts_disagreement() -> None:
+    a, b = held_out(1.0, 0.1), held_out(2.0, 0.1)
+    half = mixed(a, b, 0.5)
+    np.testing.assert_allclose(half.error_m, 0.5 * (a.error_m + b.error_m))
+    assert np.all(half.map_variance >= a.map_variance)
+    assert error_ratio(a, b) < 0.6 < 1.0 < error_ratio(b, a)
+
+
+def test_intervals_hold_what_they_promise_on_ground_of_two_kinds() -> None:
+    rng = np.random.default_rng(3)
+    east, north = rng.uniform(0, 60, (2, 600))
+
+    def floor(e: np.ndarray, n: np.ndarray) -> np.ndarray:
+        rough = 1.0 / (1.0 + np.exp(-(e - 35.0) / 3.0))
+        return 12.0 + 0.03 * n + 0.8 * rough * np.sin(e / 2.0) * np.cos(n / 2.5)
+
+    sd = np.full(600, 0.05)
+    s = Soundings(east, north, floor(east, north) + sd * rng.standard_normal(600), sd)
+    grid = Grid(0.0, 0.0, 1.0, 60, 60)
+    truth = floor(*grid.centres_m.T).reshape(60, 60)
+    result = GaussianProcessMap().fit(s).predict(grid)
+    assert 0.60 < interval_coverage(result.depth_m, result.sd_m, truth, 0.68) < 0.80
+    assert 0.90 < interval_coverage(result.depth_m, result.sd_m, truth, 0.95) < 0.99

@@ -1,0 +1,93 @@
+"""Levels from a table of high and low waters."""
+
+import math
+from contextlib import suppress
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.mapping.water.tides import MAX_GAP_S, TideTableError, parse_tid
+
+TABLE = """# Tides Data
+# Time zone: UTC
+# Harbor: Leixoes
+2019/01/01 05:20:00.000 1.1
+2019/01/01 11:38:00.000 2.9
+2019/01/01 17:55:00.000 1.1
+
+2019/01/02 00:08:00.000 3.0
+"""
+
+
+def at(*when: int) -> float:
+    return datetime(*when, tzinfo=UTC).timestamp()  # type: ignore[arg-type, misc]
+
+
+def test_the_table_is_met_at_its_entries_and_half_way_between() -> None:
+    table = parse_tid(TABLE)
+    assert (table.name, len(table.times_s)) == ("Leixoes", 4)
+    np.testing.assert_allclose(table.levels_at(table.times_s), [1.1, 2.9, 1.1, 3.0])
+    assert table.levels_at(at(2019, 1, 1, 8, 29)) == pytest.approx(2.0)
+    quarter = at(2019, 1, 1, 5, 20) + 0.25 * 378 * 60
+    assert table.levels_at(quarter) == pytest.approx(2.0 - 0.9 * math.cos(math.pi / 4))
+
+
+@given(st.floats(0, 1))
+def test_between_two_extremes_the_level_never_leaves_them(part: float) -> None:
+    table = parse_tid(TABLE)
+    span = table.times_s[-1] - table.times_s[0]
+    assert 1.1 - 1e-9 <= table.levels_at(table.times_s[0] + part * span) <= 3.0 + 1e-9
+
+
+@pytest.mark.parametrize("seconds", [-1.0, 67_681.0, 1e9, math.nan])
+def test_beyond_the_table_there_is_no_level_and_a_reason(seconds: float) -> None:
+    table = parse_tid(TABLE)
+    time = table.times_s[0] + seconds
+    assert np.isnan(table.levels_at(time))
+    assert "2019-01-01 05:20 UTC to 2019-01-02 00:08 UTC" in table.why_not(time)
+
+
+def test_a_hole_in_the_table_is_no_half_tide() -> None:
+    late = datetime(2019, 1, 2, 0, 8, tzinfo=UTC) + timedelta(seconds=MAX_GAP_S + 60)
+    table = parse_tid(TABLE + f"{late:%Y/%m/%d %H:%M:%S}.000 0.9\n")
+    assert np.isnan(table.levels_at(table.times_s[-1] - 3600))
+    assert "hole" in table.why_not(table.times_s[-1] - 3600)
+    assert table.levels_at(table.times_s[-1]) == pytest.approx(0.9)
+    assert table.why_not(table.times_s[-1]) == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "0 entries"),
+        ("2019/01/01 05:20 1.1", "1 entries"),
+        (TABLE + "2019/01/02 06:08 high", "line 9: '2019/01/02 06:08 high' is not of the form"),
+        (TABLE + "2019/02/30 06:08 1.0", "line 9: .* is no date and time"),
+        (TABLE + "2019/01/02 00:08 1.0", "line 9: .* is not later"),
+        (TABLE + "2019/01/02 06:08 110", "line 9: the level 110 is not between"),
+        (TABLE.replace("UTC", "local"), "line 2: the time zone is 'local'"),
+        ("\x00\x01", "line 1"),
+    ],
+)
+def test_a_bad_table_is_refused_with_its_line(text: str, message: str) -> None:
+    with pytest.raises(TideTableError, match=message):
+        parse_tid(text)
+
+
+@given(st.text())
+def test_whatever_is_sent_is_a_table_or_refused(text: str) -> None:
+    with suppress(TideTableError):
+        assert len(parse_tid(text).times_s) >= 2
+
+
+@pytest.mark.terrains
+def test_the_table_of_leixoes_is_read_to_its_end(terrains: Path) -> None:
+    table = parse_tid((terrains / "leixoes_2019-2021.tid").read_text())
+    assert (table.name, len(table.times_s)) == ("Leixoes", 4235)
+    assert f"{table.last:%Y-%m-%d %H:%M}" == "2021-12-31 18:57"
+    assert table.levels_at(at(2021, 12, 31, 12, 44)) == pytest.approx(3.2)
+    assert np.isnan(table.levels_at(at(2022, 1, 1)))

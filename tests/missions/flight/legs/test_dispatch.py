@@ -1,0 +1,68 @@
+"""Legs that take too long: each is ended once, and nobody's next one with it."""
+
+import asyncio
+
+import numpy as np
+import pytest
+
+from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointOrder, WaypointStatus
+from app.missions.flight.decisions.decision import make_constraints
+from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.live.mission import LiveMission
+from app.missions.service import MissionService
+from app.missions.team import Member
+from app.missions.views.mission import Level
+from tests.support.missions.harbour import sim_spec
+from tests.support.missions.specs import LAT, LON
+
+
+def send_on(live: LiveMission, member: Member, step: int) -> None:
+    """Let a vehicle fly a leg that is late at once."""
+    place = Position(LAT + 1e-4, LON + 1e-4, 2.0)
+    member.report = VehicleReport(member.name, 0.0, place)
+    member.set_order(WaypointOrder(live.id, step, member.name, place, 1.0, 3.0, 1.0), np.array([9.0, 9.0]))
+    member.link, member.status = LinkState.ENGAGED, WaypointStatus.ACKNOWLEDGED
+    member.leg_began_s, member.leg_allowed_s = asyncio.get_running_loop().time(), 0.0
+
+
+@pytest.fixture
+async def late(service: MissionService) -> tuple[LiveMission, Dispatch]:
+    live = await service.get((await service.create(sim_spec("a", "b"))).id)
+    committing = LegCommit(live, make_constraints(live.spec), leads=True)
+    for vehicle in live.spec.vehicles:
+        if live.team.get(vehicle.name) is None:
+            live.team.join(vehicle, len(live.team.members))
+    for member in live.team:
+        member.followed = member.engaged = True
+        send_on(live, member, 1)
+    return live, Dispatch(live, service.hub, committing, 1.0, persistent=False)
+
+
+async def test_a_vehicle_that_is_sent_on_while_others_lateness_is_written_down_keeps_its_leg(
+    late: tuple[LiveMission, Dispatch], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live, dispatch = late
+    log = live.journal.log
+
+    async def slow(level: Level, kind: str, message: str, **details: object) -> None:
+        # Meanwhile another task finds the second one late as well, and sends it on.
+        second = live.team.members["b"]
+        if kind == "straggler" and second.order is not None and second.order.step == 1:
+            if second.ordered:
+                dispatch.settle(second, WaypointStatus.MISSED, "late")
+            send_on(live, second, 2)
+        await log(level, kind, message, **details)
+
+    monkeypatch.setattr(live.journal, "log", slow)
+    assert {member.name for member in await dispatch.settle_late()} == {"a", "b"}
+    second = live.team.members["b"]
+    assert second.order is not None
+    assert (second.order.step, second.ordered) == (2, True)
+
+
+async def test_only_those_that_are_asked_about_are_judged(late: tuple[LiveMission, Dispatch]) -> None:
+    live, dispatch = late
+    first, second = live.team.members["a"], live.team.members["b"]
+    assert await dispatch.settle_late([second]) == [second]
+    assert (first.ordered, second.ordered) == (True, False)

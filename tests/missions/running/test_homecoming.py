@@ -1,0 +1,303 @@
+"""Every way out of a mission with a recovery point leads home."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from shapely.geometry import Point, Polygon
+
+from app.missions.errors import ConflictError
+from app.missions.fleet.interface import FaultKind
+from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.flight.legs.commit import home_of
+from app.missions.flown import Phase
+from app.missions.operations.history import events_after
+from app.missions.running.homecoming import call_home, hold
+from app.missions.service import MissionService
+from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.states import Action, MissionState
+from app.missions.team import Withdrawal
+from app.missions.views.mission import MissionView, VehicleView
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
+from tests.support.missions.specs import FRAME, lon_lat, rectangle
+from tests.support.waiting import until
+
+INSIDE, OUTSIDE = lon_lat(15.0, 4.0), lon_lat(15.0, -60.0)
+
+
+def recovered(*names: str, point: tuple[float, float] = INSIDE, **changes: Any) -> MissionSpec:
+    """A mission with a recovery point."""
+    recovery = {"point": point} | changes.pop("recovery", {})
+    return sim_spec(*names, recovery=recovery, **changes)
+
+
+def from_home_m(vehicle: VehicleView, point: tuple[float, float]) -> float:
+    assert vehicle.lat_deg is not None
+    assert vehicle.lon_deg is not None
+    east, north = FRAME.to_local(vehicle.lat_deg, vehicle.lon_deg)
+    home_east, home_north = FRAME.to_local(point[1], point[0])
+    return math.hypot(float(east) - float(home_east), float(north) - float(home_north))
+
+
+async def words_of(service: MissionService, mission: MissionView, kind: str) -> list[str]:
+    live = await service.get(mission.id)
+    return [event.message for event in await events_after(live, 0, 1000) if event.kind == kind]
+
+
+async def phase_of(service: MissionService, mission: MissionView, name: str) -> Phase | None:
+    return next(v.phase for v in (await view_of(service, mission.id)).vehicles if v.name == name)
+
+
+@pytest.mark.parametrize("point", [INSIDE, OUTSIDE])
+async def test_at_the_end_of_a_mission_everybody_goes_home(service: MissionService, point: tuple[float, float]) -> None:
+    mission = await service.create(recovered("a", "b", point=point, steps=3))
+    await act(service, mission.id, "start")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+    assert max(from_home_m(vehicle, point) for vehicle in ended.vehicles) < 25.0
+    assert max(vehicle.depth_m or 0.0 for vehicle in ended.vehicles) < 1.5, "they have come up"
+    words = await words_of(service, mission, "recovery")
+    assert sum("is home" in line for line in words) == 2, words
+    assert not await words_of(service, mission, "boundary")
+
+
+async def test_a_mission_may_want_its_vehicles_to_stop_where_they_are(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=OUTSIDE, steps=2, recovery={"on_finish": "stop"}))
+    await act(service, mission.id, "start")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert [vehicle.phase for vehicle in ended.vehicles] == [Phase.STOPPED]
+    assert from_home_m(ended.vehicles[0], OUTSIDE) > 25.0
+
+
+@pytest.mark.parametrize("action", [Action.FINISH, Action.ABORT])
+async def test_finish_and_abort_bring_everybody_home_when_asked(service: MissionService, action: Action) -> None:
+    mission = await service.create(recovered("a", "b", point=OUTSIDE, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    state = MissionState.FINISHED if action is Action.FINISH else MissionState.ABORTED
+    answer = await service.act(live, action, actor="Ana", note="wind", return_home=True)
+    assert answer.mission.state is MissionState.RUNNING
+    assert answer.mission.ending is state
+    await until(lambda: live.header.state is not MissionState.RUNNING, "everybody is home")
+    ended = await view_of(service, mission.id)
+    assert (ended.state, ended.reason, ended.ending) == (state, "wind", None)
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+
+
+async def test_a_second_finish_stops_those_on_their_way(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=lon_lat(15.0, -600.0), steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    assert (await act(service, mission.id, "finish")).mission.ending is MissionState.FINISHED
+    ended = await act(service, mission.id, "finish")
+    assert ended.mission.state is MissionState.FINISHED
+    assert [stop.acknowledged for stop in ended.stops] == [True]
+
+
+async def test_an_abort_stops_at_once_unless_asked_otherwise(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=OUTSIDE, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 1)
+    answer = await act(service, mission.id, "abort")
+    assert answer.mission.state is MissionState.ABORTED
+    assert [stop.acknowledged for stop in answer.stops] == [True]
+
+
+async def test_without_a_recovery_point_nobody_can_be_asked_to_return(service: MissionService) -> None:
+    mission = await service.create(sim_spec("a", steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 1)
+    live = await service.get(mission.id)
+    with pytest.raises(ConflictError, match="no vehicle has a recovery point"):
+        await service.act(live, Action.FINISH, actor="Ana", return_home=True)
+    with pytest.raises(ConflictError, match="no recovery point"):
+        await call_home(live, "a", "Ana")
+    assert (await act(service, mission.id, "finish")).mission.state is MissionState.FINISHED
+
+
+async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: MissionService) -> None:
+    mission = await service.create(recovered("a", "b", point=OUTSIDE, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    await call_home(live, "a", "Ana")
+    on_its_way = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
+    berth_m = home_of(live.team.members["a"], live.spec)
+    assert berth_m is not None
+    lat, lon = live.frame.to_geographic(*berth_m)
+    assert on_its_way.way_home[-1] == pytest.approx((float(lon), float(lat)), abs=1e-6)
+    with pytest.raises(ConflictError, match="called home by Ana"):
+        await call_home(live, "a", "Ana")
+
+    async def is_home() -> bool:
+        return await phase_of(service, mission, "a") is Phase.HOME
+
+    await until(is_home, "a is home")
+    there = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
+    assert (there.way_home, there.turn_back_point) == ([], None)
+    before, other = live.team.members["a"].legs, live.team.members["b"].legs
+    await until(lambda: live.team.members["b"].legs > other + 2, "b goes on meanwhile")
+    assert live.team.members["a"].legs == before
+    await service.send_on(live, "a", "Ana")
+    await until(lambda: live.team.members["a"].legs > before + 2, "a surveys again")
+    assert await phase_of(service, mission, "a") in (Phase.SURVEY, Phase.TRANSIT)
+    await act(service, mission.id, "abort")
+
+
+async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: MissionService) -> None:
+    starts = {"a": lon_lat(35.0, 60.0), "b": lon_lat(85.0, 60.0)}
+    vehicles = [{"name": name, "kind": "sim", "start": start} for name, start in starts.items()]
+    mission = await service.create(recovered(vehicles=vehicles, point=OUTSIDE, side_m=120.0, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    a, b = live.team.members["a"], live.team.members["b"]
+    await hold(live, "a", "Ana")
+    with pytest.raises(ConflictError, match="held by Ana"):
+        await hold(live, "a", "Ana")
+    await until(lambda: a.withdrawal is not None and a.withdrawal.led and not a.ordered, "a is held")
+    before, other = a.legs, b.legs
+    await until(lambda: b.legs > other + 3, "b goes on meanwhile")
+    assert a.legs == before
+    assert await phase_of(service, mission, "a") is Phase.STOPPED
+    await until(lambda: a.waits_m is not None, "it circles")
+    circles = {v.name: v.waiting_circle for v in (await view_of(service, mission.id)).vehicles}
+    assert circles["b"] is None
+    assert circles["a"] is not None
+    lon, lat = circles["a"].centre
+    east, north = FRAME.to_local(lat, lon)
+    room = Point(float(east), float(north)).buffer(circles["a"].radius_m)
+    assert Polygon(live.spec.local_area()).buffer(0.1).contains(room)
+    # What is stored lets a restart go on with it.
+    assert a.withdrawal is not None
+    assert Withdrawal.recall(a.withdrawal.remember()) == replace(a.withdrawal, led=False)
+    await service.send_on(live, "a", "Ana")
+    await until(lambda: a.legs > before + 2, "a surveys again")
+    assert all(v.waiting_circle is None for v in (await view_of(service, mission.id)).vehicles)
+    await hold(live, "b", "Ana")
+    await call_home(live, "b", "Ana")
+
+    async def is_home() -> bool:
+        return await phase_of(service, mission, "b") is Phase.HOME
+
+    await until(is_home, "b is home, though it was held")
+    await act(service, mission.id, "abort")
+
+
+async def test_vehicles_that_fly_in_steps_of_the_whole_team_come_home_too(service: MissionService) -> None:
+    spec = recovered("a", "b", point=OUTSIDE, steps=1000, limits={"max_step_m": 8.0, "com_range_m": 500.0})
+    mission = await service.create(spec)
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    await call_home(live, "a", "Ana")
+
+    async def is_home() -> bool:
+        return await phase_of(service, mission, "a") is Phase.HOME
+
+    await until(is_home, "a is home")
+    step = live.header.step
+    await until_step(service, mission.id, step + 2)
+    await service.send_on(live, "a", "Ana")
+    flown = live.team.members["a"].legs
+    await until(lambda: live.team.members["a"].legs > flown, "a takes part again")
+    await act(service, mission.id, "finish")
+    ended = await until_ended(service, mission.id)
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+
+
+async def test_a_service_that_restarts_goes_on_bringing_everybody_home(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = await service.create(recovered("a", "b", point=lon_lat(15.0, -300.0), steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    await service.act(await service.get(mission.id), Action.ABORT, actor="Ana", return_home=True)
+    service = await harbour.reopen()
+    ended = await until_ended(service, mission.id)
+    assert ended.state is MissionState.ABORTED
+    assert ended.progress.step < 20, "nobody went on surveying"
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+
+
+async def until_ended(service: MissionService, mission_id: str) -> MissionView:
+    async def ended() -> bool:
+        return (await view_of(service, mission_id)).state not in (MissionState.RUNNING, MissionState.PAUSED)
+
+    await until(ended, "the mission has ended")
+    return await view_of(service, mission_id)
+
+
+async def test_a_paused_mission_is_finished_at_home_too(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=OUTSIDE, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    await act(service, mission.id, "pause")
+    assert (await act(service, mission.id, "finish")).mission.state is MissionState.RUNNING
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert [vehicle.phase for vehicle in ended.vehicles] == [Phase.HOME]
+
+
+async def test_vehicles_turn_back_in_time(harbour_closed: Harbour) -> None:
+    """Seven minutes of energy: it is home long before its steps are done, with some of it left."""
+    # Its reserve is a minute: a machine that is busy for a second may not use that up.
+    service = await harbour_closed.open(time_scale=12.0)
+    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 7.0}]
+    spec = recovered(point=OUTSIDE, vehicles=vehicles, steps=1000)
+    mission = await service.create(spec)
+    await act(service, mission.id, "start")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    (vehicle,) = ended.vehicles
+    assert vehicle.phase is Phase.HOME
+    assert ended.progress.step < 1000
+    assert vehicle.energy_left_pct is not None
+    assert 0.0 < vehicle.energy_left_pct < 70.0
+
+
+async def test_vehicles_are_called_home_though_no_line_can_be_written(service: MissionService) -> None:
+    mission = await service.create(recovered("a", "b", steps=1000, failsafes={"vehicle_error": "return"}))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    link = service.hub._links[VehicleKind.SIM]
+    assert isinstance(link, SimFleetLink)
+    async with live.journal._logging:
+        for name in ("a", "b"):
+            link.fail(name, FaultKind.ERROR, "a fin is stuck")
+        await until(lambda: all(member.withdrawal is not None for member in live.team), "both are called home")
+        assert not await words_of(service, mission, "failsafe")
+
+    async def told() -> bool:
+        return sum("a fin is stuck" in line for line in await words_of(service, mission, "failsafe")) == 2
+
+    await until(told, "it is told why")
+    await act(service, mission.id, "abort")
+
+
+async def test_the_way_home_keeps_clear_of_zones(service: MissionService) -> None:
+    spec = recovered(
+        point=lon_lat(10.0, 8.0),
+        side_m=70.0,
+        steps=4,
+        keep_out=[rectangle(0, 32, 45, 36)],
+        limits={"max_step_m": 8.0, "keep_out_margin_m": 8.0},
+        vehicles=[{"name": "a", "kind": "sim", "start": list(lon_lat(15.0, 60.0))}],
+    )
+    mission = await service.create(spec)
+    await act(service, mission.id, "start")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert [vehicle.phase for vehicle in ended.vehicles] == [Phase.HOME]
+    assert not await words_of(service, mission, "boundary")
+
+
+@pytest.mark.parametrize(
+    ("recovery", "words"),
+    [
+        ({"point": lon_lat(0.0, -20_000.0)}, "from the area"),
+        ({"point": lon_lat(15.0, 15.0)}, "keep_out.0"),
+    ],
+)
+def test_recovery_points_are_near_and_clear(recovery: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        sim_spec("a", recovery=recovery, keep_out=[rectangle(10, 10, 20, 20)])

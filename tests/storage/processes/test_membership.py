@@ -1,0 +1,101 @@
+"""Processes that share a database know of each other who lives."""
+
+import asyncio
+import signal
+import sys
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+
+import pytest
+
+from app.storage.processes.membership import Membership, MembershipLostError, make_membership
+from tests.support.databases import Databases
+
+HOLDER = """
+import asyncio, sys
+from app.storage.processes.membership import make_membership
+
+async def hold(url, number):
+    membership = make_membership(url, lambda: None)
+    await membership.enter(number)
+    print("held", flush=True)
+    await asyncio.sleep(3600)
+
+asyncio.run(hold(sys.argv[1], int(sys.argv[2])))
+"""
+
+
+@asynccontextmanager
+async def member(url: str, number: int, on_call: Callable[[], None] = lambda: None) -> AsyncIterator[Membership]:
+    membership = make_membership(url, on_call)
+    await membership.enter(number)
+    try:
+        yield membership
+    finally:
+        await membership.leave()
+
+
+async def test_each_sees_who_lives(url: str) -> None:
+    async with member(url, 1) as one, AsyncExitStack() as guests:
+        two = await guests.enter_async_context(member(url, 2))
+        assert await one.alive([1, 2, 3]) == {1, 2}
+        assert await two.alive([1, 3]) == {1}
+        await guests.aclose()
+        assert await one.alive([1, 2, 3]) == {1}
+
+
+async def test_who_left_does_not_live_from_then_on(url: str) -> None:
+    async with member(url, 1) as one:
+        for number in range(2, 42):
+            async with member(url, number):
+                pass
+            assert await one.alive(range(1, 42)) == {1}
+
+
+async def test_a_number_is_one_process_s(url: str) -> None:
+    async with member(url, 1):
+        with pytest.raises(MembershipLostError):
+            await make_membership(url, lambda: None).enter(1)
+
+
+async def test_a_number_is_free_again_once_its_process_left(url: str) -> None:
+    async with member(url, 1):
+        pass
+    async with member(url, 1) as again:
+        assert await again.alive([1]) == {1}
+
+
+async def test_a_killed_process_does_not_live(url: str) -> None:
+    async with member(url, 1) as one:
+        other = await asyncio.create_subprocess_exec(
+            sys.executable, "-c", HOLDER, url, "2", stdout=asyncio.subprocess.PIPE
+        )
+        try:
+            assert other.stdout is not None
+            assert await asyncio.wait_for(other.stdout.readline(), 60) == b"held\n"
+            assert await one.alive([1, 2]) == {1, 2}
+        finally:
+            other.send_signal(signal.SIGKILL)
+            await other.wait()
+        async with asyncio.timeout(10):
+            while await one.alive([1, 2]) != {1}:  # noqa: ASYNC110 - the server notices in its own time
+                await asyncio.sleep(0.02)
+
+
+async def test_others_are_called_and_hear_it(databases: Databases) -> None:
+    url = databases.fresh("postgresql")
+    called = asyncio.Event()
+    async with member(url, 1, called.set), member(url, 2) as two:
+        await two.call()
+        await asyncio.wait_for(called.wait(), 10)
+
+
+async def test_whose_connection_broke_is_told_so(databases: Databases) -> None:
+    url = databases.fresh("postgresql")
+    async with member(url, 1) as one, member(url, 2) as two:
+        killed = "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND objid = 1"
+        await two._ask("execute", killed)  # type: ignore[attr-defined]
+        with pytest.raises(MembershipLostError):
+            await one.alive([1])
+        await one.enter(1)
+        assert await two.alive([1, 2]) == {1, 2}

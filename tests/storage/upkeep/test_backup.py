@@ -1,0 +1,316 @@
+"""Copies of a database that is in use, checked, damaged and put back; and room for new missions."""
+
+import asyncio
+import os
+import re
+import shutil
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from sqlalchemy import func, select
+from sqlalchemy.exc import DBAPIError
+
+from app.storage.database import Database
+from app.storage.models import Base, MissionRow, SoundingRow
+from app.storage.ping_files import PingFiles
+from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
+from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
+from tests.support.databases import Databases, query
+from tests.support.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
+
+WRITER = """
+import sqlite3, sys
+connection = sqlite3.connect(sys.argv[1], timeout=30, isolation_level=None)
+print("writing", flush=True)
+while True:
+    connection.execute("BEGIN IMMEDIATE")
+    for half in "ab":  # both or none
+        connection.execute(
+            "INSERT INTO events (mission_id, time, level, kind, message, data) VALUES (?, ?, 'info', ?, '', '{}')",
+            ("m1", "2026-06-01", half),
+        )
+    connection.execute("COMMIT")
+"""
+
+
+def path_of(url: str) -> Path:
+    return Path(url.removeprefix("sqlite+aiosqlite:///"))
+
+
+async def fill(database: Database, files: PingFiles | None = None) -> None:
+    (files or PingFiles.beside(database.url)).write(PING_FILE_NAME, PING_FILE)
+    async with database.writing() as session:
+        for rows in one_of_each():
+            session.add_all(rows)
+            await session.flush()
+
+
+def beside(folder: Path, begin: str) -> list[Path]:
+    return list(folder.glob(f"{begin}*"))
+
+
+async def counts(url: str) -> dict[str, int]:
+    database = Database(url)
+    async with database.reading() as session:
+        found = {
+            table.name: int(await session.scalar(select(func.count()).select_from(table)) or 0)
+            for table in Base.metadata.sorted_tables
+        }
+    await database.close()
+    return found
+
+
+def copies_beside_a_writer(url: str, folder: Path) -> list[Path]:
+    """Copies that were made one after the other while another process wrote."""
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(path_of(url))], stdout=subprocess.PIPE) as writer:
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        try:
+            return [back_up(url, folder / f"{number}.db")[0] for number in range(5)]
+        finally:
+            writer.kill()
+
+
+async def test_copy_of_a_database_that_is_written_to_is_one_moment_of_it(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    sizes = []
+    for copy in await asyncio.to_thread(copies_beside_a_writer, sqlite.url, tmp_path):
+        assert copy.stat().st_mode & 0o777 == 0o600
+        with closing(sqlite3.connect(copy)) as connection:
+            halves = [
+                connection.execute("SELECT count(*) FROM events WHERE kind = ?", half).fetchone()[0] for half in "ab"
+            ]
+            (journal,) = connection.execute("PRAGMA journal_mode").fetchone()
+        assert halves[0] == halves[1]
+        assert journal == "delete"
+        sizes.append(halves[0])
+    assert sizes == sorted(sizes)
+    assert sizes[-1] > 0
+    assert not any(f"{number}.db.part" in files for *_, files in os.walk(tmp_path) for number in range(5))
+
+
+async def test_what_was_backed_up_is_there_again_after_the_disk_was_lost(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    await sqlite.close()
+    before = await counts(sqlite.url)
+    copy, contents = back_up(sqlite.url, tmp_path / "backups")
+    assert {table: contents.rows[table] for table in before} == before
+    os.unlink(path_of(sqlite.url))  # noqa: PTH108 - a moment's work
+    assert restore_to(sqlite.url, copy, replace=False) == (contents, None)
+    assert await counts(sqlite.url) == before
+
+
+async def test_restoring_over_a_database_moves_it_aside_and_never_one_that_is_in_use(
+    sqlite: Database, tmp_path: Path
+) -> None:
+    copy, _ = back_up(sqlite.url, tmp_path / "empty.db")
+    await fill(sqlite)
+    with pytest.raises(BackupError, match="exists"):
+        restore_to(sqlite.url, copy, replace=False)
+    async with sqlite.reading() as session:
+        await session.scalars(select(MissionRow))
+        with pytest.raises(BackupError, match="in use"):
+            restore_to(sqlite.url, copy, replace=True)
+    await sqlite.close()
+    _, aside = restore_to(sqlite.url, copy, replace=True)
+    assert (await counts(sqlite.url))["missions"] == 0
+    assert aside is not None
+    assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
+
+
+@pytest.mark.parametrize("page", [0, 1, 2, 3])
+async def test_damage_is_noticed_and_nothing_is_restored_from_it(sqlite: Database, tmp_path: Path, page: int) -> None:
+    await fill(sqlite)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    whole = copy.read_bytes()
+    damaged = whole[: page * 4096] + b"\xff" * 1200 + whole[page * 4096 + 1200 :]
+    for content in (damaged, whole[: len(whole) // 2]):
+        copy.write_bytes(content)
+        with pytest.raises(BackupError, match=re.escape(str(copy))):
+            contents_of(copy)
+        with pytest.raises(BackupError):
+            restore_to(f"sqlite+aiosqlite:///{tmp_path / 'new.db'}", copy, replace=False)
+        assert not (tmp_path / "new.db").exists()
+
+
+async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlite: Database, tmp_path: Path) -> None:
+    files = PingFiles(str(tmp_path / "pings"))
+    await fill(sqlite, files)
+    await sqlite.close()
+    copy, made = back_up(sqlite.url, tmp_path / "copy.db", files)
+    assert made.ping_files == contents_of(copy).ping_files == 1
+    assert all(file.stat().st_mode & 0o077 == 0 for file in (tmp_path / "copy.db-pings").rglob("*"))
+    files.write("m2/000000000001-later.parquet", b"of a mission that the backup does not know")
+    restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert files.names() == [PING_FILE_NAME]
+    (aside,) = beside(tmp_path, "pings.before-")
+    assert len(PingFiles(str(aside)).names()) == 2, "with the database that was there"
+
+    file = tmp_path / "copy.db-pings" / PING_FILE_NAME
+    file.write_bytes(PING_FILE + b"?")
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
+        contents_of(copy)
+    file.unlink()
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
+        restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert files.names() == [PING_FILE_NAME]
+    files.remove("m1")
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
+        back_up(sqlite.url, tmp_path / "again.db", files)
+    assert not beside(tmp_path, "again")
+
+
+async def test_a_mission_that_goes_takes_its_files_of_pings_along_whenever_the_process_is_killed(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files, long_ago = PingFiles(str(tmp_path / "pings")), datetime.now(UTC) - timedelta(days=100)
+    async with database.writing() as session:
+        session.add_all(mission(name, state="finished", updated_at=long_ago) for name in ("m1", "m2"))
+        await session.flush()
+        session.add(ping_chunk())
+    for name in (PING_FILE_NAME, "m2/other.parquet"):
+        files.write(name, PING_FILE)
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as kill:
+        kill.setattr(Database, "writing", killed)
+        with pytest.raises(KeyboardInterrupt):
+            await remove(database, "m1", 30, files)
+    await finish_removing(database, files)
+    assert (len(files.names()), files.condemned()) == (2, []), "the mission is still there"
+    with monkeypatch.context() as kill:
+        kill.setattr(files, "remove", killed)
+        with pytest.raises(KeyboardInterrupt):
+            await remove(database, "m1", 30, files)
+    await finish_removing(database, files)
+    assert (files.names(), files.condemned()) == (["m2/other.parquet"], [])
+
+
+async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("nothing")
+    with closing(sqlite3.connect(tmp_path / "other.db")) as connection:
+        connection.execute("CREATE TABLE cats (name TEXT)")
+    for name, said in (("notes.txt", "neither an SQLite"), ("other.db", "not one of bathyfleet")):
+        with pytest.raises(BackupError, match=said):
+            contents_of(tmp_path / name)
+    with pytest.raises(BackupError, match="exists"):
+        back_up(sqlite.url, tmp_path / "other.db")
+    with pytest.raises(BackupError, match="there is no database"):
+        back_up(f"sqlite+aiosqlite:///{tmp_path / 'absent.db'}", tmp_path / "x.db")
+
+
+async def test_postgresql_is_copied_by_its_own_programs(
+    databases: Databases,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url = databases.fresh("postgresql")
+    database = Database(url)
+    files, others = PingFiles(str(tmp_path / "files")), PingFiles(str(tmp_path / "others"))
+    await fill(database, files)
+    await database.close()
+    before = await counts(url)
+    copy, made = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    assert contents_of(copy) == made
+    assert (made.size_bytes, made.ping_files) == (copy.stat().st_size, 1)
+    other = databases.fresh("postgresql")
+    await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
+    assert others.names() == [PING_FILE_NAME]
+    assert before["processes"] > 0
+    # Who lives now, and what he leads, is not copied.
+    assert await counts(other) == before | {"mission_owners": 0, "processes": 0}
+    query(url, "update alembic_version set version_num = '9999'")
+    newer, _ = await asyncio.to_thread(back_up, url, tmp_path / "newer.dump", files)
+    with pytest.raises(BackupError, match="is at revision 9999, which this version does not know"):
+        await asyncio.to_thread(restore_to, other, newer, replace=True, pings=others)
+    assert await counts(other) == before | {"mission_owners": 0, "processes": 0}
+    half = tmp_path / "half.dump"
+    half.write_bytes(copy.read_bytes()[:-2000])
+    with pytest.raises(BackupError, match="pg_restore"):
+        contents_of(half)
+
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(BackupError, match="pg_dump is not installed") as refused:
+        back_up(url, tmp_path / "again.dump")
+    assert "docker compose exec database pg_dump" in refused.value.remedy
+
+
+async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
+    databases: Databases, tmp_path: Path
+) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url = databases.fresh("postgresql")
+    database, files = Database(url), PingFiles(str(tmp_path / "files"))
+    await fill(database, files)
+    await database.close()
+    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    statement = "select id, alarm_id, recipient, state, attempts, process_id from alarm_deliveries"
+    assert query(url, statement) == [("d1", "a1", "bridge", "waiting", 0, 1)]
+    waiting = [("d1", "a1", "bridge", "waiting", 0, None)]
+
+    empty = databases.empty("postgresql")
+    await asyncio.to_thread(restore_to, empty, copy, replace=False, pings=files)
+    assert query(empty, statement) == waiting, "some other process delivers it now"
+    with pytest.raises(DBAPIError, match="fk_alarm_deliveries_process_id_processes"):
+        query(empty, "update alarm_deliveries set process_id = 7")
+
+    await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
+    assert query(url, statement) == waiting, "over the row that named a process"
+
+
+async def test_an_archive_goes_into_postgresql_as_a_whole_or_not_at_all(databases: Databases, tmp_path: Path) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    files = PingFiles(str(tmp_path / "files"))
+    copy, _ = await asyncio.to_thread(back_up, databases.fresh("postgresql"), tmp_path / "fleet.dump", files)
+    url = databases.empty("postgresql")
+    query(url, "create table waypoints (depth_m real)")  # the last table of all is in the way
+    with pytest.raises(BackupError, match=r"psql failed: .*relation \"waypoints\" already exists"):
+        await asyncio.to_thread(restore_to, url, copy, replace=False, pings=files)
+    assert query(url, "select tablename from pg_tables where schemaname = 'public'") == [("waypoints",)]
+
+
+async def test_a_password_is_given_to_no_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake = tmp_path / "pg_dump"
+    fake.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/arguments\necho "$PGPASSWORD" > {tmp_path}/word\nexit 1\n')
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    with pytest.raises(BackupError, match="pg_dump failed"):
+        back_up("postgresql+asyncpg://fleet:hunter2@db:5433/fleet", tmp_path / "x.dump")
+    assert "hunter2" not in (tmp_path / "arguments").read_text()
+    assert "--host db --port 5433" in (tmp_path / "arguments").read_text()
+    assert (tmp_path / "word").read_text() == "hunter2\n"
+
+
+async def test_missions_that_ended_long_ago_go_and_give_their_space_back(database: Database) -> None:
+    now = datetime.now(UTC)
+    ages = {"old": 100.0, "younger": 10.0, "running": 100.0, "paused": 100.0, "ready": 100.0}
+    async with database.writing() as session:
+        for name, days in ages.items():
+            state = name if name in ("running", "paused", "ready") else "finished"
+            session.add(mission(name, state=state, updated_at=now - timedelta(days=days)))
+        await session.flush()
+        for name in ages:
+            many = 2000 if name == "old" else 3
+            session.add_all(SoundingRow(**sounding(name, time_s=float(k))) for k in range(many))
+    found = await ended_before(database, 30)
+    assert [(ended.id, ended.soundings) for ended in found] == [("old", 2000)]
+    assert not await remove(database, "running", 30)
+    assert not await remove(database, "younger", 30)
+    assert await remove(database, "old", 30)
+    assert not await remove(database, "old", 30)
+    after = await counts(database.url)
+    assert (after["missions"], after["soundings"]) == (4, 12)
+    note = await give_space_back(database.url)
+    if database.url.startswith("sqlite"):
+        assert int(note.split()[3]) > 100_000
