@@ -198,9 +198,12 @@ def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(page
     box = by_id(page, "lasso").bounding_box()
     assert box is not None
     left, top, right, bottom = box["x"] + 4, box["y"] + 4, box["x"] + box["width"] - 4, box["y"] + box["height"] - 4
-    page.mouse.move(box["x"] + box["width"] / 2, top + 260)
+    tools = page.locator(".points-tools").bounding_box()
+    assert tools is not None
+    assert tools["y"] > box["y"] + 0.5 * box["height"], "alarms stand in the upper part"
+    page.mouse.move(box["x"] + box["width"] / 2, top)
     page.mouse.down()
-    for x, y in [(right, top), (right, bottom - 90), (left, bottom - 90), (left, top + 260)]:
+    for x, y in [(right, top), (right, bottom), (left, bottom), (left, top)]:
         page.mouse.move(x, y)
     page.mouse.up()
     expect(chosen).to_contain_text("of 64 soundings chosen")

@@ -56,4 +56,6 @@ def drag(page: Page, start: tuple[int, int], end: tuple[int, int]) -> None:
     page.mouse.down()
     for share in (0.3, 0.7, 1.0):
         page.mouse.move(start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
+        # A browser joins moves that come between two pictures, and what begins too far from a handle drags nothing.
+        page.evaluate("() => new Promise(requestAnimationFrame)")
     page.mouse.up()
