@@ -112,6 +112,13 @@ async def aborted_without_a_disk(folder: Path, disk: Disk) -> dict[str, Any]:
     return {"disk": disk.kind, "said": said}
 
 
+def _set(clock: Path, off_s: float) -> None:
+    """Set the wall clock at once: a service that reads it meanwhile finds the time before or after."""
+    new = clock.with_suffix(".new")
+    new.write_text(str(off_s))
+    new.rename(clock)
+
+
 async def clock_jumps(folder: Path, jumps_s: Sequence[float]) -> dict[str, Any]:
     """Set the wall clock of the service's machine forward and back in the middle of a mission."""
     clock = folder / "clock"
@@ -124,8 +131,7 @@ async def clock_jumps(folder: Path, jumps_s: Sequence[float]) -> dict[str, Any]:
     ):
         for count, jump_s in enumerate(jumps_s, 1):
             await steps_more(service, mission_id, 3)
-            clock.with_suffix(".new").write_text(str(jump_s))
-            clock.with_suffix(".new").rename(clock)
+            _set(clock, jump_s)
 
             async def told(count: int = count) -> bool:
                 return sum("clock was set" in line for line in await log_of(api, mission_id)) == count
@@ -231,7 +237,7 @@ async def bad_day(folder: Path, disk: Disk) -> dict[str, Any]:
         async with _held(service.database):
             await _nothing_is_written(service, api, mission_id, "another program holds the database locked")
         await steps_more(service, mission_id, 1)
-        clock.write_text("-86400")
+        _set(clock, -86400)
 
         async def told() -> bool:
             return any("clock was set back by 86400 s" in line for line in await log_of(api, mission_id))
