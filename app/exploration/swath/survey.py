@@ -114,6 +114,8 @@ class Assignment:
     """What its line was laid by last."""
     skipped: FloatArray | None = None
     """A line (k, 2) that its operator wants left out, until that is noted."""
+    idle: bool = False
+    """Whether there was nothing for it when it was last asked for."""
 
 
 @dataclass(frozen=True)
@@ -215,6 +217,7 @@ class SwathSurvey:
             sweep.course = None
         if sweep.course is None and not self._take_line(vehicle, pose, flying, left, team):
             self._take_crossline(sweep, pose, flying, left)
+        sweep.idle = sweep.course is None
         if sweep.course is None:
             return None
         return self._along(sweep, pose, flying, left, leg_m, reach_m)
@@ -417,6 +420,8 @@ class SwathSurvey:
         sweep = self._sweeps[vehicle]
         found, wide, overlap = self._missed(left, small, flying, coverage, pose)
         mine = shared(found, *self._free_at(vehicle, pose, team))[vehicle]
+        if not mine and all(self._sweeps[name].idle for name in team if name != vehicle):
+            mine = found  # Who is nearer was told that nothing is left, and may not be asked for again.
         for one in tour(mine, pose, flying.radius_m):
             path = self._led(one.path, flying, coverage)
             if len(path) > 1:
