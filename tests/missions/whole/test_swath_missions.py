@@ -91,7 +91,7 @@ async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Har
     assert [order.state for order in await orders_of(live)] == [OrderState.DONE]
     progress = live.progress()
     assert progress.holidays == 0
-    assert (progress.ensonified_pct or 0.0) > 98.0, "but for single cells at the border"
+    assert (progress.ensonified_pct or 0.0) > 98.0, "but for single cells"
 
 
 async def test_cells_and_what_was_left_are_the_same_after_the_service_started_again(harbour: Harbour) -> None:
