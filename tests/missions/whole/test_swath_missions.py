@@ -89,9 +89,10 @@ async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Har
     await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(45.0, 45.0)), "Ana")
     await until_state(harbour.service, live.id, MissionState.FINISHED)
     assert [order.state for order in await orders_of(live)] == [OrderState.DONE]
+    await live.build_map()  # what was seen on the last legs is in no map yet
     progress = live.progress()
     assert progress.holidays == 0
-    assert (progress.ensonified_pct or 0.0) > 98.0, "but for single cells"
+    assert (progress.ensonified_pct or 0.0) > 99.0
 
 
 async def test_cells_and_what_was_left_are_the_same_after_the_service_started_again(harbour: Harbour) -> None:
