@@ -341,13 +341,15 @@ def test_no_dive_leads_down_again_where_a_vehicle_was_lifted() -> None:
 def test_plans_keep_higher_over_uneven_floor() -> None:
     rng = np.random.default_rng(2)
     xy = rng.uniform(-1.0, 1.0, (1000, 2))
-    flat, rough = np.full(1000, 0.7), 0.7 + 0.1 * rng.choice([-1.0, 1.0], 1000)
-    least = []
-    for depth in (flat, rough):
-        floor = floor_of(Belief(xy, depth, np.full(1000, 0.01), np.zeros(1000, dtype=bool), np.ones(1000), 0.2))
-        least.append(floor.depth_m - floor.deepest_m)
-    assert least[0].max() < CLEARANCE + 0.05
-    assert least[1].min() > least[0].max()
+    even, uneven = np.full(1000, 0.7), 0.7 + 0.1 * rng.choice([-1.0, 1.0], 1000)
+    heights = []
+    for depth in (even, uneven):
+        belief = Belief(xy, depth, np.full(1000, 0.01), np.zeros(1000, dtype=bool), np.ones(1000), 0.2)
+        nothing_known = Bottom.unknown()
+        floor = estimate_floor(belief, nothing_known, np.zeros((0, 3)), CUBE, 0.4, CLEARANCE, 0.6)
+        heights.append(floor.depth_m - floor.deepest_m)
+    assert heights[0].max() < CLEARANCE + 0.05
+    assert np.median(heights[1]) > np.median(heights[0]) + 0.03
 
 
 def test_altimeters_tell_where_the_bottom_is() -> None:
