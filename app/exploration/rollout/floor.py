@@ -30,8 +30,6 @@ MARGIN = 0.1
 MARGIN_OF_ROOM = 0.25
 """The same as a part of what visibility leaves above the required clearance, where that is less."""
 
-UNEVEN = 0.5
-"""The same as a part of the deviation of the depths nearby: between landmarks the floor may be as shoal as they are."""
 
 ROUGHLY = 0.1
 """Deviation, in visibilities, up to which the depth of a landmark counts as estimated."""
@@ -120,33 +118,30 @@ def estimate_floor(
         trust = np.minimum(np.sqrt(belief.covariance_m2[:, 2, 2]), ROUGHLY * visibility_m)
     if known.any():
         sure = np.vstack([felt_m, belief.sounded_m])
-        depth, spread = _from_neighbours(
+        depth = _from_neighbours(
             np.vstack([belief.xy_m[known], sure[:, :2], deeper[:, :2]]),
             np.concatenate([belief.depth_m[known], sure[:, 2], deeper[:, 2]]),
             np.concatenate([trust[known], np.zeros(len(sure)), np.full(len(deeper), ROUGHLY * visibility_m)]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
-        )
+        ).reshape(rows, cols)
     else:
-        depth, spread = np.full(rows * cols, unknown_m), np.zeros(rows * cols)
-    depth, spread = depth.reshape(rows, cols), spread.reshape(rows, cols)
+        depth = np.full((rows, cols), unknown_m)
     here = bottom.at(np.stack([east, north], axis=-1))
     limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
     clear = np.where(np.isnan(here), limit, here - clearance_m)
-    # A vehicle that was lifted is not sent down there again: so far off may the nodes be that tell of a place.
-    _keep_above(clear, east, north, felt_m, clearance_m, STEEPEST_DIVE, np.sqrt(2.0) * cell)
+    _keep_above(clear, east, north, felt_m, clearance_m, STEEPEST_DIVE)
     if follows:
         smooth, slope = depth.copy(), STEEPEST_DIVE
         limit = np.fmin(limit, here - clearance_m)
     else:
-        limit -= UNEVEN * spread
         smooth, slope = gaussian_filter(depth, 0.12 * visibility_m / cell, mode="nearest"), ENVELOPE_SLOPE
         # The constraints' sea floor has steps between cells: whatever lies within a cell of a node counts there.
         looks = int(np.ceil(2.0 * cell / bottom.cell_m)) + 1  # no cell of the constraints' sea floor is skipped
         shifts = np.stack(np.meshgrid(*[np.linspace(-cell, cell, looks)] * 2), axis=-1).reshape(-1, 1, 1, 2)
         around = bottom.at(np.stack([east, north], axis=-1) + shifts)
         limit = np.minimum(limit, np.where(np.isnan(around), np.inf, around).min(axis=0) - clearance_m)
-        _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), slope, 0.0)
+        _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), slope)
     return FloorEstimate(
         float(low[0]), float(low[1]), float(cell), depth, smooth,
         np.minimum(_envelope(limit, cell, slope), depth - held_m), np.minimum(clear, depth - held_m),
@@ -155,19 +150,15 @@ def estimate_floor(
 
 def _from_neighbours(
     seen_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray, at_m: FloatArray, visibility_m: float
-) -> tuple[FloatArray, FloatArray]:
-    """Weigh the closest seen landmarks by distance and trust; return their mean and the deviation from it.
-
-    Far from all of them that is the mean of all, without any deviation.
-    """
+) -> FloatArray:
+    """Weigh the closest seen landmarks by distance and trust; far from all of them return their mean."""
     k = min(NEIGHBOURS, len(seen_m))
     found = cKDTree(seen_m).query(at_m, k=k)
     distance, index = (np.asarray(part).reshape(len(at_m), k) for part in found)
     weight = 1.0 / ((distance / visibility_m) ** 2 + 0.01) / (sd_m[index] ** 2 + (0.05 * visibility_m) ** 2)
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
-    spread = np.sqrt((weight * (depth_m[index] - local[:, None]) ** 2).sum(axis=1) / weight.sum(axis=1))
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
-    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean()), np.asarray(trust * spread)
+    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
 
 
 @njit(cache=True, nogil=True)
@@ -207,23 +198,14 @@ def hold_to(floor: FloorEstimate, sounded_m: FloatArray, reach_m: float) -> None
 
 @njit(cache=True, nogil=True)
 def _keep_above(
-    limit: FloatArray,
-    east: FloatArray,
-    north: FloatArray,
-    felt_m: FloatArray,
-    above_m: float,
-    slope: float,
-    around_m: float,
+    limit: FloatArray, east: FloatArray, north: FloatArray, felt_m: FloatArray, above_m: float, slope: float
 ) -> None:
-    """Lower ``limit`` (rows, cols) in place so that vehicles clear the felt points (k, 3) and can climb to them.
-
-    The bottom is taken to be as it was felt up to ``around_m`` from there.
-    """
+    """Lower ``limit`` (rows, cols) in place so that vehicles clear the felt points (k, 3) and can climb to them."""
     rows, cols = limit.shape
     for k in range(len(felt_m)):
         for r in range(rows):
             for c in range(cols):
-                away = max(0.0, np.hypot(east[r, c] - felt_m[k, 0], north[r, c] - felt_m[k, 1]) - around_m)
+                away = np.hypot(east[r, c] - felt_m[k, 0], north[r, c] - felt_m[k, 1])
                 limit[r, c] = min(limit[r, c], felt_m[k, 2] - above_m + slope * away)
 
 

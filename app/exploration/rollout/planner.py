@@ -16,7 +16,7 @@ from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
-from app.exploration.core.constraints import TOLERANCE_M, Constraints
+from app.exploration.core.constraints import Constraints
 from app.exploration.core.information_need import Lacking, lacking
 from app.exploration.core.problem import Belief, Proposal, Situation
 from app.exploration.core.routes import FreeSpace
@@ -44,7 +44,6 @@ from app.exploration.rollout.independent_mission import WORTH, apart_mission
 from app.exploration.rollout.independent_routes import stops_of
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
-from app.exploration.rollout.rising_ground import excess_if_lifted, presumed_tops_m, safest
 from app.exploration.rollout.tour import tour_of
 from app.exploration.rollout.unseen import SLACK, deeper_than_presumed, look_in_vain
 
@@ -196,15 +195,14 @@ class RolloutPlanner(PlannerBase):
         best = tour if best is None or (tour is not None and tour.score < best.score - 1.0) else best
         best = mission.convoy(team.constraints) if best is None else best
         if best is None:
-            wish = mission.towards_work(team.constraints)
-            return Proposal(mission.way_out(team, bottom, wish, self._felt.points_m), 0.0)
+            return Proposal(mission.way_out(team, bottom, mission.towards_work(team.constraints)), 0.0)
         best = mission.refine(best, self._effort(mission))
         wishes, passed_by = mission.first_step(best)
-        chosen = safest(team, bottom, wishes, self._felt.points_m, self._range.visibility_m)
-        if chosen is None:
-            positions, passed = mission.way_out(team, bottom, wishes[0], self._felt.points_m), 0
+        feasible = np.flatnonzero(team.constraints.feasible(team.positions, wishes, bottom))
+        if len(feasible):
+            positions, passed = wishes[feasible[0]], passed_by[feasible[0]]
         else:
-            positions, passed = chosen[0], passed_by[chosen[1]]
+            positions, passed = mission.way_out(team, bottom, wishes[0]), 0
         self._kept = Backbone(best.flown.plan.at_m[passed : best.count].copy(), best.flown.plan.chain.copy())
         self._heights = best.flown.plan.height_m[passed : best.count].copy()
         self._sinking = best.flown.plan.sinking[passed : best.count].copy()
@@ -510,12 +508,11 @@ class _Mission:
                 passed.append(after)
         return np.array(wishes), passed
 
-    def way_out(self, team: Situation, bottom: Bottom, wish: FloatArray, felt_m: FloatArray) -> FloatArray:
+    def way_out(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
         """Return the feasible one of many random moves (n_vehicles, 3) that comes closest to a wish that is not.
 
         Part of the moves change the whole team alike, part of them every vehicle on its own; going up counts little
-        because it is what most often helps. Where some of them keep the limits even if vehicles are lifted off the
-        bottom, it is one of these.
+        because it is what most often helps.
         """
         n, step = len(wish), self._rules.step_m * (1 - 1e-9)
         alike = np.linspace(0.0, 1.0, OUTLETS)[:, None, None]
@@ -527,9 +524,6 @@ class _Mission:
         feasible = candidates[team.constraints.feasible(self._start, candidates, bottom)]
         if len(feasible) == 0:
             return settle(team, bottom, wish[None])[0]
-        tops = presumed_tops_m(team, feasible[..., :2], felt_m, self._sight)
-        safe = excess_if_lifted(team, feasible, tops) <= TOLERANCE_M
-        feasible = feasible[safe] if safe.any() else feasible
         off = feasible - wish
         off[..., 2] *= np.where(off[..., 2] < 0.0, UP_COUNTS, 1.0)
         return np.asarray(feasible[np.argmin(np.linalg.norm(off, axis=2).sum(axis=1))])

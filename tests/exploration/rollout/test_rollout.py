@@ -330,28 +330,6 @@ def test_a_wall_that_was_felt_is_kept_clear_of() -> None:
     assert here < sample(before.deepest_m, before.west_m, before.south_m, before.cell_m, 0.1, 0.2)
 
 
-def test_no_dive_leads_down_again_where_a_vehicle_was_lifted() -> None:
-    belief, depth = hilly(3)
-    known = Belief(belief.xy_m, depth, np.full(len(depth), 0.01), belief.accurate, belief.weight, 0.2)
-    for at in ([0.11, 0.23], [-0.42, 0.57], [0.0, 0.0]):
-        floor = floor_of(known, np.array([[*at, 0.3]]))
-        assert sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, *at) <= 0.3 - CLEARANCE + 1e-9
-
-
-def test_plans_keep_higher_over_uneven_floor() -> None:
-    rng = np.random.default_rng(2)
-    xy = rng.uniform(-1.0, 1.0, (1000, 2))
-    even, uneven = np.full(1000, 0.7), 0.7 + 0.1 * rng.choice([-1.0, 1.0], 1000)
-    heights = []
-    for depth in (even, uneven):
-        belief = Belief(xy, depth, np.full(1000, 0.01), np.zeros(1000, dtype=bool), np.ones(1000), 0.2)
-        nothing_known = Bottom.unknown()
-        floor = estimate_floor(belief, nothing_known, np.zeros((0, 3)), CUBE, 0.4, CLEARANCE, 0.6)
-        heights.append(floor.depth_m - floor.deepest_m)
-    assert heights[0].max() < CLEARANCE + 0.05
-    assert np.median(heights[1]) > np.median(heights[0]) + 0.03
-
-
 def test_altimeters_tell_where_the_bottom_is() -> None:
     felt = FeltBottom()
     team = make_situation(constraints=Constraints(SQUARE, max_step_m=10.0, min_altitude_m=1.5))
