@@ -94,6 +94,7 @@ export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_ou
   kind?: Schemas["MissionKind"];
   site?: string | null;
   site_prior?: boolean;
+  after?: string | null;
   vehicles: VehicleSpec[];
   budget?: Schemas["Budget"];
   speed_mps?: number;

@@ -3,7 +3,7 @@
 import { effect, type Signal, signal, untracked } from "@preact/signals";
 import { api, liveUrl, ServiceError } from "../api/client";
 import { LiveSocket } from "../api/socket";
-import type { ActionView, MissionAction, NewMission } from "../api/types";
+import type { ActionView, MissionAction, MissionSummary, MissionView, NewMission } from "../api/types";
 import { siteOf } from "../map/marks/site";
 import { withTiles } from "../map/picture/seafloor";
 import { type Key, say } from "../words/say";
@@ -34,6 +34,8 @@ import {
 import { isAllowed } from "./words";
 
 const LIST_PERIOD_MS = 5000;
+/** While a mission is about to follow the one that is shown. */
+const SOON_MS = 1000;
 const LEAST_MAP_PERIOD_MS = 300;
 const REPLAY_MAP_PERIOD_MS = 120;
 
@@ -69,7 +71,8 @@ async function refreshForever(): Promise<never> {
   for (;;) {
     // Without anybody signed in every request would be refused, and count as one more.
     if (!signedOut.peek()) await refresh();
-    await new Promise((resolve) => setTimeout(resolve, LIST_PERIOD_MS));
+    const period_ms = nextOf(missions.peek() ?? [], "ready") ? SOON_MS : LIST_PERIOD_MS;
+    await new Promise((resolve) => setTimeout(resolve, period_ms));
   }
 }
 
@@ -84,6 +87,9 @@ export async function refresh(): Promise<void> {
     ]);
     layers.value = declared;
     missions.value = list;
+    // Whoever watches goes on with the vehicles: what stops them is there.
+    const next = nextOf(list, "running");
+    if (next) selectMission(next.id);
     fleet.value = vehicles;
     serviceFault.value = null;
     if (!selectedId.value) {
@@ -93,6 +99,20 @@ export async function refresh(): Promise<void> {
   } catch (error) {
     noteFault(error);
   }
+}
+
+/** The mission that was seen running on this page. */
+let watched = "";
+
+/** What follows the mission that was watched to its end, while it is in a state. */
+function nextOf(
+  list: readonly MissionSummary[],
+  wanted: MissionSummary["state"],
+): MissionSummary | undefined {
+  const shown = mission.peek();
+  if (shown?.state === "running") watched = shown.id;
+  if (shown?.state !== "finished" || shown.id !== watched) return undefined;
+  return list.find(({ after, state }) => after === shown.id && state === wanted);
 }
 
 export function noteFault(error: unknown): void {
@@ -391,12 +411,25 @@ export async function send<T>(what: string, answer: Promise<T>, inDialog = false
   }
 }
 
-export async function createMission(mission: NewMission): Promise<string> {
-  const created = await api.create(mission);
+/** Creates missions that follow each other, all or none, and shows the first; returns their ids. */
+export async function createMissions(described: readonly NewMission[]): Promise<string[]> {
+  const ids: string[] = [];
+  try {
+    for (const mission of described) {
+      const created: MissionView = await api.create({ ...mission, after: ids.at(-1) ?? null });
+      ids.push(created.id);
+    }
+  } catch (error) {
+    await Promise.allSettled(ids.map(api.deleteMission));
+    throw error;
+  }
   await refresh();
-  selectMission(created.id);
-  return created.id;
+  selectMission(ids[0] as string);
+  return ids;
 }
+
+export const createMission = async (mission: NewMission): Promise<string> =>
+  (await createMissions([mission]))[0] as string;
 
 /** Replaces what a mission is to do that has not started; it stays where it is in the list. */
 export async function describeMission(id: string, mission: NewMission): Promise<void> {

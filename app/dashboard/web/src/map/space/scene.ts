@@ -26,6 +26,7 @@ import { type Certainty, isMeasured } from "../picture/certainty";
 import type { Range } from "../picture/layers";
 import { colourAt, type Palette } from "../picture/palette";
 import { cellOf, gridPlace, type SeaFloor, valueAt } from "../picture/seafloor";
+import { Pace, shuffled } from "./pace";
 
 export interface SceneVehicle {
   name: string;
@@ -45,6 +46,10 @@ export interface ScenePoints {
 }
 
 const POINT_PX = 4;
+/** So long after its last turn the view is still. */
+const STILL_MS = 250;
+/** While it is turned on a slow machine there are at least this many pixels for one on the screen. */
+const COARSEST = 0.5;
 
 function isDrawn(map: SeaFloor, row: number, col: number, { none_m }: Certainty): boolean {
   return (
@@ -66,10 +71,12 @@ export class SeaFloorScene {
   #placed = false;
   #floorShown = true;
   #frame = 0;
+  readonly #pace = new Pace();
+  #turning = false;
+  #stillness: ReturnType<typeof setTimeout> | undefined;
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true });
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.#world.add(this.#fleet);
     this.#scene.add(this.#world, new AmbientLight(0xffffff, 1.5));
     const sun = new DirectionalLight(0xffffff, 2.2);
@@ -77,12 +84,13 @@ export class SeaFloorScene {
     this.#scene.add(sun);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.maxPolarAngle = Math.PI * 0.49;
-    this.#controls.addEventListener("change", this.#draw);
+    this.#controls.addEventListener("change", this.#turned);
     this.#controls.listenToKeyEvents(canvas);
   }
 
   close(): void {
     cancelAnimationFrame(this.#frame);
+    clearTimeout(this.#stillness);
     this.#controls.dispose();
     this.#forget(this.#mesh);
     this.#clearFleet();
@@ -213,6 +221,8 @@ export class SeaFloorScene {
       const geometry = new BufferGeometry();
       geometry.setAttribute("position", new BufferAttribute(places, 3));
       geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * points.lng.length), 3));
+      // Whatever share of them is drawn lies all over.
+      geometry.setIndex(new BufferAttribute(shuffled(points.lng.length), 1));
       this.#points = new Points(
         geometry,
         new PointsMaterial({ size: POINT_PX, sizeAttenuation: false, vertexColors: true }),
@@ -289,9 +299,35 @@ export class SeaFloorScene {
     mesh.material.dispose();
   }
 
+  /** Turned, or moved, or looked at from nearer. */
+  #turned = (): void => {
+    if (!this.#turning) this.#pace.begin();
+    this.#turning = true;
+    clearTimeout(this.#stillness);
+    this.#stillness = setTimeout(() => {
+      this.#turning = false;
+      this.#draw();
+    }, STILL_MS);
+    this.#draw();
+  };
+
   /** Drawn only when something changed. */
   #draw = (): void => {
     cancelAnimationFrame(this.#frame);
-    this.#frame = requestAnimationFrame(() => this.#renderer.render(this.#scene, this.#camera));
+    this.#frame = requestAnimationFrame(this.#render);
+  };
+
+  #render = (at_ms: number): void => {
+    const detail = this.#turning ? this.#pace.detail : 1;
+    const ratio = Math.min(devicePixelRatio, 2) * Math.max(COARSEST, Math.sqrt(detail));
+    if (ratio !== this.#renderer.getPixelRatio()) this.#renderer.setPixelRatio(ratio);
+    if (this.#points) {
+      const { geometry } = this.#points;
+      const all = geometry.getAttribute("position").count;
+      geometry.setDrawRange(0, Math.ceil(detail * all));
+      this.canvas.dataset.points = String(geometry.drawRange.count);
+    }
+    this.#renderer.render(this.#scene, this.#camera);
+    if (this.#turning) this.#pace.drawn(at_ms);
   };
 }

@@ -1,10 +1,11 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
-import type { NewMission, PlanView } from "../../api/types";
+import type { PlanView } from "../../api/types";
 import { vehicleColour } from "../../map/picture/palette";
+import { transits } from "../../state/form/blocks";
 import type { Estimate, Share } from "../../state/form/draft";
-import { LatestAsker } from "../../state/form/planning";
+import { LatestAsker, plansOf } from "../../state/form/planning";
 import { distance, duration, percent } from "../../state/format";
 import { said } from "../../state/session";
 import { fleet, planned } from "../../state/store";
@@ -14,27 +15,24 @@ import { WholeSurvey } from "./WholeSurvey";
 const PERCENT = 100;
 const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
 
-/** Keeps the plan on the map in step with what is described, null while that is no mission; returns what is wrong. */
+/** Keeps the plan on the map in step with the blocks that are described, null while one is no mission; returns what is wrong. */
 export function usePlan(described: string | null): string {
   const fault = useSignal("");
-  const asker = useRef<LatestAsker<PlanView> | null>(null);
-  asker.current ??= new LatestAsker<PlanView>(
-    (of, gone) => api.plan(JSON.parse(of) as NewMission, gone),
-    (answer, current) => {
-      if ("found" in answer) {
-        planned.value = { plan: answer.found, old: !current };
-        fault.value = "";
-      } else if (current) {
-        planned.value = null;
-        fault.value = reasonOf(answer.error);
-      }
-    },
-  );
+  const asker = useRef<LatestAsker<PlanView[]> | null>(null);
+  asker.current ??= new LatestAsker<PlanView[]>(plansOf(api.plan), (answer, current) => {
+    if ("found" in answer) {
+      planned.value = { plans: answer.found, old: !current };
+      fault.value = "";
+    } else if (current) {
+      planned.value = null;
+      fault.value = reasonOf(answer.error);
+    }
+  });
   useEffect(() => {
     asker.current?.want(described);
     fault.value = "";
-    const { plan } = planned.peek() ?? {};
-    planned.value = plan && described !== null ? { plan, old: true } : null;
+    const { plans } = planned.peek() ?? {};
+    planned.value = plans && described !== null ? { plans, old: true } : null;
   }, [described]);
   useEffect(
     () => () => {
@@ -54,12 +52,80 @@ function reasonOf(error: unknown): string {
 
 type Vehicle = PlanView["vehicles"][number];
 
+interface PlannedProps {
+  of: Estimate;
+  /** Of the blocks, in their order. */
+  names: readonly string[];
+  /** Which of them is told of in detail. */
+  turn: number;
+  fault: string;
+}
+
+/** Each block with its time and length, the ways over between them, and the sum. */
+function InBlocks({
+  plans,
+  names,
+  shares,
+}: Pick<PlannedProps, "names"> & { plans: readonly PlanView[]; shares: readonly Share[] }) {
+  const speed = new Map(shares.map(({ name, metres, seconds }) => [name, metres / seconds]));
+  const over = transits(plans).map((ways) => ({
+    metres: ways.reduce((sum, { metres }) => sum + metres, 0),
+    seconds: Math.max(0, ...ways.map(({ vehicle, metres }) => metres / (speed.get(vehicle) ?? Infinity))),
+  }));
+  const sum = (of: (plan: PlanView) => number, between: "metres" | "seconds") =>
+    plans.reduce((all, plan) => all + of(plan), 0) + over.reduce((all, one) => all + one[between], 0);
+  const whole = {
+    low: sum((plan) => plan.duration_s_range.low, "seconds"),
+    high: sum((plan) => plan.duration_s_range.high, "seconds"),
+  };
+  return (
+    <table class="shares in-blocks" data-testid="in-blocks">
+      <thead>
+        <tr>
+          <th scope="col">{say("blocks.blocks")}</th>
+          <th scope="col">{say("asked.time")}</th>
+          <th scope="col">{say("asked.length")}</th>
+        </tr>
+      </thead>
+      <tbody>
+        {plans.map((plan, i) => (
+          <>
+            {i > 0 ? (
+              <tr key={`over ${names[i]}`} class="over">
+                <th scope="row">{say("blocks.wayOver")}</th>
+                <td>{duration(over[i - 1]?.seconds ?? 0)}</td>
+                <td>{distance(over[i - 1]?.metres ?? 0)}</td>
+              </tr>
+            ) : null}
+            <tr key={names[i]} data-testid={`in-block-${i + 1}`}>
+              <th scope="row">{names[i]}</th>
+              <td>{between(plan.duration_s_range)}</td>
+              <td>{distance(plan.distance_m)}</td>
+            </tr>
+          </>
+        ))}
+      </tbody>
+      <tfoot>
+        <tr data-testid="in-blocks-all">
+          <th scope="row">{say("blocks.inAll")}</th>
+          <td>{between(whole)}</td>
+          <td>{distance(sum((plan) => plan.distance_m, "metres"))}</td>
+        </tr>
+      </tfoot>
+    </table>
+  );
+}
+
 /** What each vehicle does by the plan, or at most while there is none, beside the energy that it has. */
-export function Planned({ of: { shares }, fault }: { of: Estimate; fault: string }) {
-  const { plan, old } = planned.value ?? { plan: null, old: false };
+export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
+  const { plans, old } = planned.value ?? { plans: [], old: false };
+  const plan = plans[turn] ?? null;
   const state = plan === null ? "none" : old ? "old" : "new";
   return (
     <div class="planned" data-testid="planned" data-plan={state}>
+      {names.length > 1 && plans.length === names.length ? (
+        <InBlocks plans={plans} names={names} shares={shares} />
+      ) : null}
       {plan ? (
         <p>
           <b data-testid="planned-whole">
