@@ -48,6 +48,8 @@ export interface ScenePoints {
 const POINT_PX = 4;
 /** So long after its last turn the view is still. */
 const STILL_MS = 250;
+/** What changes all the time is made anew at most so often, and not while the view is turned. */
+const ANEW_MS = 1000;
 /** While it is turned on a slow machine there are at least this many pixels for one on the screen. */
 const COARSEST = 0.5;
 
@@ -74,6 +76,11 @@ export class SeaFloorScene {
   readonly #pace = new Pace();
   #turning = false;
   #stillness: ReturnType<typeof setTimeout> | undefined;
+  /** Newer than what is shown. */
+  #newFloor: (() => void) | null = null;
+  #newFleet: (() => void) | null = null;
+  #madeAt_ms = -ANEW_MS;
+  #making: ReturnType<typeof setTimeout> | undefined;
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true });
@@ -91,6 +98,7 @@ export class SeaFloorScene {
   close(): void {
     cancelAnimationFrame(this.#frame);
     clearTimeout(this.#stillness);
+    clearTimeout(this.#making);
     this.#controls.dispose();
     this.#forget(this.#mesh);
     this.#clearFleet();
@@ -117,19 +125,44 @@ export class SeaFloorScene {
   }
 
   /** Where the map knows too little to be drawn from above there is nothing here either. */
-  setSeaFloor(map: SeaFloor, palette: Palette, { low, high }: Range, certainty: Certainty): void {
+  setSeaFloor(map: SeaFloor, palette: Palette, range: Range, certainty: Certainty): void {
     this.#map = map;
+    this.#newFloor = () => this.#makeFloor(map, palette, range, certainty);
+    if (!this.#placed) this.lookFromSouth();
+    this.#makeAnew();
+  }
+
+  /** Makes what is newer than what is shown, at once or when there is time for it. */
+  #makeAnew = (): void => {
+    clearTimeout(this.#making);
+    if (this.#turning) return;
+    const wait_ms = this.#madeAt_ms + ANEW_MS - performance.now();
+    if (wait_ms > 0) {
+      this.#making = setTimeout(this.#makeAnew, wait_ms);
+      return;
+    }
+    const floor = this.#floorShown ? this.#newFloor : null;
+    if (!floor && !this.#newFleet) return;
+    if (floor) this.#newFloor = null;
+    floor?.();
+    this.#newFleet?.();
+    this.#newFleet = null;
+    this.#madeAt_ms = performance.now();
+    this.#draw();
+  };
+
+  #makeFloor(map: SeaFloor, palette: Palette, { low, high }: Range, certainty: Certainty): void {
     const { rows, cols, cell_m } = map;
     const places = new Float32Array(rows * cols * 3);
     const colours = new Float32Array(rows * cols * 3);
     const known = new Uint8Array(rows * cols);
+    const shade = new Color();
     for (let row = 0; row < rows; row++) {
       for (let col = 0; col < cols; col++) {
         const at = row * cols + col;
         const depth = valueAt(map, "depth", row, col);
         known[at] = depth !== null && isDrawn(map, row, col, certainty) ? 1 : 0;
         places.set([(col + 0.5 - cols / 2) * cell_m, -(depth ?? 0), (rows / 2 - row - 0.5) * cell_m], at * 3);
-        const shade = new Color();
         const [r, g, b] = colourAt(palette, depth ?? 0, low, high);
         shade.setRGB(r / 255, g / 255, b / 255, "srgb");
         colours.set([shade.r, shade.g, shade.b], at * 3);
@@ -156,8 +189,6 @@ export class SeaFloorScene {
     this.#mesh = new Mesh(geometry, new MeshLambertMaterial({ vertexColors: true, side: DoubleSide }));
     this.#mesh.visible = this.#floorShown;
     this.#world.add(this.#mesh);
-    if (!this.#placed) this.lookFromSouth();
-    this.#draw();
   }
 
   /** The view it begins with: from the south, half from above. */
@@ -177,6 +208,11 @@ export class SeaFloorScene {
   }
 
   setVehicles(vehicles: readonly SceneVehicle[]): void {
+    this.#newFleet = () => this.#makeFleet(vehicles);
+    this.#makeAnew();
+  }
+
+  #makeFleet(vehicles: readonly SceneVehicle[]): void {
     const map = this.#map;
     this.#clearFleet();
     if (!map) return;
@@ -204,7 +240,6 @@ export class SeaFloorScene {
         new Line(up, new LineBasicMaterial({ color: vehicle.colour, transparent: true, opacity: 0.5 })),
       );
     }
-    this.#draw();
   }
 
   /** Soundings as points, each with its colour (red, green, blue; 0 to 1); null: none. */
@@ -264,6 +299,7 @@ export class SeaFloorScene {
   setFloorShown(shown: boolean): void {
     this.#floorShown = shown;
     if (this.#mesh) this.#mesh.visible = shown;
+    this.#makeAnew();
     this.#draw();
   }
 
@@ -306,6 +342,7 @@ export class SeaFloorScene {
     clearTimeout(this.#stillness);
     this.#stillness = setTimeout(() => {
       this.#turning = false;
+      this.#makeAnew();
       this.#draw();
     }, STILL_MS);
     this.#draw();

@@ -24,8 +24,8 @@ export function BlockFields() {
                   id={`block-${i + 1}`}
                   kind="tool small"
                   aria-pressed={i === draft.turn}
-                  aria-label={say("blocks.describe", { name: blockTitle(block, i) })}
-                  title={say("blocks.describe", { name: blockTitle(block, i) })}
+                  aria-label={say("blocks.describe", { i: i + 1, name: blockTitle(block, i) })}
+                  title={say("blocks.describe", { i: i + 1, name: blockTitle(block, i) })}
                   onClick={() => set(atBlock(draft, i))}
                 >
                   {i + 1}
