@@ -5,24 +5,31 @@ describe("what is drawn while it is turned", () => {
   it("is everything where pictures come quickly", () => {
     const pace = new Pace();
     pace.begin();
-    for (let at = 0; at < 500; at += 16) pace.drawn(at);
+    for (let k = 0; k < 100; k++) pace.drawn(16);
     expect(pace.detail).toBe(1);
   });
 
-  it("is half as much after every picture that came late, but never nothing", () => {
+  it("is half as much after every picture that took long, but never nothing", () => {
     const pace = new Pace();
     pace.begin();
-    for (const at of [0, 300, 500, 516]) pace.drawn(at);
+    for (const took of [300, 200, 16]) pace.drawn(took);
     expect(pace.detail).toBe(1 / 4);
-    for (let at = 700; at < 9000; at += 200) pace.drawn(at);
-    expect(pace.detail).toBe(1 / 64);
+    for (let k = 0; k < 20; k++) pace.drawn(200);
+    expect(pace.detail).toBe(1 / 32);
   });
 
-  it("is more again when it is turned the next time, and a pause is no late picture", () => {
+  it("is more again after some pictures that came quickly", () => {
+    const pace = new Pace();
+    for (const took of [300, 200, ...Array(8).fill(16)]) pace.drawn(took);
+    expect(pace.detail).toBe(1 / 2);
+    for (const took of [...Array(7).fill(16), 50, ...Array(7).fill(16)]) pace.drawn(took);
+    expect(pace.detail).toBe(1 / 2);
+  });
+
+  it("is more again when it is turned the next time", () => {
     const pace = new Pace();
     pace.begin();
-    for (const at of [0, 300, 500, 8000]) pace.drawn(at);
-    expect(pace.detail).toBe(1 / 4);
+    for (const took of [300, 200]) pace.drawn(took);
     pace.begin();
     expect(pace.detail).toBe(1 / 2);
   });

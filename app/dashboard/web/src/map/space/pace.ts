@@ -1,14 +1,14 @@
 /** How much is drawn of something that takes long while it is turned: as much as this machine keeps up with. Pure. */
 
-/** A picture that comes later than this after the one before makes turning jerky. */
+/** A picture that holds the next one up for longer makes turning jerky. */
 const SLOW_MS = 80;
-/** Who waits this long does not turn it. */
-const PAUSE_MS = 1000;
-const LEAST = 1 / 64;
+/** After some in a row that come as quickly as this, more is drawn. */
+const [QUICK_MS, IN_A_ROW] = [35, 8];
+const LEAST = 1 / 32;
 
 export class Pace {
   #detail = 1;
-  #last_ms: number | null = null;
+  #quick = 0;
 
   /** The share that is drawn while it is turned, 0 to 1. */
   get detail(): number {
@@ -18,14 +18,14 @@ export class Pace {
   /** It begins to be turned: perhaps the machine has more time than before. */
   begin(): void {
     this.#detail = Math.min(1, 2 * this.#detail);
-    this.#last_ms = null;
+    this.#quick = 0;
   }
 
-  /** A picture was drawn. */
-  drawn(at_ms: number): void {
-    const gap_ms = at_ms - (this.#last_ms ?? at_ms);
-    this.#last_ms = at_ms;
-    if (gap_ms > SLOW_MS && gap_ms < PAUSE_MS) this.#detail = Math.max(LEAST, this.#detail / 2);
+  /** A picture was drawn, and the next one could be after so long. */
+  drawn(took_ms: number): void {
+    this.#quick = took_ms < QUICK_MS ? this.#quick + 1 : 0;
+    if (took_ms > SLOW_MS) this.#detail = Math.max(LEAST, this.#detail / 2);
+    else if (this.#quick >= IN_A_ROW) this.begin();
   }
 }
 

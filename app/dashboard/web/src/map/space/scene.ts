@@ -46,8 +46,9 @@ export interface ScenePoints {
 }
 
 const POINT_PX = 4;
-/** So long after its last turn the view is still. */
-const STILL_MS = 250;
+/** So long after its last turn the view is still; a pointer that holds it may only have stopped. */
+const STILL_MS = 300;
+const HELD_STILL_MS = 1500;
 /** What changes all the time is made anew at most so often, and not while the view is turned. */
 const ANEW_MS = 1000;
 /** While it is turned on a slow machine there are at least this many pixels for one on the screen. */
@@ -75,6 +76,7 @@ export class SeaFloorScene {
   #frame = 0;
   readonly #pace = new Pace();
   #turning = false;
+  #held = false;
   #stillness: ReturnType<typeof setTimeout> | undefined;
   /** Newer than what is shown. */
   #newFloor: (() => void) | null = null;
@@ -91,6 +93,8 @@ export class SeaFloorScene {
     this.#scene.add(sun);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.maxPolarAngle = Math.PI * 0.49;
+    this.#controls.addEventListener("start", this.#hold);
+    this.#controls.addEventListener("end", this.#release);
     this.#controls.addEventListener("change", this.#turned);
     this.#controls.listenToKeyEvents(canvas);
   }
@@ -335,16 +339,31 @@ export class SeaFloorScene {
     mesh.material.dispose();
   }
 
+  #hold = (): void => {
+    this.#held = true;
+  };
+
+  #release = (): void => {
+    this.#held = false;
+    if (this.#turning) this.#awaitStillness();
+  };
+
   /** Turned, or moved, or looked at from nearer. */
   #turned = (): void => {
     if (!this.#turning) this.#pace.begin();
     this.#turning = true;
+    this.#draw();
+  };
+
+  /** Counted from the last picture: on a slow machine the next turn is only seen after it. */
+  #awaitStillness(): void {
     clearTimeout(this.#stillness);
-    this.#stillness = setTimeout(() => {
-      this.#turning = false;
-      this.#makeAnew();
-      this.#draw();
-    }, STILL_MS);
+    this.#stillness = setTimeout(this.#still, this.#held ? HELD_STILL_MS : STILL_MS);
+  }
+
+  #still = (): void => {
+    this.#turning = false;
+    this.#makeAnew();
     this.#draw();
   };
 
@@ -365,6 +384,11 @@ export class SeaFloorScene {
       this.canvas.dataset.points = String(geometry.drawRange.count);
     }
     this.#renderer.render(this.#scene, this.#camera);
-    if (this.#turning) this.#pace.drawn(at_ms);
+    if (this.#turning) requestAnimationFrame((next_ms) => this.#shown(next_ms - at_ms));
   };
+
+  #shown(took_ms: number): void {
+    this.#pace.drawn(took_ms);
+    if (this.#turning) this.#awaitStillness();
+  }
 }
