@@ -87,7 +87,7 @@ async def test_a_mission_that_failed_is_followed_by_nothing(service: MissionServ
     await act(service, west, "start")
     await until_step(service, west, 1)
     live = await service.get(west)
-    live.builder.belief = None  # type: ignore[method-assign,assignment]
+    live.builder.belief = None  # type: ignore[assignment]
     await until(lambda: live.header.state is S.FAILED, "it failed")
     await until_said(service, east, "was not flown to its end")
     assert await state_of(service, east) is S.READY
@@ -144,7 +144,10 @@ async def test_no_vehicle_sets_out_whose_every_way_in_is_barred(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(succession, "PATIENCE_S", 0.0)
-    zones = {"keep_out": [rectangle(36, -60, 54, 90)], "limits": {"max_step_m": 8.0, "keep_out_margin_m": 2.0}}
+    zones: dict[str, Any] = {
+        "keep_out": [rectangle(36, -60, 54, 90)],
+        "limits": {"max_step_m": 8.0, "keep_out_margin_m": 2.0},
+    }
     rovers = [{"name": "a", "kind": "rest"}]
     first = await service.create(make_spec(name="West", vehicles=rovers, steps=2, **zones))
     second = await service.create(make_spec(name="East", area=EAST, vehicles=rovers, after=first.id, **zones))

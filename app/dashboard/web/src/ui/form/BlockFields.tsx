@@ -19,7 +19,7 @@ export function BlockFields() {
           <p class="hint">{say("blocks.flownInThisOrder")}</p>
           <ol>
             {all.map((block, i) => (
-              <li key={i}>
+              <li key={i} class="field">
                 <Button
                   id={`block-${i + 1}`}
                   kind="tool small"
