@@ -75,11 +75,11 @@ class Guide:
 
     def tell_of_ships(self) -> None:
         """Send what an AIS receiver and the own ship's GPS and compass say."""
-        (own_lon, own_lat), (lon, lat) = lon_lat(-30.0, 150.0), lon_lat(150.0, 345.0)
+        (own_lon, own_lat), (lon, lat) = lon_lat(-30.0, 150.0), lon_lat(60.0, -28.0)
         north, west = ((int(abs(deg)), 60.0 * (abs(deg) % 1.0)) for deg in (own_lat, own_lon))
         fix = f"{north[0]:02d}{north[1]:07.4f},N,{west[0]:03d}{west[1]:07.4f},W"
         words = [nmea(f"GPGGA,092750,{fix},1,8,1.0,2.0,M,55.2,M,,"), nmea("HEHDT,75.0,T")]
-        words += [*named(PASSING, "ESTRELA"), *[position(PASSING, lat, lon, knots=4.0, course_deg=95.0)] * 3]
+        words += [*named(PASSING, "ESTRELA"), *[position(PASSING, lat, lon, knots=1.0, course_deg=95.0)] * 3]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for line in words:
                 sender.sendto(line + b"\r\n", ("127.0.0.1", self.ais_port))
@@ -139,10 +139,11 @@ def watch_done(guide: Guide, page: Page) -> None:
 
 def ships(guide: Guide, page: Page) -> None:
     """The own ship, a ship that passes, and the circle of a vehicle that waits."""
-    mission = guide.survey(0.65)
+    mission = guide.survey(0.3)
     show(page, mission)
+    by_id(page, "range-low").wait_for()
     by_id(page, f"hold-{HELD[0]}").click()
-    guide.wait(mission, lambda one: any(v["waiting_circle"] for v in one["vehicles"]))
+    guide.wait(mission, lambda one: any(v["waiting_circle"] and v["withdrawn"] for v in one["vehicles"]))
     guide.tell_of_ships()
 
 
@@ -185,8 +186,7 @@ def blocks(guide: Guide, page: Page) -> None:
     for number, name in enumerate(("Mole", "Anchorage", "Fairway"), start=1):
         by_id(page, f"block-name-{number}").fill(name)
     page.wait_for_selector('[data-testid="planned"][data-plan="new"]')
-    by_id(page, "in-blocks-all").scroll_into_view_if_needed()
-    by_id(page, "blocks").scroll_into_view_if_needed()
+    by_id(page, "in-blocks").evaluate("table => table.scrollIntoView()")
 
 
 def checklist(guide: Guide, page: Page) -> None:
@@ -288,7 +288,7 @@ def main() -> None:
     options = parser.parse_args()
     [ais_port] = free_ports(1)
     settings = {"simulation__family": "canyon", "time_scale": TIME_SCALE}
-    settings |= {"ais__udp_address": "127.0.0.1", "ais__udp_port": str(ais_port)}
+    settings |= {"ais__udp_address": "127.0.0.1", "ais__udp_port": str(ais_port), "ais__cpa_m": "10"}
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         service = Service(Path(folder), **settings)
         service.start()

@@ -211,3 +211,19 @@ async def test_missions_do_not_follow_each_other_round(service: MissionService) 
             await service.describe_anew(await service.get(west), sim_spec(after=after))
     kept = await service.describe_anew(await service.get(east), sim_spec(name="Farther east", after=west))
     assert kept.after == west
+
+
+async def test_the_way_in_takes_nothing_of_a_missions_length(service: MissionService) -> None:
+    rovers = [{"name": "a", "kind": "rest"}]
+    mission = await service.create(make_spec(vehicles=rovers, budget={"km_per_vehicle": 0.03}))
+    live = await service.get(mission.id)
+    await act(service, mission.id, "start")
+    rover = Rover(service, mission.id, "a", east_m=15, north_m=-60)
+    await rover.post()
+    assert await rover.poll(5.0)
+    [member] = live.team
+    assert member.committed_m < 60.0, "it comes from 60 m away"
+    with suppress(ConflictError):
+        while await state_of(service, mission.id) is S.RUNNING:
+            await rover.poll(0.1)
+    assert 25.0 < member.committed_m < 40.0, "as much as was asked for, and a last leg"

@@ -15,7 +15,6 @@ export const PLANNING = {
   "blocks.earlier": { en: "Fly {name} earlier", pt: "Percorrer {name} mais cedo" },
   "blocks.remove": { en: "Remove {name}", pt: "Remover {name}" },
   "blocks.takeThemAll": { en: "All {all} as blocks", pt: "As {all} como blocos" },
-  "blocks.wayOver": { en: "way over", pt: "passagem" },
   "blocks.inAll": { en: "In all", pt: "No total" },
   "blocks.after": { en: "Begins by itself after {name}", pt: "Começa sozinha depois de {name}" },
   "blocks.doesNotFollow": {

@@ -1,13 +1,13 @@
 import { describe, expect, it } from "vitest";
-import type { LngLat, PlanView } from "../../api/types";
+import type { LngLat, NewMission, PlanView } from "../../api/types";
 import { ringOf } from "../../map/area";
 import {
   atBlock,
   blockTitle,
+  comingFrom,
   earlier,
   renamed,
   toMissions,
-  transits,
   withAnother,
   withAreas,
   withoutBlock,
@@ -125,17 +125,23 @@ describe("blocks", () => {
   });
 });
 
-describe("the ways over", () => {
-  const plan = (from: LngLat, to: LngLat): PlanView =>
-    ({ vehicles: [{ vehicle: "a", way: [from, to] }] }) as unknown as PlanView;
-
-  it("lead from where a vehicle ends one block to where it begins the next", () => {
-    const [only, ...none] = transits([plan([-9, 41], [-9, 41.001]), plan([-9, 41.002], [-9, 41.003])]);
-    expect(none).toEqual([]);
-    expect(only?.map(({ vehicle, from, to }) => [vehicle, from, to])).toEqual([
-      ["a", [-9, 41.001], [-9, 41.002]],
-    ]);
-    expect(only?.[0]?.metres).toBeCloseTo(111, 0);
-    expect(transits([plan([-9, 41], [-9, 41.001])])).toEqual([]);
+describe("the plan of a block", () => {
+  it("begins where the vehicles end the one before", () => {
+    const [west, middle] = toMissions(three) as [NewMission, NewMission];
+    expect(comingFrom(undefined, west)).toEqual(west);
+    const before = {
+      vehicles: [
+        {
+          vehicle: "sim-1",
+          way: [
+            [-9, 41],
+            [-9, 41.001],
+          ],
+        },
+      ],
+    } as unknown as PlanView;
+    const asked = comingFrom(before, middle);
+    expect(asked.after).toBe("planned");
+    expect(asked.vehicles.map(({ start }) => start)).toEqual([[-9, 41.001], undefined]);
   });
 });

@@ -1,7 +1,6 @@
 /** Several areas of one plan, flown one after the other by the same team: blocks. Pure. */
 
 import type { LngLat, NewMission, PlanView } from "../../api/types";
-import { wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
 import { allBlocks, type Block, cornersOf, type Draft, toMission } from "./draft";
 
@@ -81,21 +80,16 @@ export function toMissions(draft: Draft): NewMission[] {
   });
 }
 
-/** A vehicle's way from where it ends one block to where it begins the next. */
-export interface Transit {
-  vehicle: string;
-  from: LngLat;
-  to: LngLat;
-  metres: number;
-}
-
-/** The ways over, between each block and the next. */
-export function transits(plans: readonly PlanView[]): Transit[][] {
-  return plans.slice(1).map((plan, i) =>
-    (plans[i] as PlanView).vehicles.flatMap(({ vehicle, way }) => {
-      const from = way.at(-1);
-      const to = plan.vehicles.find((one) => one.vehicle === vehicle)?.way[0];
-      return from && to ? [{ vehicle, from, to, metres: wayBetween(from, to).metres }] : [];
+/** A block as its plan is asked for: its vehicles come from where they end the one before. */
+export function comingFrom(before: PlanView | undefined, mission: NewMission): NewMission {
+  if (!before) return mission;
+  const ends = new Map(before.vehicles.map(({ vehicle, way }) => [vehicle, way.at(-1)]));
+  return {
+    ...mission,
+    after: "planned",
+    vehicles: mission.vehicles.map((vehicle) => {
+      const start = ends.get(vehicle.name);
+      return start ? { ...vehicle, start } : vehicle;
     }),
-  );
+  };
 }

@@ -72,16 +72,19 @@ describe("a plan", () => {
 });
 
 describe("plans of several missions", () => {
-  it("are asked for in their order, and only of what changed", async () => {
+  it("are asked for in their order, each with the one before, and only of what changed", async () => {
     const asked: string[] = [];
-    const plans = plansOf(async (mission: string) => {
-      asked.push(mission);
-      return mission.toUpperCase();
-    });
+    const plans = plansOf(
+      async (mission: string) => {
+        asked.push(mission);
+        return mission.toUpperCase();
+      },
+      (before: string | undefined, mission) => `${before ?? ""}${mission}`,
+    );
     const { signal } = new AbortController();
-    expect(await plans('["a","b"]', signal)).toEqual(["A", "B"]);
-    expect(await plans('["a","c"]', signal)).toEqual(["A", "C"]);
+    expect(await plans('["a","b"]', signal)).toEqual(["A", "AB"]);
+    expect(await plans('["a","c"]', signal)).toEqual(["A", "AC"]);
     expect(await plans('["b"]', signal)).toEqual(["B"]);
-    expect(asked).toEqual(["a", "b", "c", "b"]);
+    expect(asked).toEqual(["a", "Ab", "Ac", "b"]);
   });
 });

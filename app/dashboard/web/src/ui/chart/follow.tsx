@@ -194,13 +194,11 @@ export function follow(chart: Chart): () => void {
 /** The lines of the plan of what is being described, each cut where its vehicle has to turn back. */
 function planLines(): PlanLines {
   const { plans, old } = planned.value ?? { plans: [], old: false };
-  const ways = plans.flatMap((plan, block) =>
-    plan.vehicles.map((v, i) => {
+  const ways = plans.flatMap(({ vehicles }, block) =>
+    vehicles.map((v, i) => {
       const [way, beyond] = cutAt(v.way, v.turn_back_m);
-      const over = plans[block + 1]?.vehicles[i]?.way[0];
-      const last = v.way.at(-1);
       // Before the next block nobody goes home.
-      const home = over && last ? [last, over] : (v.way_home ?? []);
+      const home = block === plans.length - 1 ? (v.way_home ?? []) : [];
       return { colour: vehicleColour(i), way, beyond, home };
     }),
   );

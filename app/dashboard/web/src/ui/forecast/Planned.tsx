@@ -3,7 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
 import type { PlanView } from "../../api/types";
 import { vehicleColour } from "../../map/picture/palette";
-import { transits } from "../../state/form/blocks";
+import { comingFrom } from "../../state/form/blocks";
 import type { Estimate, Share } from "../../state/form/draft";
 import { LatestAsker, plansOf } from "../../state/form/planning";
 import { distance, duration, percent } from "../../state/format";
@@ -19,7 +19,7 @@ const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
 export function usePlan(described: string | null): string {
   const fault = useSignal("");
   const asker = useRef<LatestAsker<PlanView[]> | null>(null);
-  asker.current ??= new LatestAsker<PlanView[]>(plansOf(api.plan), (answer, current) => {
+  asker.current ??= new LatestAsker<PlanView[]>(plansOf(api.plan, comingFrom), (answer, current) => {
     if ("found" in answer) {
       planned.value = { plans: answer.found, old: !current };
       fault.value = "";
@@ -61,22 +61,12 @@ interface PlannedProps {
   fault: string;
 }
 
-/** Each block with its time and length, the ways over between them, and the sum. */
-function InBlocks({
-  plans,
-  names,
-  shares,
-}: Pick<PlannedProps, "names"> & { plans: readonly PlanView[]; shares: readonly Share[] }) {
-  const speed = new Map(shares.map(({ name, metres, seconds }) => [name, metres / seconds]));
-  const over = transits(plans).map((ways) => ({
-    metres: ways.reduce((sum, { metres }) => sum + metres, 0),
-    seconds: Math.max(0, ...ways.map(({ vehicle, metres }) => metres / (speed.get(vehicle) ?? Infinity))),
-  }));
-  const sum = (of: (plan: PlanView) => number, between: "metres" | "seconds") =>
-    plans.reduce((all, plan) => all + of(plan), 0) + over.reduce((all, one) => all + one[between], 0);
+/** Each block with its time and length, in which the way over into it counts, and the sum. */
+function InBlocks({ plans, names }: { plans: readonly PlanView[]; names: readonly string[] }) {
+  const sum = (of: (plan: PlanView) => number) => plans.reduce((all, plan) => all + of(plan), 0);
   const whole = {
-    low: sum((plan) => plan.duration_s_range.low, "seconds"),
-    high: sum((plan) => plan.duration_s_range.high, "seconds"),
+    low: sum((plan) => plan.duration_s_range.low),
+    high: sum((plan) => plan.duration_s_range.high),
   };
   return (
     <table class="shares in-blocks" data-testid="in-blocks">
@@ -89,27 +79,18 @@ function InBlocks({
       </thead>
       <tbody>
         {plans.map((plan, i) => (
-          <>
-            {i > 0 ? (
-              <tr key={`over ${names[i]}`} class="over">
-                <th scope="row">{say("blocks.wayOver")}</th>
-                <td>{duration(over[i - 1]?.seconds ?? 0)}</td>
-                <td>{distance(over[i - 1]?.metres ?? 0)}</td>
-              </tr>
-            ) : null}
-            <tr key={names[i]} data-testid={`in-block-${i + 1}`}>
-              <th scope="row">{names[i]}</th>
-              <td>{between(plan.duration_s_range)}</td>
-              <td>{distance(plan.distance_m)}</td>
-            </tr>
-          </>
+          <tr key={names[i]} data-testid={`in-block-${i + 1}`}>
+            <th scope="row">{names[i]}</th>
+            <td>{between(plan.duration_s_range)}</td>
+            <td>{distance(plan.distance_m)}</td>
+          </tr>
         ))}
       </tbody>
       <tfoot>
         <tr data-testid="in-blocks-all">
           <th scope="row">{say("blocks.inAll")}</th>
           <td>{between(whole)}</td>
-          <td>{distance(sum((plan) => plan.distance_m, "metres"))}</td>
+          <td>{distance(sum((plan) => plan.distance_m))}</td>
         </tr>
       </tfoot>
     </table>
@@ -123,9 +104,7 @@ export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
   const state = plan === null ? "none" : old ? "old" : "new";
   return (
     <div class="planned" data-testid="planned" data-plan={state}>
-      {names.length > 1 && plans.length === names.length ? (
-        <InBlocks plans={plans} names={names} shares={shares} />
-      ) : null}
+      {names.length > 1 && plans.length === names.length ? <InBlocks plans={plans} names={names} /> : null}
       {plan ? (
         <p>
           <b data-testid="planned-whole">
