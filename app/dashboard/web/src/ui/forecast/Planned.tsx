@@ -13,6 +13,8 @@ import { say } from "../../words/say";
 import { WholeSurvey } from "./WholeSurvey";
 
 const PERCENT = 100;
+/** By so much a way that is cut off may be longer than it says. */
+const ROUNDING_M = 0.5;
 const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
 
 /** Keeps the plan on the map in step with the blocks that are described, null while one is no mission; returns what is wrong. */
@@ -108,6 +110,7 @@ export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
       {plan ? (
         <p>
           <b data-testid="planned-whole">
+            {names.length > 1 ? `${names[turn]} · ` : ""}
             {say("planned.planned", {
               length: distance(plan.distance_m),
               time: between(plan.duration_s_range),
@@ -176,9 +179,9 @@ function Rows({ share, colour, plan }: { share: Share; colour: string; plan: Veh
       <tr>
         <td>{plan ? between(plan.duration_s_range) : duration(share.seconds)}</td>
         <td>
-          {plan
+          {plan && plan.distance_m < share.metres + ROUNDING_M
             ? say("planned.ofAtMost", { planned: distance(plan.distance_m), most: distance(share.metres) })
-            : distance(share.metres)}
+            : distance(plan?.distance_m ?? share.metres)}
         </td>
         <td>{homeOf(plan)}</td>
         <td>{words}</td>
