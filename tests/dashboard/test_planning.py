@@ -185,3 +185,17 @@ def test_who_finishes_a_block_early_is_told_that_the_next_does_not_begin(page: P
     expect_state(page, "finished")
     assert service.get(f"/missions/{east}")["state"] == "ready"
     expect(by_id(page, f"mission-{east}")).not_to_contain_text("Begins by itself")
+
+
+def test_a_block_that_cannot_begin_by_itself_is_shown_with_its_alarm(page: Page, service: Service) -> None:
+    sims = [{"name": name, "kind": "sim"} for name in ("kept", "lost")]
+    west = service.create(name="Flown", vehicles=sims, steps=20)
+    east = service.create(name="Waiting", vehicles=sims, after=west)
+    show(page, west)
+    start(page)
+    service.post(f"/missions/{west}/vehicles/lost/abort", {})
+    expect(by_id(page, "mission-name")).to_have_text("Waiting", timeout=120_000)
+    expect(by_id(page, "alarms")).to_contain_text("does not begin by itself: lost left 'Flown'")
+    expect_state(page, "ready")
+    expect(by_id(page, "abort")).to_be_enabled()
+    assert service.get(f"/missions/{east}")["state"] == "ready"

@@ -3,12 +3,12 @@
 import { effect, type Signal, signal, untracked } from "@preact/signals";
 import { api, liveUrl, ServiceError } from "../api/client";
 import { LiveSocket } from "../api/socket";
-import type { ActionView, MissionAction, MissionSummary, MissionView, NewMission } from "../api/types";
+import type { ActionView, MissionAction, MissionView, NewMission } from "../api/types";
 import { siteOf } from "../map/marks/site";
 import { withTiles } from "../map/picture/seafloor";
 import { type Key, say } from "../words/say";
 import { identify, me, signedOut, whyNotCommand } from "./access";
-import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
+import { EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
 import {
   abortDialogOpen,
   abortOne,
@@ -34,8 +34,6 @@ import {
 import { isAllowed } from "./words";
 
 const LIST_PERIOD_MS = 5000;
-/** While a mission is about to follow the one that is shown. */
-const SOON_MS = 1000;
 const LEAST_MAP_PERIOD_MS = 300;
 const REPLAY_MAP_PERIOD_MS = 120;
 
@@ -57,6 +55,14 @@ export function startSession(): void {
     now.value = Date.now();
   }, 500);
   void refreshForever();
+  let watched = "";
+  effect(() => {
+    const shown = mission.value;
+    if (shown?.state === "running") watched = shown.ending ? "" : shown.id;
+    const next = nextOf(view.value, missions.value ?? []);
+    // Whoever watches goes on with the vehicles: what stops them is there.
+    if (next && shown?.id === watched) untracked(() => selectMission(next));
+  });
   effect(() => {
     const id = selectedId.value;
     return id && me.value && !signedOut.value ? followMission(id) : clear();
@@ -71,8 +77,7 @@ async function refreshForever(): Promise<never> {
   for (;;) {
     // Without anybody signed in every request would be refused, and count as one more.
     if (!signedOut.peek()) await refresh();
-    const period_ms = nextOf(missions.peek() ?? [], "ready") ? SOON_MS : LIST_PERIOD_MS;
-    await new Promise((resolve) => setTimeout(resolve, period_ms));
+    await new Promise((resolve) => setTimeout(resolve, LIST_PERIOD_MS));
   }
 }
 
@@ -87,9 +92,6 @@ export async function refresh(): Promise<void> {
     ]);
     layers.value = declared;
     missions.value = list;
-    // Whoever watches goes on with the vehicles: what stops them is there.
-    const next = nextOf(list, "running");
-    if (next) selectMission(next.id);
     fleet.value = vehicles;
     serviceFault.value = null;
     if (!selectedId.value) {
@@ -99,20 +101,6 @@ export async function refresh(): Promise<void> {
   } catch (error) {
     noteFault(error);
   }
-}
-
-/** The mission that was seen running on this page. */
-let watched = "";
-
-/** What follows the mission that was watched to its end, while it is in a state. */
-function nextOf(
-  list: readonly MissionSummary[],
-  wanted: MissionSummary["state"],
-): MissionSummary | undefined {
-  const shown = mission.peek();
-  if (shown?.state === "running") watched = shown.id;
-  if (shown?.state !== "finished" || shown.id !== watched) return undefined;
-  return list.find(({ after, state }) => after === shown.id && state === wanted);
 }
 
 export function noteFault(error: unknown): void {
