@@ -99,51 +99,54 @@ class Succession:
             words = f"{before!r} was flown to its end while the service restarted: start it when its vehicles are fit"
             await _raise(live, words)
 
-    async def _followed(self, live: LiveMission, reason: str) -> None:
+    async def _followed(self, before: LiveMission, reason: str) -> None:
         async with self._database.reading() as session:
-            ids = await mission_queries.followers(session, live.id)
+            ids = await mission_queries.followers(session, before.id)
         for mission_id in ids:
             try:
-                following = await self._get(mission_id)
+                await self._follow(mission_id, before, reason)
             except MissionNotFoundError:
                 continue
             except MissionError as error:
                 words = f"the mission that follows does not begin by itself: {error}"
-                await live.journal.alarm(AlarmKind.NOT_BEGUN, words)
-                continue
-            if reason:
-                await self._begin(following, live, reason)
-            else:
-                words = f"does not begin by itself: {live.spec.name!r} was not flown to its end"
-                await following.journal.log(Level.WARNING, "waiting", words)
+                await before.journal.alarm(AlarmKind.NOT_BEGUN, words)
 
-    async def _begin(self, live: LiveMission, before: LiveMission, reason: str) -> None:
+    async def _follow(self, mission_id: str, before: LiveMission, reason: str) -> None:
         """Start a mission after the one before it, as soon as its vehicles answer; else raise an alarm."""
-        why_not = _unfit(live, before, reason)
+        live, ended = await self._get(mission_id), f"{before.spec.name!r} was flown to its end"
+        if not reason:
+            words = f"does not begin by itself: {before.spec.name!r} was not flown to its end"
+            await live.journal.log(Level.WARNING, "waiting", words)
+            return
+        why_not, told = _unfit(live, before, reason), False
         until_s = asyncio.get_running_loop().time() + PATIENCE_S
-        told = False
         while not why_not:
-            problems = [check for check in preflight(live).checks if check.status is CheckStatus.PROBLEM]
-            trouble = "; ".join(f"{check.title}: {check.message}" for check in problems)
+            # Meanwhile a person may have started it, given it up, or described it anew.
+            live = await self._get(mission_id)
+            if live.header.state is not MissionState.READY or live.spec.after != before.id:
+                return
+            trouble = await self._tried(live, ended)
             if not trouble:
-                try:
-                    await self._start(live, f"{before.spec.name!r} was flown to its end")
-                    return
-                except MoveRefusedError:
-                    return  # somebody started it, or wants it no more
-                except ConflictError as error:
-                    trouble = str(error)
-            if live.header.state is not MissionState.READY:
                 return
             if not told:
                 told = True
-                words = f"{before.spec.name!r} was flown to its end: begins as soon as it can: {trouble}"
-                await live.journal.log(Level.INFO, "state", words)
+                await live.journal.log(Level.INFO, "state", f"{ended}: begins as soon as it can: {trouble}")
             if asyncio.get_running_loop().time() > until_s:
                 why_not = trouble
             else:
                 await asyncio.sleep(AGAIN_S)
         await _raise(live, why_not)
+
+    async def _tried(self, live: LiveMission, why: str) -> str:
+        """Start a mission that is ready; returns what keeps it from that, '' once it is started."""
+        problems = [check for check in preflight(live).checks if check.status is CheckStatus.PROBLEM]
+        if problems:
+            return "; ".join(f"{check.title}: {check.message}" for check in problems)
+        try:
+            await self._start(live, why)
+        except (ConflictError, MoveRefusedError) as error:
+            return str(error)
+        return ""
 
 
 async def _raise(live: LiveMission, why: str) -> None:

@@ -8,11 +8,13 @@ import pytest
 from app.missions import succession
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
 from app.missions.preflight.survey import preflight
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
+from app.missions.views.mission import CheckStatus, CheckView, PreflightView
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, state_of, until_state, until_step, view_of
@@ -43,6 +45,15 @@ async def until_said(service: MissionService, mission_id: str, words: str) -> No
 
 async def alarms(service: MissionService, mission_id: str) -> list[tuple[AlarmKind, bool]]:
     return [(a.kind, a.ended_at is None) for a in (await service.get(mission_id)).journal.alarms.open]
+
+
+async def until_alarms(service: MissionService, mission_id: str, *kinds: tuple[AlarmKind, bool]) -> None:
+    """An alarm is shown after its line is written."""
+
+    async def there() -> bool:
+        return await alarms(service, mission_id) == list(kinds)
+
+    await until(there, f"alarms are {kinds}")
 
 
 async def test_a_mission_begins_when_the_one_before_it_was_flown_to_its_end(service: MissionService) -> None:
@@ -103,9 +114,9 @@ async def test_a_vehicle_that_was_stopped_on_the_way_keeps_the_next_mission_from
     await until_state(service, west, S.FINISHED)
     await until_said(service, east, "does not begin by itself: b left 'West'")
     assert await state_of(service, east) is S.READY
-    assert await alarms(service, east) == [(AlarmKind.NOT_BEGUN, True)]
+    await until_alarms(service, east, (AlarmKind.NOT_BEGUN, True))
     await act(service, east, "start")
-    assert await alarms(service, east) == [(AlarmKind.NOT_BEGUN, False)], "that is over once it is started"
+    await until_alarms(service, east, (AlarmKind.NOT_BEGUN, False))
 
 
 async def test_a_vehicle_that_went_home_on_the_way_keeps_the_next_mission_from_beginning_by_itself(
@@ -163,9 +174,30 @@ async def test_no_vehicle_sets_out_whose_every_way_in_is_barred(
         "does not begin by itself: Place of a: it is 50 m from the area, and a keep-out zone bars every",
     )
     assert await state_of(service, second.id) is S.READY
-    assert await alarms(service, second.id) == [(AlarmKind.NOT_BEGUN, True)]
+    await until_alarms(service, second.id, (AlarmKind.NOT_BEGUN, True))
     places = [check for check in preflight(await service.get(second.id)).checks if check.id == "place.a"]
     assert [check.status for check in places] == ["problem"]
+
+
+async def test_a_mission_that_is_described_anew_meanwhile_does_not_begin(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    west, east = await two_blocks(service)
+    await act(service, west, "start")
+    await until_step(service, west, 1)
+    monkeypatch.setattr(succession, "preflight", preflight_with_a_problem)
+    await until_said(service, east, "begins as soon as it can: Sea: rough")
+    await service.describe_anew(await service.get(east), sim_spec(name="Alone", area=EAST))
+    monkeypatch.undo()
+    await until(lambda: not service._succession._under_way, "nothing is about to begin")
+    assert await state_of(service, east) is S.READY
+    assert await alarms(service, east) == []
+
+
+def preflight_with_a_problem(live: LiveMission) -> PreflightView:
+    found = preflight(live)
+    rough = CheckView(id="sea", title="Sea", status=CheckStatus.PROBLEM, message="rough")
+    return found.model_copy(update={"ready": False, "checks": [*found.checks, rough]})
 
 
 async def test_the_checklist_says_that_the_vehicles_are_with_the_mission_before(service: MissionService) -> None:
@@ -184,7 +216,7 @@ async def test_what_ended_while_no_service_ran_is_told_once(harbour: Harbour, da
     for _ in range(2):
         service = await harbour.open()
         await until_said(service, east, "'West' was flown to its end while the service restarted")
-        assert await alarms(service, east) == [(AlarmKind.NOT_BEGUN, True)]
+        await until_alarms(service, east, (AlarmKind.NOT_BEGUN, True))
         assert await state_of(service, east) is S.READY
         await harbour.close()
 
