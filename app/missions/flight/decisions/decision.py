@@ -15,8 +15,8 @@ from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage, SwathTask
-from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.errands import due_to_rise
+from app.exploration.core.moving_targets import Localization, Targets
 from app.exploration.core.problem import Belief, Planner, Situation
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
