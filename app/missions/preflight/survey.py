@@ -8,16 +8,15 @@ from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
 from app.arrays import FloatArray
-from app.missions import safety
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState
-from app.missions.flight.decisions.decision import INSET_M, NEARBY_OUTSIDE_M, make_constraints
+from app.missions.flight.decisions.decision import INSET_M, from_outside, make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks
-from app.missions.safety import WAITING_CIRCLE_M
+from app.missions.safety.free_space import WAITING_CIRCLE_M, way_in
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.team import Member
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
@@ -127,6 +126,7 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
     area = Polygon(live.area)
     zones = [Polygon(live.spec.to_local(zone)) for zone in live.spec.keep_out]
     constraints = make_constraints(live.spec)
+    inner = Polygon(constraints.area)
     for member in live.team:
         place = _place(live, member)
         if place is None:
@@ -141,7 +141,7 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
                 message="it lies in a keep-out zone",
                 remedy="Bring it out of there, or change the zone",
             )
-        elif distance > NEARBY_OUTSIDE_M and safety.way_in(constraints, _en_m(place), INSET_M, []) is None:
+        elif from_outside(_en_m(place), inner, live.spec) and way_in(constraints, _en_m(place), INSET_M, []) is None:
             yield CheckView(
                 id=name,
                 title=title,
