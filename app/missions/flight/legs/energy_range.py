@@ -16,7 +16,7 @@ from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.safety import travel_depth
 from app.missions.team import Member
-from imc_bridge.control.layers import DepthLayer
+from imc_bridge.control.depth_layers import DepthLayer
 
 LAND_PERIOD_S = 10.0
 """How often is looked whether the map shows other shallows, seconds of the event loop's time."""
@@ -31,7 +31,7 @@ LEAST_DEPTH_M = 0.5
 """Water with less room than the least altitude and this is land to vehicles."""
 
 
-class RangeLeft:
+class EnergyRange:
     """Ways home of the vehicles of one running mission, and what their energy leaves beside them."""
 
     def __init__(self, live: LiveMission, constraints: Constraints, committing: LegCommit) -> None:
