@@ -278,12 +278,13 @@ class GaussianProcessMap:
             self._rough_hyperparameters: Hyperparameters | None = None
         if self.kernel != "auto" or self.kernel_ == ROUGHEST:
             return None
-        learn = learn or self._rough_hyperparameters is None
+        known = None if learn else self._rough_hyperparameters
         uniform = uniform_scales(len(self._levels.soundings))
-        likelihood = likelihood_of(self._levels, ROUGHEST, subset, uniform, learn=learn)
-        if learn:
-            self._rough_hyperparameters, _ = likelihood.maximise(self.stationary_hyperparameters_)
-        return conditioned(self._levels, ROUGHEST, self._rough_hyperparameters, likelihood, uniform)
+        likelihood = likelihood_of(self._levels, ROUGHEST, subset, uniform, learn=known is None)
+        if known is None:
+            known, _ = likelihood.maximise(self.stationary_hyperparameters_)
+            self._rough_hyperparameters = known
+        return conditioned(self._levels, ROUGHEST, known, likelihood, uniform)
 
     def _coarse_relief(self, extent: float) -> tuple[Grid, FloatArray]:
         """A coarse stationary map, depth minus trend: shows the grain and the edges of the sea floor."""
