@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
+from shapely import LineString, Polygon
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
@@ -120,6 +121,7 @@ class LawnmowerPlanner(PlannerBase):
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
         done = self._go_on(team)
+        self._lead_round(team)
         steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
         # The corner that a leg cuts may be that of a zone: then it is flown out.
         cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
@@ -155,6 +157,18 @@ class LawnmowerPlanner(PlannerBase):
             elif passes:
                 done.add(name)
         return frozenset(done)
+
+    def _lead_round(self, team: Situation) -> None:
+        """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere."""
+        zones = [Polygon(zone) for zone in team.constraints.keep_out]
+        for i, name in enumerate(team.vehicles):
+            here, route = team.positions[i, :2], self._routes[name]
+            if not team.moves[i] or not len(route):
+                continue
+            leg = LineString([here, route[0]])
+            if any(zone.intersects(leg) for zone in zones):
+                free = FreeSpace(team.constraints, BORDER_MARGIN_M)
+                self._routes[name] = np.vstack([free.way(here, route[0]), route[1:]])
 
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""

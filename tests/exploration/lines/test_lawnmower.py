@@ -1,5 +1,7 @@
 """What a vehicle of a lawnmower survey flies that has flown its own lines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,19 @@ def test_a_vehicle_whose_battery_lasts_longer_than_was_sure_does_not_wait_where_
         if proposal.done:
             break
     assert proposal.done == {"a"}, "who can fly no further line is done"
+
+
+def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:
+    """One that joined was given lines on the other side, and stayed where it was for as long as its battery lasted."""
+    planner = create_planner("lawnmower")
+    zone = np.array([[30.0, 100.0], [90.0, 100.0], [90.0, 200.0], [30.0, 200.0]])
+    constraints = Constraints(AREA, (zone,), max_step_m=20.0, max_depth_m=10.0)
+    rng, place, behind = np.random.default_rng(0), (60.0, 95.0), np.array([[60.0, 205.0]])
+    planner.propose(replace(situation(3000.0, place), constraints=constraints), rng)
+    planner.put_back("a", behind, None)
+    for _ in range(15):
+        [(east, north, _)] = planner.propose(replace(situation(3000.0, place), constraints=constraints), rng).positions
+        place = (float(east), float(north))
+        if np.hypot(*(place - behind[0])) < 1.0:
+            break
+    assert place == pytest.approx(behind[0], abs=1.0)
