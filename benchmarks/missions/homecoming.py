@@ -25,8 +25,9 @@ PROGRAM = ("app", "simulator")
 
 def version() -> str:
     """Return what tells versions of the program apart, that of the documentation aside."""
-    asked = ["git", "rev-parse", "--short=10", *(f"HEAD:{folder}" for folder in PROGRAM)]
-    return "-".join(subprocess.run(asked, cwd=PROJECT, check=True, capture_output=True, text=True).stdout.split())
+    asked = ["git", "rev-parse", *(f"HEAD:{folder}" for folder in PROGRAM)]
+    trees = subprocess.run(asked, cwd=PROJECT, check=True, capture_output=True, text=True).stdout.split()
+    return "-".join(tree[:10] for tree in trees)
 
 
 def kept(file: Path | None, of: str) -> list[dict[str, Any]]:
