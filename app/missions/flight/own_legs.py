@@ -127,7 +127,7 @@ class OwnLegs:
             await asyncio.gather(sending, return_exceptions=True)
         left = any(self._wants_legs(member) for member in self._live.team.surveying)
         if left and self._done:
-            return "nothing is left to ensonify"
+            return "nothing is left to ensonify" if self._measured else "nobody can fly a further line"
         return "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
 
     async def _until_needed(self, sending: asyncio.Task[None]) -> None:

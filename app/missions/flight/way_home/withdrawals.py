@@ -16,7 +16,7 @@ from app.missions.flight.legs.range_left import RangeLeft
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission, phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
-from app.missions.recovery.berths import room_of_m
+from app.missions.recovery.berths import is_home, room_of_m
 from app.missions.recovery.failsafes import LINK_LOST_S
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.team import Member, Withdrawal
@@ -192,9 +192,9 @@ class Withdrawals:
             await self._end(member, withdrawal, f"{member.name} has no recovery point and stops where it is")
             return
         away_m = float(np.hypot(*(home_m - here_m)))
-        from_point_m = float(np.hypot(*(point_of(recovery, spec) - here_m)))
-        # Its place may be a way off the point that everybody is to be near.
-        near = from_point_m <= recovery.radius_m or away_m <= room_of_m(member.spec, spec)
+        point_m = point_of(recovery, spec)
+        from_point_m = float(np.hypot(*(point_m - here_m)))
+        near = is_home(here_m, home_m, point_m, room_of_m(member.spec, spec), recovery.radius_m)
         if near and (self._at_surface(member) or self._waited_to_rise(member)):
             facts = {"from_point_m": round(from_point_m, 1), "energy_left_pct": energy_left_pct(member)}
             await self._end(member, withdrawal, f"{member.name} is home, {away_m:.0f} m from its place", **facts)
