@@ -19,8 +19,8 @@ from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.exchange import LegExchange
-from app.missions.flight.legs.range_left import RangeLeft
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
@@ -74,10 +74,10 @@ class OwnLegs:
         waiting: Waiting,
         constraints: Constraints,
         time_scale: float,
-        range_left: RangeLeft,
+        energy_range: EnergyRange,
         orders: OrderBook,
     ) -> None:
-        self._range = range_left
+        self._range = energy_range
         self._orders = orders
         self._constraints = constraints
         self._live = live
@@ -87,7 +87,7 @@ class OwnLegs:
         self._dispatch = dispatch
         self._maps = maps
         self._waiting = waiting
-        self._exchange = LegExchange(live, decider, committing, range_left, time_scale)
+        self._exchange = LegExchange(live, decider, committing, energy_range, time_scale)
         self._time_scale = time_scale
         self._watched = bool(live.spec.targets) or live.spec.surface_policy is not None
         self._measured = live.spec.planner.name in COVERERS
@@ -300,16 +300,17 @@ class OwnLegs:
         return replace(place_ahead(member, self._live), moving=moving, left_m=left_m)
 
     def _next_number(self, member: Member) -> int:
-        """Return the number of a vehicle's next leg: one that joins, or comes back, goes on where the team is."""
+        """Return the number of a vehicle's next leg: one that joins or comes back goes on with what others fly."""
         if member.name in self._taking_part or member.ordered or member.ahead:
             return member.legs + 1
-        reached = min((m.legs for m in self._live.team.present if m is not member), default=self._live.header.step)
+        others = [m.legs - len(m.ahead) for m in self._live.team.present if m is not member]
+        reached = min(others, default=self._live.header.step)
         return max(member.legs, min(reached, self._live.header.step)) + 1
 
     def _who_gets_legs(self) -> list[Member]:
         """Return the vehicles to decide for now: none, or those that need a leg, with others that soon will."""
         now_s = asyncio.get_running_loop().time()
-        self._taking_part -= {member.name for member in self._live.team if not member.present}
+        self._taking_part &= {member.name for member in self._live.team if member.present}
         able = [
             member
             for member in self._live.team.present

@@ -26,7 +26,6 @@ from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 from app.mapping.types import Grid
-from app.missions import safety
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
@@ -36,15 +35,16 @@ from app.missions.flight.decisions.decision import (
     turn_radius_m,
     without_zones,
 )
-from app.missions.flight.legs.commit import home_of
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
 from app.missions.forecast.simulate import fly
 from app.missions.forecast.swarm import Swarm
 from app.missions.forecast.whole_survey import HALVINGS, WholeWay, whole_way
 from app.missions.maps.builder import MapBuilder, make_grid
+from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
+from app.missions.safety import free_space
 from app.missions.spec.mission import MissionSpec, PlannerSpec
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
@@ -150,7 +150,7 @@ def plan(
     depth_m = floor_depth_m or max(LEAST_GUESS_M, cruise_m + spec.limits.min_altitude_m + ROOM_M)
     constraints = make_constraints(spec)
     inner = Polygon(constraints.area)
-    begin_m = np.array([safety.nearest_inside(inner, start) for start in starts_m])
+    begin_m = np.array([free_space.nearest_inside(inner, start) for start in starts_m])
 
     def over() -> bool:
         return stop() or time.thread_time() > until
@@ -307,7 +307,7 @@ def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: F
     along = _along(corners)
     turn_s, clock_s = _turns_s(spec, member, corners), _clock_s(spec, member, corners)
     circles_s = len(turn_s) * 2.0 * np.pi * radius_m / speed
-    home_m = home_of(member, spec)
+    home_m = home_of(member.spec, member.slot, spec)
     ways_home = None if home_m is None else WaysHome(constraints, home_m)
 
     def home_from(place_m: FloatArray) -> FloatArray | None:

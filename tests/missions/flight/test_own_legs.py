@@ -13,21 +13,23 @@ from hypothesis import strategies as st
 from shapely import Point, Polygon
 from sqlalchemy import select
 
-from app.missions import safety
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import NO_LEG, LegCommit
+from app.missions.flight.own_legs import MOST_AHEAD, OwnLegs
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
+from app.missions.safety import free_space
 from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_state
+from tests.support.waiting import until
 
 APART = {"limits": {"max_step_m": 5.0, "min_separation_m": 0.0}}
 
@@ -190,6 +192,27 @@ async def test_a_vehicle_that_comes_back_while_its_leg_is_written_gets_numbers_o
     assert max(row.step for row in rows if row.vehicle == "a") == 15
 
 
+async def test_who_comes_back_flies_as_many_legs_as_the_others_have_left_not_as_many_as_are_undecided(
+    service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decisions that take long give vehicles many legs at once, here all of them."""
+    monkeypatch.setattr(OwnLegs, "_legs_at_once", lambda *_: MOST_AHEAD)
+    mission = (await service.create(sim_spec(steps=15, side_m=60.0, **APART))).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: live.team.named("a").legs, "a leg")
+    await service.team_changes.take_out(live, "a", actor="Ana")
+    await until(lambda: live.team.named("b").legs == 15, "all legs of the other one")
+    await service.team_changes.rejoin(live, "a", actor="Ana")
+    of_b = live.team.named("b")
+    flown = of_b.legs - len(of_b.ahead)
+    await until_state(service, mission, MissionState.FINISHED)
+    async with database.reading() as session:
+        rows = (await session.scalars(select(WaypointRow))).all()
+    assert len([row for row in rows if row.vehicle == "b"]) == 15
+    assert len([row for row in rows if row.vehicle == "a" and row.step > flown]) == 15 - flown > 1
+
+
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
     service = await harbour_closed.open(time_scale=15.0)
     vehicles = [{"name": "fast", "kind": "sim", "speed_mps": 2.0}, {"name": "slow", "kind": "sim", "speed_mps": 0.8}]
@@ -229,7 +252,7 @@ async def test_who_has_flown_everything_circles_inside_the_area(
     assert flown.held["fast"]
     for place in flown.held["fast"]:
         east, north = spec.frame().to_local(np.array(place.lat_deg), np.array(place.lon_deg))
-        assert Polygon(spec.local_area()).buffer(-safety.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
+        assert Polygon(spec.local_area()).buffer(-free_space.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
 
 
 @given(st.integers(0, 10_000))

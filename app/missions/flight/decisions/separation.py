@@ -6,10 +6,10 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.motion.timeline import Approach, Timeline, closest_approach
-from app.missions import safety
 from app.missions.flight.decisions.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.energy import ASCENT_MPS
+from app.missions.safety import free_space
 from app.missions.spec.mission import Limits, MissionSpec
 from app.missions.team import Member
 
@@ -72,7 +72,7 @@ def passes_above(member: Member, live: LiveMission, spec: MissionSpec) -> str:
         if other.report.position.depth_m > depth_m - limits.min_vertical_separation_m:
             continue
         nearest = closest_approach(rise, _motion(other, live, spec), until_s=float(rise.time_s[-1]))
-        if nearest.distance_m < limits.min_separation_m + safety.CIRCLE_M:
+        if nearest.distance_m < limits.min_separation_m + free_space.CIRCLE_M:
             return other.name
     return ""
 
