@@ -10,6 +10,7 @@ import math
 import os
 import subprocess
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -30,11 +31,11 @@ def version() -> str:
     return "-".join(tree[:10] for tree in trees)
 
 
-def kept(file: Path | None, of: str) -> list[dict[str, Any]]:
-    """Return the missions of a file that were flown by this version; lines that hold none are passed over."""
+def kept(file: Path | None, of: str | None) -> list[dict[str, Any]]:
+    """Return the missions of a file that were flown by this version, None: by any; of a seed's the last."""
     lines = [] if file is None or not file.exists() else file.read_text(encoding="utf-8").splitlines()
-    found = [json.loads(line) for line in lines if line.startswith("{") and line.endswith("}")]
-    return [mission for mission in found if mission.get("version") == of]
+    found = {mission["seed"]: mission for mission in map(json.loads, lines) if of in (None, mission["version"])}
+    return list(found.values())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,15 +47,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--minutes", type=float, default=math.inf, help="of processor; no mission is begun after that")
     parser.add_argument("--still", action="store_true", help="no current")
     parser.add_argument("--keep", type=Path, help="keep what was flown in this file, and go on from it")
+    parser.add_argument("--any-version", action="store_true", help="what other versions flew counts, too")
     options = parser.parse_args(arguments)
     logs.configure("error", "json")
     of, begun = version(), time.monotonic()
-    done = kept(options.keep, of)
+    done = kept(options.keep, None if options.any_version else of)
     flown = {mission["seed"] for mission in done}
     seeds = [seed for seed in range(options.first, options.first + options.missions) if seed not in flown]
 
     def told(mission: dict[str, object]) -> None:
-        line = json.dumps({"version": of} | mission)
+        mission = {"version": of} | mission
+        line = json.dumps(mission)
         print(line, flush=True)
         done.append(mission)
         if options.keep is not None:
@@ -64,13 +67,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if seeds:
         fly_all(seeds, options.time_scale, told, still=options.still, most_s=60.0 * options.minutes)
     result = summary(done, still=options.still)
-    result["version"] = of
+    result["missions_of_versions"] = dict(Counter(mission["version"] for mission in done))
     result["wall_s"] = round(time.monotonic() - begun, 1)
     result["processor_s"] = round(time.process_time(), 1)
     result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     print(json.dumps(result, indent=2))
     title = f"Coming home, {'in still water' if options.still else 'in currents'}"
-    write_section(options.write, FLIGHT, title, result, seeds=sorted(mission["seed"] for mission in done))
+    of_all = sorted(mission["seed"] for mission in done)
+    write_section(options.write, FLIGHT, title, result, seeds=of_all, hidden={options.keep: "FILE"})
     return 1 if result["wrong"] else 0
 
 
