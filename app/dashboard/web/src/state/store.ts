@@ -208,13 +208,14 @@ export const measured = signal<readonly LngLat[] | null>(null);
 
 /** A mission being described: its area and zones on the map, and what is being drawn. */
 export interface DraftShapes {
-  area: PolygonGeometry | null;
+  /** One, or several blocks. */
+  areas: readonly PolygonGeometry[];
   keepOut: readonly PolygonGeometry[];
   /** Places of a search, and where vehicles come home to. */
   marks: readonly PlaceMark[];
 }
-/** What the mission that is being described would begin with; `old` while something else is described by now. */
-export const planned = signal<{ plan: PlanView; old: boolean } | null>(null);
+/** What the mission that is being described would begin with, block by block; `old` while something else is described by now. */
+export const planned = signal<{ plans: readonly PlanView[]; old: boolean } | null>(null);
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);

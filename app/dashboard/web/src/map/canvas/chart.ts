@@ -241,10 +241,10 @@ export class Chart {
     this.#lay({ area, keepOut });
   }
 
-  /** A mission that is being described; its area is what is to be seen meanwhile. */
-  setDraft(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
-    this.#draftBounds = boundsOf(area?.coordinates[0] ?? []);
-    this.#show({ draft: { area, keepOut } });
+  /** A mission that is being described; its areas are what is to be seen meanwhile. */
+  setDraft(areas: readonly PolygonGeometry[], keepOut: readonly PolygonGeometry[]): void {
+    this.#draftBounds = boundsOf(areas.flatMap(({ coordinates }) => coordinates[0] ?? []));
+    this.#show({ draft: { areas, keepOut } });
   }
 
   /** What that mission would begin with. */

@@ -193,11 +193,15 @@ export function follow(chart: Chart): () => void {
 
 /** The lines of the plan of what is being described, each cut where its vehicle has to turn back. */
 function planLines(): PlanLines {
-  const { plan, old } = planned.value ?? { plan: null, old: false };
-  const ways = (plan?.vehicles ?? []).map((v, i) => {
-    const [way, beyond] = cutAt(v.way, v.turn_back_m);
-    return { colour: vehicleColour(i), way, beyond, home: v.way_home ?? [] };
-  });
+  const { plans, old } = planned.value ?? { plans: [], old: false };
+  const ways = plans.flatMap(({ vehicles }, block) =>
+    vehicles.map((v, i) => {
+      const [way, beyond] = cutAt(v.way, v.turn_back_m);
+      // Before the next block nobody goes home.
+      const home = block === plans.length - 1 ? (v.way_home ?? []) : [];
+      return { colour: vehicleColour(i), way, beyond, home };
+    }),
+  );
   return { old, ways };
 }
 
@@ -230,14 +234,14 @@ function followDraft(chart: Chart): () => void {
   let shown = "";
   let typing: ReturnType<typeof setTimeout> | undefined;
   const stop = effect(() => {
-    const area = draftShapes.value?.area ?? null;
-    chart.setDraft(area, draftShapes.value?.keepOut ?? []);
-    const corners = JSON.stringify(area?.coordinates ?? "");
+    const areas = draftShapes.value?.areas ?? [];
+    chart.setDraft(areas, draftShapes.value?.keepOut ?? []);
+    const corners = JSON.stringify(areas.map(({ coordinates }) => coordinates));
     if (corners === shown) return;
     shown = corners;
     clearTimeout(typing);
     // What is drawn or dragged on the map is in sight already.
-    if (area && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
+    if (areas.length > 0 && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
   });
   return () => {
     clearTimeout(typing);
