@@ -68,9 +68,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         fly_all(seeds, options.time_scale, told, still=options.still, most_s=60.0 * options.minutes)
     result = summary(done, still=options.still)
     result["missions_of_versions"] = dict(Counter(mission["version"] for mission in done))
-    result["wall_s"] = round(time.monotonic() - begun, 1)
-    result["processor_s"] = round(time.process_time(), 1)
-    result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
+    if seeds:
+        # Of what was flown now.
+        result["missions_now"] = len([mission for mission in done if mission["seed"] not in flown])
+        result["wall_s"] = round(time.monotonic() - begun, 1)
+        result["processor_s"] = round(time.process_time(), 1)
+        result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     print(json.dumps(result, indent=2))
     title = f"Coming home, {'in still water' if options.still else 'in currents'}"
     of_all = sorted(mission["seed"] for mission in done)
