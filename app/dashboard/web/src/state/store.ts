@@ -24,7 +24,7 @@ import type { PlaceMark } from "../map/marks/marks";
 import type { Site } from "../map/marks/site";
 import { certaintyFor } from "../map/picture/certainty";
 import { NORTH_WEST_DEG } from "../map/picture/hillshade";
-import { fittingRange, type Range } from "../map/picture/layers";
+import { fittingRange, type Range } from "../map/picture/layerColours";
 import { type DepthPalette, vehicleColour } from "../map/picture/palette";
 import type { SeaFloor } from "../map/picture/seafloor";
 import type { CoordinateFormat } from "./format";

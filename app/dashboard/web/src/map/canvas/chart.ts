@@ -16,6 +16,7 @@ import type { SwathLine } from "../marks/swath";
 import type { TargetMark } from "../marks/targets";
 import type { PictureResult } from "../picture/picture.worker";
 import { coasts, showsCoast } from "./coast";
+import { imageOf, paintStill, type StillContent } from "./fixedMarks";
 import { type Box, type Label, placed, type Side } from "./labels";
 import {
   type LivelyContent,
@@ -26,11 +27,10 @@ import {
   type Sketch,
   WORDS_FONT,
   WORDS_HEIGHT_PX,
-} from "./lively";
+} from "./movingMarks";
 import { type Look, PAPER } from "./paper";
 import { moved, type Projection } from "./projection";
 import { Sheets } from "./sheets";
-import { imageOf, paintStill, type StillContent } from "./still";
 import type { Pixel } from "./strokes";
 
 setWorkerUrl(workerUrl);

@@ -23,7 +23,7 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { LngLat, Place } from "../../api/types";
 import { type Certainty, isMeasured } from "../picture/certainty";
-import type { Range } from "../picture/layers";
+import type { Range } from "../picture/layerColours";
 import { colourAt, type Palette } from "../picture/palette";
 import { cellOf, gridPlace, type SeaFloor, valueAt } from "../picture/seafloor";
 import { Pace, shuffled } from "./pace";

@@ -34,13 +34,13 @@ import {
 import { say } from "../../words/say";
 import { Button, FileButton, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
-import { AskedFields } from "./AskedFields";
-import { Beginnings, Keeping } from "./Beginnings";
 import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
 import { Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
+import { Keeping, MissionTemplates } from "./MissionTemplates";
 import { SearchFields } from "./SearchFields";
 import { SiteFields } from "./SiteFields";
+import { SurveyFields } from "./SurveyFields";
 import { VehicleFields } from "./VehicleFields";
 
 export function NewMissionForm() {
@@ -148,11 +148,11 @@ export function NewMissionForm() {
         {edited ? (
           <p class="hint">{say("mission.itKeepsItsNumber")}</p>
         ) : (
-          <Beginnings draft={draft.value} onBegin={begin} />
+          <MissionTemplates draft={draft.value} onBegin={begin} />
         )}
         <Text field="name" label={say("mission.name")} placeholder={say("mission.leixEsQuay")} />
         <Kind />
-        {draft.value.kind === "survey" ? <AskedFields /> : null}
+        {draft.value.kind === "survey" ? <SurveyFields /> : null}
         <AreaFields />
         {draft.value.kind === "survey" && !edited ? <BlockFields /> : null}
         {draft.value.kind === "survey" ? <SiteFields /> : null}

@@ -6,7 +6,7 @@ import SPEC from "../../api/mission.json";
 import type { LngLat, MissionView, Place, PolygonGeometry, WaypointView } from "../../api/types";
 import { ringOf } from "../../map/area";
 import type { Chart, Pin } from "../../map/canvas/chart";
-import type { PlanLines } from "../../map/canvas/lively";
+import type { PlanLines } from "../../map/canvas/movingMarks";
 import type { Look } from "../../map/canvas/paper";
 import { outliersOf, placeOf } from "../../map/marks/crossings";
 import type { PlaceMark, Route, Track } from "../../map/marks/marks";
@@ -18,7 +18,7 @@ import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../../map/mark
 import { targetMarks } from "../../map/marks/targets";
 import { contourInterval } from "../../map/picture/contours";
 import { drawnBy } from "../../map/picture/drawings";
-import { paletteOf } from "../../map/picture/layers";
+import { paletteOf } from "../../map/picture/layerColours";
 import { Painter } from "../../map/picture/painter";
 import { lookupTable, vehicleColour } from "../../map/picture/palette";
 import { gridPlace, type SeaFloor } from "../../map/picture/seafloor";
@@ -253,7 +253,7 @@ function followDraft(chart: Chart): () => void {
 function followTools<T>(
   signal: Signal<T | null>,
   ready: Signal<boolean>,
-  begin: (tools: typeof import("../../map/canvas/draw"), wanted: T) => Promise<() => void>,
+  begin: (tools: typeof import("../../map/canvas/areaEditor"), wanted: T) => Promise<() => void>,
 ): () => void {
   return effect(() => {
     const wanted = signal.value;
@@ -261,7 +261,7 @@ function followTools<T>(
     if (!wanted) return;
     let ended = false;
     let end = () => {};
-    void import("../../map/canvas/draw").then(async (tools) => {
+    void import("../../map/canvas/areaEditor").then(async (tools) => {
       if (ended) return;
       end = await begin(tools, wanted);
       if (ended) end();

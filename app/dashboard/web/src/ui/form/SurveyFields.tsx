@@ -1,4 +1,4 @@
-import "./AskedFields.css";
+import "./SurveyFields.css";
 import { api } from "../../api/client";
 import SPEC from "../../api/mission.json";
 import { sizeOf } from "../../map/area";
@@ -24,7 +24,7 @@ import { Choice } from "../parts/Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
 
 /** What the survey is to give: how sure, how complete, how long it may take; and what follows from that. */
-export function AskedFields() {
+export function SurveyFields() {
   return (
     <fieldset class="asked">
       <legend>{say("asked.whatIsAsked")}</legend>

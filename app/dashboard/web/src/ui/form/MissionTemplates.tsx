@@ -17,7 +17,7 @@ const BUILT_IN: Readonly<Partial<Record<Key, Partial<Draft>>>> = {
 };
 
 /** What a new mission begins with: a template, or a file. */
-export function Beginnings({ draft, onBegin }: { draft: Draft; onBegin: (draft: Draft) => void }) {
+export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (draft: Draft) => void }) {
   const fault = useSignal("");
   const read = (name: string, text: string) => {
     try {
