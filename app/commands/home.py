@@ -48,6 +48,9 @@ LONGEST_S = 4 * 3600.0
 START_S = 1.7e9
 """Unix time at which missions begin."""
 
+STILL_MPS = 0.06
+"""Up to this current the water is still."""
+
 LEAST_SURVEY_PCT = 90.0
 """In still water so much of the energy that ways there and home do not take is to be used for the survey (median)."""
 
@@ -264,7 +267,7 @@ def summary(missions: Sequence[dict[str, Any]], *, still: bool) -> dict[str, Any
     """Return what became of the vehicles of all missions together, and in words what is not as it has to be."""
     vehicles = [vehicle for mission in missions for vehicle in mission["vehicles"].values()]
     home = [v for v in vehicles if v["from_point_m"] is not None and v["from_point_m"] <= NEAR_M]
-    shares = [vehicle["surveyed_pct"] for vehicle in vehicles if vehicle["surveyed_pct"] is not None]
+    shares, in_still_water = _shares(missions), _shares([m for m in missions if m["current_mps"] <= STILL_MPS])
     away_m = [v["from_point_m"] for v in vehicles if v["from_point_m"] is not None]
     left_pct = [v["energy_left_pct"] or 0.0 for v in vehicles]
     wrong = [f"seed {mission['seed']}: {words}" for mission in missions for words in mission["wrong"]]
@@ -282,6 +285,8 @@ def summary(missions: Sequence[dict[str, Any]], *, still: bool) -> dict[str, Any
         "least_energy_pct": min(left_pct, default=None),
         "survey_share_pct": share_pct,
         "least_survey_share_pct": min(shares, default=None),
+        "survey_share_in_still_water_pct": round(statistics.median(in_still_water), 1) if in_still_water else None,
+        "vehicles_in_still_water": len(in_still_water),
         "links_lost": sum(mission["links_lost"] for mission in missions),
         "zones_entered": sum(mission["zones_entered"] for mission in missions),
         "zones_drifted_into": sum(mission["zones_drifted_into"] for mission in missions),
@@ -291,6 +296,11 @@ def summary(missions: Sequence[dict[str, Any]], *, still: bool) -> dict[str, Any
         "closest_m": min(closest_m, default=None),
         "wrong": wrong,
     }
+
+
+def _shares(missions: Sequence[dict[str, Any]]) -> list[float]:
+    vehicles = [vehicle for mission in missions for vehicle in mission["vehicles"].values()]
+    return [vehicle["surveyed_pct"] for vehicle in vehicles if vehicle["surveyed_pct"] is not None]
 
 
 def home(
@@ -309,7 +319,7 @@ def home(
 
     Exit code 1 when a vehicle is not home with energy left, was in a zone, or came too close to another one on the way,
     and in still water when too little was surveyed: `wrong` says which. survey_share_pct: of the energy that ways
-    there and home did not need, which part was used before turning back (median).
+    there and home did not need, which part was used on legs of the survey (median); circling is none.
     """
     from app.api import logs
 

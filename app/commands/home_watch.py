@@ -18,6 +18,9 @@ TICK_S = 0.05
 LONG_M, TALL_M = 2.5, 0.8
 """Vehicles touch each other of which the centres are closer than one is long, and than one is tall that is pitched."""
 
+NOWHERE_M = 1.0
+"""A leg that is not longer leads nowhere: its vehicle circles."""
+
 Place = tuple[float, float, float]
 
 
@@ -31,12 +34,14 @@ class Seen:
     """when it turned back,"""
     home_at_pct: float | None = None
     """and when it was home."""
+    waited_pct: float = 0.0
+    """What it used before it turned back while it had no leg, or one that led nowhere."""
     from_point_m: float | None = None
     why: str = ""
 
     @property
     def surveyed_pct(self) -> float | None:
-        """Of the energy that neither its way there nor its way home took, which part it used before it turned back.
+        """Of the energy that neither its way there nor its way home took, which part it used on legs of the survey.
 
         None for one that turned back for another reason than its energy.
         """
@@ -45,7 +50,14 @@ class Seen:
         over_pct = self.surveys_at_pct - (self.turned_at_pct - self.home_at_pct)
         if "energy" not in self.why or over_pct <= 0.0:
             return None
-        return round(100.0 * (self.surveys_at_pct - self.turned_at_pct) / over_pct, 1)
+        return round(100.0 * (self.surveys_at_pct - self.turned_at_pct - self.waited_pct) / over_pct, 1)
+
+
+def leads_on(member: "Member") -> bool:
+    """Whether a vehicle has a leg that leads anywhere."""
+    if not member.ordered or member.target_m is None:
+        return False
+    return member.leg_start_m is None or math.dist(member.leg_start_m, member.target_m) > NOWHERE_M
 
 
 class Watch:
@@ -91,25 +103,29 @@ class Watch:
             seen = self.seen.setdefault(member.name, Seen())
             if seen.from_point_m is not None or member.report is None:
                 continue  # It was taken out of the water.
+            _, before_pct = self._last.get(member.name, (None, 0.0))
             if self._link.swims(member.name):
                 self._last[member.name] = self._place(member.name), self._link.battery_pct(member.name)
             elif member.name not in self._last:
                 continue
             # The mission's end takes vehicles out between two looks: then they were where they were seen last.
             place, left_pct = self._last[member.name]
-            self._note(member, seen, place, left_pct)
+            used_pct = max(before_pct - left_pct, 0.0)
+            self._note(member, seen, place, left_pct, used_pct)
             self._look_at_zones(member.name, place)
             out[member.name] = member, place
         for (a, (one, here)), (b, (other, there)) in combinations(sorted(out.items()), 2):
             returning = any(m.withdrawal is not None and not m.withdrawal.asked for m in (one, other))
             self._compare((a, b), here, there, returning=returning)
 
-    def _note(self, member: "Member", seen: Seen, place: Place, left_pct: float) -> None:
+    def _note(self, member: "Member", seen: Seen, place: Place, left_pct: float, used_pct: float) -> None:
         from app.missions.flown import Phase
         from app.missions.recovery.berths import point_of
 
         if seen.surveys_at_pct is None and member.flown.phase is Phase.SURVEY:
             seen.surveys_at_pct = left_pct
+        if seen.surveys_at_pct is not None and seen.turned_at_pct is None and not leads_on(member):
+            seen.waited_pct += used_pct
         if member.withdrawal is not None and seen.turned_at_pct is None:
             seen.turned_at_pct, seen.why = left_pct, member.withdrawal.why
         recovery = self._live.spec.recovery_of(member.spec)

@@ -19,6 +19,8 @@ BUSY_TIMEOUT_MS = 30_000
 """How long a writer waits for one of another process."""
 TROUBLED_TIMEOUT_MS = 1_000
 """How long one waits once another one has waited in vain."""
+PATIENCE = "bathyfleet_patience_ms"
+"""Under this name a connection keeps how long it waits."""
 RECENT_S = 60.0
 """A trouble that did not show for this long is taken to be over."""
 
@@ -61,8 +63,10 @@ def make_engine(url: str) -> AsyncEngine:
     def _begin(connection: Connection) -> None:
         # A reader that becomes a writer half-way fails when another writer was faster: writers say so at once.
         options = connection.get_execution_options()
-        if "bathyfleet_patience_ms" in options:
-            connection.exec_driver_sql(f"PRAGMA busy_timeout={options['bathyfleet_patience_ms']}")
+        patience_ms = options.get(PATIENCE)
+        if patience_ms not in (None, connection.info.get(PATIENCE, BUSY_TIMEOUT_MS)):
+            connection.exec_driver_sql(f"PRAGMA busy_timeout={patience_ms}")
+            connection.info[PATIENCE] = patience_ms
         connection.exec_driver_sql("BEGIN IMMEDIATE" if options.get("bathyfleet_writes", False) else "BEGIN")
 
     return engine

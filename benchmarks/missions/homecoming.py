@@ -1,17 +1,41 @@
 """Whether everybody comes home: ``python -m benchmarks.missions.homecoming [--missions 20 --minutes 25]``.
 
-The missions of ``bathyfleet evaluate home``; what became of each vehicle is told for every mission as it ends.
+The missions of ``bathyfleet evaluate home``; what became of each vehicle is told for every mission as it ends. With
+``--keep FILE`` that is kept: the file's missions are not flown again as long as the program is the same, and the
+figures are of all of them. A long run may be interrupted, and gone on with.
 """
 
 import json
 import math
 import os
+import subprocess
 import time
+from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from app.api import logs
-from app.commands.home import fly_all
+from app.commands.home import fly_all, summary
 from benchmarks.common.report import FLIGHT, make_parser, write_section
+from tests.support.paths import PROJECT
+
+PROGRAM = ("app", "simulator")
+"""What is flown, and flies."""
+
+
+def version() -> str:
+    """Return what tells versions of the program apart, that of the documentation aside."""
+    asked = ["git", "rev-parse", *(f"HEAD:{folder}" for folder in PROGRAM)]
+    trees = subprocess.run(asked, cwd=PROJECT, check=True, capture_output=True, text=True).stdout.split()
+    return "-".join(tree[:10] for tree in trees)
+
+
+def kept(file: Path | None, of: str | None) -> list[dict[str, Any]]:
+    """Return the missions of a file that were flown by this version, None: by any; of a seed's the last."""
+    lines = [] if file is None or not file.exists() else file.read_text(encoding="utf-8").splitlines()
+    found = {mission["seed"]: mission for mission in map(json.loads, lines) if of in (None, mission["version"])}
+    return list(found.values())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,21 +46,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--time-scale", type=float, default=20.0)
     parser.add_argument("--minutes", type=float, default=math.inf, help="of processor; no mission is begun after that")
     parser.add_argument("--still", action="store_true", help="no current")
+    parser.add_argument("--keep", type=Path, help="keep what was flown in this file, and go on from it")
+    parser.add_argument("--any-version", action="store_true", help="what other versions flew counts, too")
     options = parser.parse_args(arguments)
     logs.configure("error", "json")
-    seeds, begun = range(options.first, options.first + options.missions), time.monotonic()
+    of, begun = version(), time.monotonic()
+    done = kept(options.keep, None if options.any_version else of)
+    flown = {mission["seed"] for mission in done}
+    seeds = [seed for seed in range(options.first, options.first + options.missions) if seed not in flown]
 
     def told(mission: dict[str, object]) -> None:
-        print(json.dumps(mission), flush=True)
+        mission = {"version": of} | mission
+        line = json.dumps(mission)
+        print(line, flush=True)
+        done.append(mission)
+        if options.keep is not None:
+            with options.keep.open("a", encoding="utf-8") as file:
+                file.write(line + "\n")
 
-    most_s = 60.0 * options.minutes
-    result = fly_all(seeds, options.time_scale, told, still=options.still, most_s=most_s)
-    result["wall_s"] = round(time.monotonic() - begun, 1)
-    result["processor_s"] = round(time.process_time(), 1)
-    result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
+    if seeds:
+        fly_all(seeds, options.time_scale, told, still=options.still, most_s=60.0 * options.minutes)
+    result = summary(done, still=options.still)
+    result["missions_of_versions"] = dict(Counter(mission["version"] for mission in done))
+    if seeds:
+        # Of what was flown now.
+        result["missions_now"] = len([mission for mission in done if mission["seed"] not in flown])
+        result["wall_s"] = round(time.monotonic() - begun, 1)
+        result["processor_s"] = round(time.process_time(), 1)
+        result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     print(json.dumps(result, indent=2))
     title = f"Coming home, {'in still water' if options.still else 'in currents'}"
-    write_section(options.write, FLIGHT, title, result, seeds=seeds[: result["missions"]])
+    of_all = sorted(mission["seed"] for mission in done)
+    write_section(options.write, FLIGHT, title, result, seeds=of_all, hidden={options.keep: "FILE"})
     return 1 if result["wrong"] else 0
 
 

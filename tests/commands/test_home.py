@@ -2,12 +2,16 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.commands import home, home_watch
 from app.commands.home import drawn, fly_mission, summary, wrong_with
-from app.commands.home_watch import Seen
+from app.commands.home_watch import Seen, leads_on
+from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.settings import SimulationSettings
+from app.missions.spec.mission import VehicleSpec
+from app.missions.team import Team
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.specs import lon_lat
 
@@ -19,6 +23,7 @@ def vehicle(from_point_m: float | None, energy_left_pct: float | None, surveyed_
 def mission(*vehicles: dict[str, Any], **other: Any) -> dict[str, Any]:
     flown = {
         "seed": 3,
+        "current_mps": 0.05,
         "state": "finished",
         "vehicles": {f"v{k}": vehicle for k, vehicle in enumerate(vehicles)},
         "links_lost": 1,
@@ -50,6 +55,8 @@ def test_who_is_far_off_or_never_arrived_is_not_home() -> None:
         "least_energy_pct": 0.0,
         "survey_share_pct": 95.5,
         "least_survey_share_pct": 95.0,
+        "survey_share_in_still_water_pct": 95.5,
+        "vehicles_in_still_water": 2,
         "links_lost": 2,
         "zones_entered": 0,
         "zones_drifted_into": 2,
@@ -92,6 +99,25 @@ def test_ways_there_and_home_do_not_count_as_survey_nor_against_it() -> None:
     assert seen.surveyed_pct == pytest.approx(100.0 * 70.0 / 80.0)
     seen.why = "called home"
     assert seen.surveyed_pct is None
+
+
+def test_circling_is_no_survey() -> None:
+    seen = Seen(surveys_at_pct=95.0, turned_at_pct=25.0, home_at_pct=10.0, waited_pct=20.0, why="its energy")
+    assert seen.surveyed_pct == pytest.approx(100.0 * 50.0 / 80.0)
+    member = Team().join(VehicleSpec.model_validate({"name": "a", "kind": "sim"}), 0)
+    assert not leads_on(member), "it has no leg"
+    order = WaypointOrder("m1", 1, "a", Position(41.0, -8.0, 2.0), 1.3, 3.0, 2.0)
+    for start_m, leads in (((0.0, 0.0), True), ((20.0, 0.0), False)):
+        member.set_order(order, np.array([20.0, 0.0]))
+        member.status, member.leg_start_m = WaypointStatus.SENT, np.array(start_m)
+        assert leads_on(member) is leads
+
+
+def test_the_share_in_still_water_is_told_by_itself() -> None:
+    flown = [mission(GOOD), mission(vehicle(4.0, 12.0, 60.0), current_mps=0.4)]
+    told = summary(flown, still=False)
+    assert told["survey_share_in_still_water_pct"] == 95.0
+    assert told["vehicles_in_still_water"] == 1
 
 
 def test_missions_follow_from_their_seed() -> None:

@@ -13,6 +13,7 @@ from app.exploration.core.routes import FreeSpace
 
 SHARE_SAMPLES = 200
 MAX_LINES = 2000
+LEAST_LINE_M = 0.5
 MOST_INSET = 0.4
 """A line is taken back at either end by at most this part of its length."""
 
@@ -34,11 +35,15 @@ def longer_axis_rad(area: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A direction of survey lines: ``v`` runs along the lines, ``u`` across them."""
+    """A direction of survey lines: ``v`` runs along the lines, ``u`` across them.
+
+    Lines lie ``within`` two values of v.
+    """
 
     constraints: Constraints
     free: FreeSpace
     direction_rad: float
+    within: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def _axes(self) -> FloatArray:
@@ -83,6 +88,11 @@ class Sweep:
         lines = (shapely.get_type_id(cuts) == shapely.GeometryType.LINESTRING) & ~shapely.is_empty(cuts)
         cuts, of = cuts[lines], of[lines]
         pieces = np.stack([shapely.get_coordinates(shapely.get_point(cuts, k)).reshape(-1, 2) for k in (0, -1)], axis=1)
+        if np.isfinite(self.within).any():
+            ends_uv = self.to_uv(pieces)
+            ends_uv[..., 1] = np.clip(ends_uv[..., 1], *self.within)
+            some = np.abs(np.diff(ends_uv[..., 1], axis=1)[:, 0]) > LEAST_LINE_M
+            pieces, of = self.to_en(ends_uv[some]), of[some]
         along = self.to_uv(pieces)[..., 1]
         backwards = along[:, 0] > along[:, 1]
         pieces[backwards] = pieces[backwards, ::-1]

@@ -1,8 +1,10 @@
 """The usual practice: evenly spaced parallel lines, an equal share of the area per vehicle."""
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
+from shapely import LineString, Polygon
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
@@ -40,8 +42,45 @@ def lawnmower_routes(constraints: Constraints, starts: FloatArray, budgets_m: Fl
     return routes
 
 
+def route_across(
+    constraints: Constraints, en_m: FloatArray, vehicle: int, passes: int, budget_m: float
+) -> FloatArray | None:
+    """Return the next lines (k, 2) of a vehicle that has flown its own and can go on; None where it cannot.
+
+    Parameters
+    ----------
+    en_m : (n_vehicles, 2)
+        Where the team is: it has strips of equal shares, in that order.
+    passes
+        How often it got such lines: they lie across its strip and along it in turn. The first ones must pay: it has to
+        be able to fly farther than a line of the area is long.
+    budget_m
+        How far it can fly.
+    """
+    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
+    uv, area_uv = sweep.to_uv(en_m), sweep.to_uv(constraints.area)
+    if passes == 0 and budget_m <= float(np.ptp(area_uv[:, 1])):
+        return None
+    strip = int(np.flatnonzero(np.argsort(uv[:, 0], kind="stable") == vehicle)[0])
+    low, high = sweep.shares(np.ones(len(en_m)))[strip : strip + 2].tolist()
+    across = replace(sweep, direction_rad=sweep.direction_rad + np.pi / 2, within=(-high, -low))
+    ways = [
+        (across, float(area_uv[:, 1].min()), float(area_uv[:, 1].max())),
+        (sweep, low, high),
+    ]
+    for of, begin, end in ways if passes % 2 == 0 else ways[::-1]:
+        route = boustrophedon(of, en_m[vehicle], begin, end, budget_m)
+        if len(route) and route_length(en_m[vehicle], route) <= budget_m:
+            return route
+    return None
+
+
 class LawnmowerPlanner(PlannerBase):
-    """Follows the lines; a vehicle that leaves hands on its rest, one that joins takes half of the longest rest."""
+    """Follows the lines; a vehicle that leaves hands on its rest, one that joins takes half of the longest rest.
+
+    A vehicle that can still fly when it has flown its lines, as one whose battery lasts longer than was sure at first,
+    gets more of them, across its strip.
+    """
 
     name: ClassVar[str] = "lawnmower"
     plans_for_all = True
@@ -51,6 +90,8 @@ class LawnmowerPlanner(PlannerBase):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._routes: dict[str, FloatArray] = {}
+        self._passes: dict[str, int] = {}
+        """How often vehicles got more lines."""
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
@@ -71,13 +112,16 @@ class LawnmowerPlanner(PlannerBase):
         return dict(self._routes)
 
     def _remember(self) -> dict[str, Any]:
-        return {"routes": self._routes}
+        return {"routes": self._routes, "passes": self._passes}
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._routes = {k: np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state["routes"].items()}
+        self._passes = {k: int(count) for k, count in state.get("passes", {}).items()}
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
+        done = self._go_on(team)
+        self._lead_round(team)
         steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
         # The corner that a leg cuts may be that of a zone: then it is flown out.
         cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
@@ -94,10 +138,37 @@ class LawnmowerPlanner(PlannerBase):
         for i, name in enumerate(team.vehicles):
             if team.moves[i] and np.hypot(*(positions[i, :2] - targets[which, i])) < 1e-6:
                 self._routes[name] = self._routes[name][following[which, i] :]
-        return Proposal(positions, 0.0, {"left_m": float(sum(self._left(team, i) for i in range(len(positions))))})
+        left_m = float(sum(self._left(team, i) for i in range(len(positions))))
+        return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
     def _left(self, team: Situation, i: int) -> float:
         return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])
+
+    def _go_on(self, team: Situation) -> frozenset[str]:
+        """Give those that have flown their lines more of them; returns those that had more, and can fly no others."""
+        en, left_m, done = team.positions[:, :2], metres_left(team), set()
+        for i, name in enumerate(team.vehicles):
+            if not team.moves[i] or self._left(team, i) > 0.0:
+                continue
+            passes = self._passes.get(name, 0)
+            route = route_across(team.constraints, en, i, passes, float(left_m[i]))
+            if route is not None:
+                self._routes[name], self._passes[name] = route, passes + 1
+            elif passes:
+                done.add(name)
+        return frozenset(done)
+
+    def _lead_round(self, team: Situation) -> None:
+        """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere."""
+        zones = [Polygon(zone) for zone in team.constraints.keep_out]
+        for i, name in enumerate(team.vehicles):
+            here, route = team.positions[i, :2], self._routes[name]
+            if not team.moves[i] or not len(route):
+                continue
+            leg = LineString([here, route[0]])
+            if any(zone.intersects(leg) for zone in zones):
+                free = FreeSpace(team.constraints, BORDER_MARGIN_M)
+                self._routes[name] = np.vstack([free.way(here, route[0]), route[1:]])
 
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""

@@ -213,14 +213,14 @@ class GaussianProcessMap:
                 self.kernel_, start = choose_kernel(self._levels, REACH_UNITS * self._unit_m)
             else:
                 self.kernel_ = self.kernel
-        likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
+        likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform, learn=learn)
         if learn:
             self.stationary_hyperparameters_, least = likelihood.maximise(start)
             if self.stationary_hyperparameters_.amplitude_m < float(np.median(self._levels.fine.sd_m)):
                 # The relief drowns in noise: few points tell too little of its length.
                 points *= MORE_IN_NOISE
                 subset = spread_subset(self._levels.fine_tree, points)
-                likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform)
+                likelihood = likelihood_of(self._levels, self.kernel_, subset, uniform, learn=True)
                 self.stationary_hyperparameters_, least = likelihood.maximise(self.stationary_hyperparameters_)
             self._learned_from = points
             self.refinement_ = 0.0
@@ -237,7 +237,7 @@ class GaussianProcessMap:
         )
         if self.nonstationary and (learn or self.refinement_ > 0.0):
             scales = _scales(self._scale_fields.at(self._levels.points))
-            likelihood = likelihood_of(self._levels, self.kernel_, subset, scales)
+            likelihood = likelihood_of(self._levels, self.kernel_, subset, scales, learn=learn)
             if learn:
                 hyper, value = likelihood.maximise(self.stationary_hyperparameters_)
                 self._refined_hyperparameters = lengthen(
@@ -278,11 +278,13 @@ class GaussianProcessMap:
             self._rough_hyperparameters: Hyperparameters | None = None
         if self.kernel != "auto" or self.kernel_ == ROUGHEST:
             return None
+        known = None if learn else self._rough_hyperparameters
         uniform = uniform_scales(len(self._levels.soundings))
-        likelihood = likelihood_of(self._levels, ROUGHEST, subset, uniform)
-        if learn or self._rough_hyperparameters is None:
-            self._rough_hyperparameters, _ = likelihood.maximise(self.stationary_hyperparameters_)
-        return conditioned(self._levels, ROUGHEST, self._rough_hyperparameters, likelihood, uniform)
+        likelihood = likelihood_of(self._levels, ROUGHEST, subset, uniform, learn=known is None)
+        if known is None:
+            known, _ = likelihood.maximise(self.stationary_hyperparameters_)
+            self._rough_hyperparameters = known
+        return conditioned(self._levels, ROUGHEST, known, likelihood, uniform)
 
     def _coarse_relief(self, extent: float) -> tuple[Grid, FloatArray]:
         """A coarse stationary map, depth minus trend: shows the grain and the edges of the sea floor."""

@@ -26,13 +26,18 @@ CHOICE_MARGIN = 0.02  # a longer length must predict better by this much
 GAP_FACTOR = 1.5  # radius of the holes over the median distance of places to their nearest sounding
 
 
-def likelihood_of(levels: TwoLevels, kernel: KernelName, subset: IntArray, scales: LocalScales) -> RestrictedLikelihood:
+def likelihood_of(
+    levels: TwoLevels, kernel: KernelName, subset: IntArray, scales: LocalScales, *, learn: bool
+) -> RestrictedLikelihood:
     """Return the likelihood of the fine soundings ``subset`` and, where there are more, of some given their neighbours.
 
-    ``scales`` are those of all soundings.
+    ``scales`` are those of all soundings. The trend is found by the subset alone: who does not ``learn`` by the
+    likelihood needs no others.
     """
     fine, n = levels.fine, levels.n_fine
     likelihood = _likelihood_of_subset(levels, kernel, subset, scales)
+    if not learn:
+        return likelihood
     chosen = families(levels.fine_tree, FAMILIES) if n > len(subset) else None
     if chosen is None:
         return likelihood

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray, IntArray
@@ -39,21 +40,45 @@ class HoleErrors:
 
 def neighbours_beyond(tree: cKDTree, rows: IntArray, radius_m: float, k: int) -> IntArray:
     """Return the ``k`` points of ``tree`` nearest to each of ``rows`` at ``radius_m`` or more: (h, k), -1 for none."""
-    n, points = tree.n, tree.data
+    points = np.asarray(tree.data)
+    northward = np.argsort(points[:, 1], kind="stable")
+    return _neighbours_beyond(np.ascontiguousarray(points[northward]), northward, rows, radius_m, k)
+
+
+@njit(cache=True, nogil=True)
+def _neighbours_beyond(points: FloatArray, number: IntArray, rows: IntArray, radius_m: float, k: int) -> IntArray:
+    """Search from each point's own northing to both sides, as far as any nearer one may be.
+
+    ``points`` (n, 2) ascend in northing, ``number`` (n,) is what each is called.
+    """
+    n = len(points)
+    place = np.empty(n, np.int64)
+    for i in range(n):
+        place[number[i]] = i
     result = np.full((len(rows), k), -1, np.int64)
-    todo = np.arange(len(rows))
-    ask = min(n, 4 * k)
-    while len(todo):
-        distance, index = nearest(tree, points[rows[todo]], ask)
-        outside = distance >= radius_m
-        rank = np.cumsum(outside, axis=1)
-        take = outside & (rank <= k)
-        row, col = np.nonzero(take)
-        result[todo[row], rank[row, col] - 1] = index[row, col]
-        if ask == n:
-            break
-        todo = todo[rank[:, -1] < k]
-        ask = min(n, 2 * ask)
+    squared = np.empty(k)
+    for t in range(len(rows)):
+        begin = place[rows[t]]
+        east, north = points[begin, 0], points[begin, 1]
+        found = 0
+        for side in (-1, 1):
+            i = begin if side < 0 else begin + 1
+            while 0 <= i < n:
+                dy = points[i, 1] - north
+                if found == k and dy * dy >= squared[k - 1]:
+                    break
+                dx = points[i, 0] - east
+                d2 = dx * dx + dy * dy
+                if (found < k or d2 < squared[k - 1]) and np.sqrt(d2) >= radius_m:
+                    j = min(found, k - 1)
+                    while j > 0 and squared[j - 1] > d2:
+                        squared[j] = squared[j - 1]
+                        result[t, j] = result[t, j - 1]
+                        j -= 1
+                    squared[j] = d2
+                    result[t, j] = number[i]
+                    found = min(found + 1, k)
+                i += side
     return result
 
 

@@ -127,7 +127,7 @@ class OwnLegs:
             await asyncio.gather(sending, return_exceptions=True)
         left = any(self._wants_legs(member) for member in self._live.team.surveying)
         if left and self._done:
-            return "nothing is left to ensonify"
+            return "nothing is left to ensonify" if self._measured else "nobody can fly a further line"
         return "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
 
     async def _until_needed(self, sending: asyncio.Task[None]) -> None:
@@ -174,6 +174,9 @@ class OwnLegs:
         done = names & frozenset().union(*(decision.done for decision in decisions[:1]))
         self._done = (self._done - names) | done if all_flown else set()
         self._look_later(names if not decisions else done)
+        if not self._measured:
+            # What is planned for good leaves nothing to wait for.
+            self._call_home(done)
         for later, decision in enumerate(decisions):
             starts = {place.vehicle: place.en_m for place in places}
             places = moved_on(places, decision)
@@ -225,6 +228,16 @@ class OwnLegs:
         # It flies the legs it has. Looked at again at once it would be decided for all that time, and others wait.
         self._look_later({member.name})
         return False
+
+    def _call_home(self, done: frozenset[str] | set[str]) -> None:
+        """Send vehicles home that have flown all that is planned for them and can fly no further line."""
+        for member in self._live.team.surveying:
+            idle = member.present and not member.ahead and not member.ordered
+            if member.name in done and idle and self._spec.recovery_of(member.spec) is not None:
+                energy_m = self._range.beyond_m(member)
+                lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
+                words = "its energy lasts for its way home" if lasts else "what is left of its way is for going home"
+                self._live.withdraw(member, Response.RETURN, f"{words} and for no further line")
 
     def _has_leg(self, name: str, number: int) -> bool:
         member = self._live.team.get(name)

@@ -83,6 +83,20 @@ def room_of_m(vehicle: VehicleSpec, spec: MissionSpec) -> float:
     return max(HOME_RADIUS_M, spec.arrival_radius_m, vehicle.turn_radius_m or 0.0)
 
 
+def is_home(here_m: FloatArray, place_m: FloatArray, point_m: FloatArray, room_m: float, radius_m: float) -> bool:
+    """Whether a vehicle is home: within the radius of the recovery point, or of its place where that is farther off.
+
+    Parameters
+    ----------
+    here_m, place_m, point_m : (2,)
+        Where it is, where it is to wait, and the point.
+    room_m
+        How far from its place it may be while it waits.
+    """
+    outside = math.dist(place_m, point_m) + room_m > radius_m
+    return math.dist(here_m, place_m if outside else point_m) <= radius_m
+
+
 @lru_cache(maxsize=128)
 def _places(count: int) -> FloatArray:
     """Return the places of a triangular grid of spacing 1 about the middle of a triangle, (count, 2), nearest first."""

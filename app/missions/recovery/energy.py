@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 HOTEL = 0.3
 """Share of a vehicle's consumption at its usual speed that has nothing to do with moving."""
 
+ASCENT_MPS = 0.3
+"""How fast vehicles come up."""
+
 FASTEST_SHARE = 3.0
 """A speed of more than so many times the usual one is a wrong figure."""
 

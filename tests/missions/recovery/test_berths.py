@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.missions.recovery.berths import berth_m, berth_spacing_m, farthest_m, layer_of, room_of_m
+from app.missions.recovery.berths import berth_m, berth_spacing_m, farthest_m, is_home, layer_of, room_of_m
 from app.missions.spec.mission import MissionSpec
 from tests.support.missions.harbour import sim_spec
 
@@ -69,3 +69,21 @@ def test_vehicles_that_are_apart_already_keep_their_depths() -> None:
     assert [layer_of(name, cruise_m, 1.0).depth_m(3.0) for name in cruise_m] == [3.0, 2.0]
     assert [layer_of(name, cruise_m, 1.0).depth_m(2.0) for name in cruise_m] == [2.0, 1.0]
     assert [layer_of(name, {"a": 3.0, "b": 3.0}, 1.0).depth_m(3.0) for name in cruise_m] == [2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("place_m", "here_m", "home"),
+    [
+        ((8.0, 0.0), (24.0, 0.0), True),
+        # 18 m from its place, and 26 m from the point.
+        ((8.0, 0.0), (26.0, 0.0), False),
+        ((8.0, 0.0), (-20.0, 0.0), True),
+        # There is no room for its place within the radius.
+        ((40.0, 0.0), (50.0, 0.0), True),
+        ((40.0, 0.0), (10.0, 0.0), False),
+    ],
+)
+def test_home_is_near_the_point_unless_ones_place_is_farther(
+    place_m: tuple[float, float], here_m: tuple[float, float], home: bool
+) -> None:
+    assert is_home(np.array(here_m), np.array(place_m), np.zeros(2), 5.0, 25.0) is home

@@ -8,6 +8,8 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.motion.timeline import Approach, Timeline, closest_approach
 from app.missions.flight.decisions.decision import Decision
 from app.missions.live.mission import LiveMission
+from app.missions.recovery.energy import ASCENT_MPS
+from app.missions.safety import free_space
 from app.missions.spec.mission import Limits, MissionSpec
 from app.missions.team import Member
 
@@ -50,6 +52,29 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
             f"{approach.time_s:.0f} s from now"
         )
         del new[waits]
+
+
+def passes_above(member: Member, live: LiveMission, spec: MissionSpec) -> str:
+    """Return who is above a vehicle and passes it while it would come up where it is; '' where nobody does.
+
+    It circles while it comes up.
+    """
+    limits = spec.limits
+    if member.report is None or limits.min_separation_m <= 0.0:
+        return ""
+    here, depth_m = member.place_m(live.frame), member.report.position.depth_m
+    up = np.array([[*here, depth_m], [*here, 0.0]])
+    rise = Timeline(np.array([0.0, max(depth_m / ASCENT_MPS, 1e-3)]), up)
+    for other in live.team:
+        ended = other.withdrawal is not None and other.withdrawal.over
+        if other is member or ended or not other.present or other.report is None:
+            continue
+        if other.report.position.depth_m > depth_m - limits.min_vertical_separation_m:
+            continue
+        nearest = closest_approach(rise, _motion(other, live, spec), until_s=float(rise.time_s[-1]))
+        if nearest.distance_m < limits.min_separation_m + free_space.CIRCLE_M:
+            return other.name
+    return ""
 
 
 def ways_aside(start: FloatArray, target: FloatArray, constraints: Constraints, bottom: Bottom) -> FloatArray:

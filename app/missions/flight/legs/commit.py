@@ -203,7 +203,9 @@ class LegCommit:
             start = member.place_m(self._live.frame)
             depth_m = self._depth_m(member, place.depth_m, self._turning(member, start, target))
             place = replace(place, depth_m=depth_m)
-        if member.report is not None and self._leads:
+        # Who comes up at home, or is about to, stays there: beyond it others wait, or survey.
+        stays = member.withdrawal is not None and all(np.array_equal(one.target_m, target) for one in member.ahead)
+        if member.report is not None and self._leads and not stays:
             start = member.place_m(self._live.frame)
             beyond = free_space.lead_point(self._constraints, start, target, LEAD_M)
             on = target + np.linspace(0.0, 1.0, LEAD_SAMPLES)[:, None] * (beyond - target)

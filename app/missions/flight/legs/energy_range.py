@@ -11,6 +11,7 @@ from app.exploration.core.constraints import Constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of, layer_of
+from app.missions.recovery.energy import ASCENT_MPS
 from app.missions.recovery.failsafes import drift_reserve_s, with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
@@ -23,9 +24,6 @@ LAND_PERIOD_S = 10.0
 
 MOVED_M = 5.0
 """The way home is looked for anew when its vehicle is so far from where that was done last."""
-
-ASCENT_MPS = 0.3
-"""How fast vehicles come up."""
 
 LEAST_DEPTH_M = 0.5
 """Water with less room than the least altitude and this is land to vehicles."""

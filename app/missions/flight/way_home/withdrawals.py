@@ -9,13 +9,14 @@ import structlog
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointStatus
+from app.missions.flight.decisions.separation import passes_above
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission, phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
-from app.missions.recovery.berths import home_of, point_of
+from app.missions.recovery.berths import home_of, is_home, point_of, room_of_m
 from app.missions.recovery.failsafes import LINK_LOST_S
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.team import Member, Withdrawal
@@ -28,6 +29,9 @@ PATIENCE_S = 0.5
 
 RISING_S = 120.0
 """How long a vehicle that is home is waited for to come up, seconds of the vehicles' time."""
+
+PASSING_S = 60.0
+"""How long a vehicle waits below for others to pass, seconds of the vehicles' time: less than it has in reserve."""
 
 DEEP_M = 1.0
 """Who is not deeper is at the surface."""
@@ -57,6 +61,8 @@ class Withdrawals:
         self._stranded: set[str] = set()
         self._ending: set[str] = set()
         """Vehicles that are just being stopped where they were to go."""
+        self._below_since_s: dict[str, float] = {}
+        """Since when others of the team have passed above vehicles on their way home, the event loop's time."""
         self._rising_since_s: dict[str, float] = {}
         """Since when vehicles have been sent up at home, the event loop's time."""
         for member in live.team:
@@ -117,26 +123,40 @@ class Withdrawals:
             await self._go_home(member, withdrawal)
 
     async def _waits_below(self, member: Member, withdrawal: Withdrawal) -> bool:
-        """Whether a vehicle on its way home stays below for ships to pass where it would come up now."""
-        held = any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in member.failsafes)
-        if not held or withdrawal.response is not Response.RETURN or self._at_surface(member):
+        """Whether a vehicle on its way home stays below for others to pass where it would come up now."""
+        rises = member.ordered and member.order is not None and member.order.position.depth_m <= DEEP_M
+        will_rise = not member.ordered and bool(member.ahead) and member.ahead[0].position.depth_m <= DEEP_M
+        others = ""
+        if any(one.failsafe is Failsafe.TRAFFIC and one.response is not Response.WARN for one in member.failsafes):
+            others = "ships"
+        elif withdrawal.below or rises or will_rise:
+            others = self._passes_above(member)
+        if not others or withdrawal.response is not Response.RETURN or self._at_surface(member):
             withdrawal.below = False
             return False
         if withdrawal.below:
             return True
-        rises = member.ordered and member.order is not None and member.order.position.depth_m <= DEEP_M
-        will_rise = not member.ordered and bool(member.ahead) and member.ahead[0].position.depth_m <= DEEP_M
         if not rises and not will_rise:
             return False
         withdrawal.below = True
         order = self._committing.waiting_below(member)
         if rises:
-            self._dispatch.settle(member, WaypointStatus.MISSED, "ships are about")
+            self._dispatch.settle(member, WaypointStatus.MISSED, f"{others} would be in its way")
         if order is not None:
             await self._dispatch.stay(member, order)
-        words = f"{member.name} waits below for ships to pass"
+        words = f"{member.name} waits below for {others} to pass"
         await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name)
         return True
+
+    def _passes_above(self, member: Member) -> str:
+        """Return which vehicle passes where this one would come up; '' where none does, or it has waited for long."""
+        other = passes_above(member, self._live, self._live.spec)
+        if not other:
+            self._below_since_s.pop(member.name, None)
+            return ""
+        now_s = asyncio.get_running_loop().time()
+        waited_s = (now_s - self._below_since_s.setdefault(member.name, now_s)) * self._time_scale
+        return other if waited_s < PASSING_S else ""
 
     async def _begin(self, member: Member, withdrawal: Withdrawal) -> None:
         """Write a withdrawal down and give up the vehicle's legs."""
@@ -172,12 +192,14 @@ class Withdrawals:
             await self._end(member, withdrawal, f"{member.name} has no recovery point and stops where it is")
             return
         away_m = float(np.hypot(*(home_m - here_m)))
-        if away_m <= recovery.radius_m and (self._at_surface(member) or self._waited_to_rise(member)):
-            from_point_m = float(np.hypot(*(point_of(recovery, spec) - here_m)))
+        point_m = point_of(recovery, spec)
+        from_point_m = float(np.hypot(*(point_m - here_m)))
+        near = is_home(here_m, home_m, point_m, room_of_m(member.spec, spec), recovery.radius_m)
+        if near and (self._at_surface(member) or self._waited_to_rise(member)):
             facts = {"from_point_m": round(from_point_m, 1), "energy_left_pct": energy_left_pct(member)}
             await self._end(member, withdrawal, f"{member.name} is home, {away_m:.0f} m from its place", **facts)
             return
-        if away_m <= recovery.radius_m and member.name in self._rising_since_s:
+        if near and member.name in self._rising_since_s:
             return
         way_m = self._range.way_from(here_m, home_m)
         if way_m is None:

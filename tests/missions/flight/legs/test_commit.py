@@ -13,6 +13,8 @@ from app.missions.flight.decisions.decision import Knowledge, Place, decide, mak
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.service import MissionService
 from app.missions.soundings.corrections import Corrections
+from app.missions.spec.failsafes import Response
+from app.missions.team import Withdrawal
 from tests.support.missions.harbour import sim_spec
 
 DATUM_DEPTH_M = 10.0
@@ -115,3 +117,21 @@ async def test_an_order_is_no_deeper_than_the_turn_into_its_leg_and_the_circle_a
     assert held.position.depth_m <= 6.9 - 0.2 * 9.0, "the circle is 10 m wide to either side"
     assert led is not None
     assert led.lead is None or led.lead.depth_m <= led.position.depth_m
+
+
+async def test_who_comes_up_at_home_stays_there(service: MissionService) -> None:
+    """Sent on beyond it, as on a leg of the survey, one came up 18 m further on and met another there."""
+    live = await service.get((await service.create(sim_spec("a"))).id)
+    committing = LegCommit(live, make_constraints(live.spec), leads=True)
+    member = live.team.join(live.spec.vehicles[0], 0)
+    lat, lon = live.frame.to_geographic(np.array(15.0), np.array(3.0))
+    member.report = VehicleReport("a", 0.0, Position(float(lat), float(lon), 2.0))
+    member.withdrawal = Withdrawal(Response.RETURN, "its energy")
+    corner, home = np.array([15.0, 10.0]), np.array([15.0, 18.0])
+    committing.lead_home(member, [(corner, 2.0), (home, 2.0), (home, 0.0)])
+    leads = []
+    while member.ahead:
+        committing.begin_next(member)
+        assert member.order is not None
+        leads.append(member.order.lead is not None)
+    assert leads == [True, False, False], "it is led through the corner, and to its place"

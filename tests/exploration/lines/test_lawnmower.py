@@ -1,0 +1,93 @@
+"""What a vehicle of a lawnmower survey flies that has flown its own lines."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.lines.lattice import route_length
+from app.exploration.lines.lawnmower import LawnmowerPlanner, route_across
+from app.exploration.planners import create_planner
+
+WIDTH, HEIGHT = 120.0, 300.0
+AREA = np.array([[0.0, 0.0], [WIDTH, 0.0], [WIDTH, HEIGHT], [0.0, HEIGHT]])
+TEAM = np.array([[20.0, 290.0], [60.0, 150.0], [100.0, 150.0]])
+
+
+def test_lines_across_keep_to_their_vehicles_strip_and_to_what_it_can_fly() -> None:
+    route = route_across(Constraints(AREA), TEAM, 0, 0, 400.0)
+    assert route is not None
+    assert route_length(TEAM[0], route) <= 400.0
+    assert route[:, 0].min() >= 0.0
+    assert route[:, 0].max() <= WIDTH / 3 + 1.0, "the third of the area that the westernmost has"
+    legs = np.diff(route, axis=0)
+    assert (np.abs(legs[:, 0]) > 20.0).sum() >= 3, "several lines lie across"
+
+
+def test_lines_along_follow_those_across() -> None:
+    route = route_across(Constraints(AREA), TEAM, 2, 1, 700.0)
+    assert route is not None
+    assert route[:, 0].min() >= 2 * WIDTH / 3 - 1.0
+    assert (np.abs(np.diff(route[:, 1])) > 200.0).any()
+
+
+@pytest.mark.parametrize(("passes", "budget_m"), [(0, HEIGHT - 1.0), (2, 20.0)])
+def test_who_can_hardly_fly_on_gets_no_more_lines(passes: int, budget_m: float) -> None:
+    assert route_across(Constraints(AREA), TEAM, 0, passes, budget_m) is None
+
+
+def situation(left_m: float, at_m: tuple[float, float]) -> Situation:
+    xy = np.array([[60.0, 150.0]])
+    belief = Belief(xy, np.array([20.0]), np.array([1.0]), np.zeros(1, bool), np.ones(1), 10.0)
+    constraints = Constraints(AREA, max_step_m=20.0, max_depth_m=10.0)
+    return Situation(
+        step=1,
+        steps_total=10,
+        vehicles=("a",),
+        positions=np.array([[*at_m, 2.0]]),
+        headings_rad=np.zeros(1),
+        soundings_en_m=np.zeros((0, 2)),
+        belief=belief,
+        constraints=constraints,
+        left_m=np.array([left_m]),
+    )
+
+
+def test_a_vehicle_whose_battery_lasts_longer_than_was_sure_does_not_wait_where_its_lines_end() -> None:
+    planner = create_planner("lawnmower")
+    assert isinstance(planner, LawnmowerPlanner)
+    place, rng = (2.0, 2.0), np.random.default_rng(0)
+    for _ in range(60):
+        east, north, _ = planner.propose(situation(400.0, place), rng).positions[0]
+        moved_m = float(np.hypot(east - place[0], north - place[1]))
+        assert moved_m > 0.5, "it always has somewhere to go"
+        place = (float(east), float(north))
+    told = planner.propose(situation(400.0, place), rng).done
+    assert told == frozenset()
+    memory = planner.snapshot()
+    ended = create_planner("lawnmower")
+    ended.restore(memory)
+    for _ in range(450):
+        proposal = ended.propose(situation(1.0, place), rng)
+        place = (float(proposal.positions[0, 0]), float(proposal.positions[0, 1]))
+        if proposal.done:
+            break
+    assert proposal.done == {"a"}, "who can fly no further line is done"
+
+
+def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:
+    """One that joined was given lines on the other side, and stayed where it was for as long as its battery lasted."""
+    planner = create_planner("lawnmower")
+    zone = np.array([[30.0, 100.0], [90.0, 100.0], [90.0, 200.0], [30.0, 200.0]])
+    constraints = Constraints(AREA, (zone,), max_step_m=20.0, max_depth_m=10.0)
+    rng, place, behind = np.random.default_rng(0), (60.0, 95.0), np.array([[60.0, 205.0]])
+    planner.propose(replace(situation(3000.0, place), constraints=constraints), rng)
+    planner.put_back("a", behind, None)
+    for _ in range(15):
+        [(east, north, _)] = planner.propose(replace(situation(3000.0, place), constraints=constraints), rng).positions
+        place = (float(east), float(north))
+        if np.hypot(*(place - behind[0])) < 1.0:
+            break
+    assert place == pytest.approx(behind[0], abs=1.0)
