@@ -79,7 +79,7 @@ def test_misses_tell_where_predictions_are_farther_off_than_they_say() -> None:
 
 def test_wider_holes_leave_out_more_up_to_the_widest_allowed() -> None:
     east, north = np.meshgrid(np.arange(0.0, 60.0, 6.0), np.arange(60.0))
-    lines = Soundings(*(x.ravel() for x in (east, north, np.zeros_like(east))), np.full(east.size, 0.1))
+    lines = Soundings(east.ravel(), north.ravel(), np.zeros(east.size), np.full(east.size, 0.1))
     levels = two_levels(lines, 1.0, 3.0)
     rows = np.arange(0, levels.n_fine, 5)
 
