@@ -264,13 +264,7 @@ class GaussianProcessMap:
         )
         self.trend_ = best.trend
         if self._calibration is not None:
-            self._calibration = replace(
-                self._calibration,
-                misses=self.misses_,
-                log_scale=self.log_scale_,
-                log_scale_beyond=self.log_scale_beyond_,
-                noise_scale=self.hyperparameters_.noise_scale,
-            )
+            self._calibration = self._checked(self._calibration)
         self._reach: Reach | None = reach(self._levels, self._unit_m, self._factor) if self.calibrate else None
         return self
 
@@ -343,6 +337,16 @@ class GaussianProcessMap:
             log_scale = checked_log_scale(beyond, calibration.variance_factor(beyond.points_m))
             self.log_scale_beyond_ = max(self.log_scale_, log_scale)
             self._factor = self._checked_factor(calibration) if self.claims else UNCHECKED_FACTOR
+
+    def _checked(self, calibration: Calibration) -> Calibration:
+        """Return the calibration with what the checks found."""
+        return replace(
+            calibration,
+            misses=self.misses_,
+            log_scale=self.log_scale_,
+            log_scale_beyond=self.log_scale_beyond_,
+            noise_scale=self.hyperparameters_.noise_scale,
+        )
 
     def _learn_calibration(self, calibration: Calibration, held_out: HeldOut) -> None:
         """Learn from held-out soundings where the map misses by more than elsewhere, and by how much on the whole."""
