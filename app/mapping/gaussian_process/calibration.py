@@ -31,7 +31,7 @@ FINE_RELIEF = 0.25
 """Part of the noise beyond the stated one that is relief too fine to be resolved: no sounding errs by it, every cell
 does."""
 
-CELL_EXCESS = 0.08
+CELL_EXCESS = 0.1
 """Logarithm of how much farther off cells are than soundings held out: these lie where the survey went."""
 
 NEUTRAL_WEIGHT = 100.0
