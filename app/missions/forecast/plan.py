@@ -26,10 +26,10 @@ from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 from app.mapping.types import Grid
-from app.missions import safety
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
+    from_outside,
     make_constraints,
     make_planner,
     swath_sonar,
@@ -45,6 +45,7 @@ from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
+from app.missions.safety import free_space
 from app.missions.spec.mission import MissionSpec, PlannerSpec
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
@@ -150,7 +151,7 @@ def plan(
     depth_m = floor_depth_m or max(LEAST_GUESS_M, cruise_m + spec.limits.min_altitude_m + ROOM_M)
     constraints = make_constraints(spec)
     inner = Polygon(constraints.area)
-    begin_m = np.array([safety.nearest_inside(inner, start) for start in starts_m])
+    begin_m = np.array([free_space.nearest_inside(inner, start) for start in starts_m])
 
     def over() -> bool:
         return stop() or time.thread_time() > until
@@ -177,8 +178,16 @@ def plan(
         )
     else:
         routes, whole = _planned(spec, members, constraints, begin_m, depth_m, over)
+    ways_in_m = np.where(
+        [from_outside(start, inner, spec) for start in starts_m], np.hypot(*(begin_m - starts_m).T), 0.0
+    )
     ways = [
-        _way(spec, constraints, member, _cut(np.vstack([starts_m[i], begin_m[i], route]), member.way_left_m(spec)))
+        _way(
+            spec,
+            constraints,
+            member,
+            _cut(np.vstack([starts_m[i], begin_m[i], route]), ways_in_m[i] + member.way_left_m(spec)),
+        )
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
     return Plan(ways, whole, own, depth_m, all_swept)
