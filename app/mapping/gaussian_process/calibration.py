@@ -89,13 +89,16 @@ class Calibration:
         """Factor on the variance at ``points`` (m, 2) that steepness and misses nearby make: (m,)."""
         return np.asarray(np.exp(self.field.at(points)[0] + self.misses.at(points)[0]))
 
-    def deviation(self, grid: Grid, variance: FloatArray) -> FloatArray:
-        """Deviation in metres on ``grid``, where the process has ``variance``, both (rows, cols)."""
+    def deviations(self, grid: Grid, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deviation in metres on ``grid``, where the process has ``variance``, both (rows, cols).
+
+        The second is without the misses nearby: they change as soundings come in, and what is claimed must last.
+        """
         log_steepness, sounding_sd = self.field.over(grid)
         log_scale = self.log_scale_beyond + (self.log_scale - self.log_scale_beyond) * self.support.over(grid)[0]
-        log_factor = log_steepness + self.misses.over(grid)[0] + 2.0 * log_scale
-        own = COMMON_ERROR**2 + FINE_RELIEF * max(self.noise_scale - 1.0, 0.0)
-        return np.asarray(np.sqrt(variance * np.exp(log_factor) + own * sounding_sd**2))
+        even = variance * np.exp(log_steepness + 2.0 * log_scale)
+        own = (COMMON_ERROR**2 + FINE_RELIEF * max(self.noise_scale - 1.0, 0.0)) * sounding_sd**2
+        return np.sqrt(even * np.exp(self.misses.over(grid)[0]) + own), np.sqrt(even + own)
 
 
 def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArray, surrounded: Field) -> Calibration:

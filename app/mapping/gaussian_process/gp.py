@@ -336,7 +336,7 @@ class GaussianProcessMap:
             calibration = replace(self._calibration, misses=self.misses_)
             log_scale = checked_log_scale(beyond, calibration.variance_factor(beyond.points_m))
             self.log_scale_beyond_ = max(self.log_scale_, log_scale)
-            self._factor = self._checked_factor(calibration) if self.claims else UNCHECKED_FACTOR
+            self._factor = self._checked_factor(self._calibration) if self.claims else UNCHECKED_FACTOR
 
     def _checked(self, calibration: Calibration) -> Calibration:
         """Return the calibration with what the checks found."""
@@ -371,7 +371,7 @@ class GaussianProcessMap:
             strips = strip_neighbours(self._levels, rows, radius)
             enough = (strips >= 0).sum(axis=1) >= LEAST_IN_STRIP
             for held_out in (self._predicted(rows, holes), self._predicted(rows[enough], strips[enough])):
-                factor = calibration.variance_factor(held_out.points_m)
+                factor = calibration.steepness_factor(held_out.points_m)
                 square = likely_square(held_out, factor, self.log_scale_, 2.0 * radius)
                 squares += [] if square is None else [square]
         return likely_factor(squares)
@@ -402,14 +402,16 @@ class GaussianProcessMap:
             raise ValueError(f"mask has shape {wanted.shape}; the grid has {shape}")
         neighbours = self.neighbours or (NEIGHBOURS_OF_SMALL_GRIDS if _small(grid) else NEIGHBOURS_OF_LARGE_GRIDS)
         depth, variance = self._predict(grid, wanted, neighbours)
-        deviation = np.sqrt(variance) if self._calibration is None else self._calibration.deviation(grid, variance)
+        deviation = even = np.sqrt(variance)
+        if self._calibration is not None:
+            deviation, even = self._calibration.deviations(grid, variance)
         process_sd, bound = None, None
         if self._reach is not None:
             distance = nearest(self._levels.fine_tree, grid.centres_m, 1)[0].reshape(shape)
             depth, moved = self._reach.plausible(depth, distance, grid.cell_m)
             deviation = np.hypot(deviation, moved)
             process_sd = deviation
-            bound = self._reach.bound(deviation, distance, grid.cell_m)
+            bound = self._reach.bound(np.hypot(even, moved), distance, grid.cell_m)
             deviation = self._reach.deviation(deviation, distance)
         if not self.claims:
             bound = np.full(shape, np.inf)

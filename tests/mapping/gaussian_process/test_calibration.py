@@ -54,7 +54,9 @@ def test_each_place_has_the_factor_of_where_it_is() -> None:
     calibration = Calibration(
         NEUTRAL.field, Field(COARSE, support), Field(COARSE, near), log_scale=np.log(2.0), log_scale_beyond=np.log(3.0)
     )
-    np.testing.assert_allclose(calibration.deviation(COARSE, np.ones((4, 4))), np.tile([2.0, 4.0, 3.0, 6.0], (4, 1)))
+    deviation, even = calibration.deviations(COARSE, np.ones((4, 4)))
+    np.testing.assert_allclose(deviation, np.tile([2.0, 4.0, 3.0, 6.0], (4, 1)))
+    np.testing.assert_allclose(even, np.tile([2.0, 2.0, 3.0, 3.0], (4, 1)))
     np.testing.assert_allclose(calibration.variance_factor(np.array([[5.0, 5.0], [15.0, 5.0]])), [1.0, 4.0])
 
 
@@ -62,7 +64,7 @@ def test_noise_beyond_the_stated_one_is_partly_relief_that_every_cell_has() -> N
     soundings_sd = np.concatenate([np.zeros((1, 4, 4)), np.full((1, 4, 4), 0.2)])
     told = replace(NEUTRAL, field=Field(COARSE, soundings_sd))
     nothing = np.zeros((4, 4))
-    as_told, less, more = (replace(told, noise_scale=x).deviation(COARSE, nothing) for x in (1.0, 0.5, 5.0))
+    as_told, less, more = (replace(told, noise_scale=x).deviations(COARSE, nothing)[0] for x in (1.0, 0.5, 5.0))
     np.testing.assert_array_equal(as_told, less)
     np.testing.assert_allclose(more**2 - as_told**2, FINE_RELIEF * 4.0 * 0.2**2)
 
