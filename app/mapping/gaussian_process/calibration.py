@@ -9,9 +9,11 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
 from app.arrays import FloatArray, IntArray
+from app.mapping.gaussian_process.roughness import SCORE_RANGE, HoleErrors
 from app.mapping.kriging.fields import Field
 from app.mapping.kriging.kernels import KERNEL_CODES
 from app.mapping.kriging.kriging import Conditioned, krige_holes
+from app.mapping.kriging.levels import TwoLevels
 from app.mapping.kriging.neighbours import nearest
 from app.mapping.types import Grid
 
@@ -21,15 +23,30 @@ STEEPNESS_EXPONENT = 0.25
 STEEPNESS_FLOOR = 0.1
 """Of the mean squared slope, added to the local one."""
 
-COMMON_ERROR = 0.12
-"""Part of a sounding's standard deviation that its neighbours share (tide, sound speed, relief too fine to be
-resolved), so that it does not average out."""
+COMMON_ERROR = 0.06
+"""Part of a sounding's standard deviation that its neighbours share, so that it does not average out. What all
+soundings of a survey share (tide, sound speed) is counted where the map is used."""
 
-CELL_EXCESS = 0.05
+FINE_RELIEF = 0.25
+"""Part of the noise beyond the stated one that is relief too fine to be resolved: no sounding errs by it, every cell
+does."""
+
+CELL_EXCESS = 0.1
 """Logarithm of how much farther off cells are than soundings held out: these lie where the survey went."""
 
 NEUTRAL_WEIGHT = 100.0
 """The factor on deviations starts from 1 as if so many held-out soundings had asked for that."""
+
+WIDER = 3.0
+"""Deviations are checked across the survey's gaps, and across holes so many times as wide: along a line a hole as wide
+as the gap beside it tells little of what lies between the lines."""
+
+APART_UNITS = 2.0
+"""Squares of single soundings; misses nearer than that to a held-out sounding are not counted for it, since they are
+its own."""
+
+MISSES_RANGE = (0.2, 5.0)
+"""Of the factor on the variance that misses nearby make."""
 
 PROBABILITIES = (0.68, 0.95)
 SCALE_RANGE = (0.2, 5.0)
@@ -46,31 +63,46 @@ class Calibration:
     ----------
     field
         Two quantities: the logarithm of the factor on the variance, high where the sea floor is steep, about 0 on
-        average; and the error in metres that does not average out.
+        average; and the deviation in metres of the nearest sounding.
     support
         How far soundings surround places, see :mod:`app.mapping.gaussian_process.support`.
+    misses
+        Logarithm of the factor on the variance that soundings held out near a place make; 0 on average.
     log_scale, log_scale_beyond
         Logarithm of the factor on the deviation where soundings surround a place, and where they do not.
+    noise_scale
+        Factor on the stated variance of soundings that the process found.
     """
 
     field: Field
     support: Field
-    log_scale: float
-    log_scale_beyond: float
+    misses: Field
+    log_scale: float = 0.0
+    log_scale_beyond: float = 0.0
+    noise_scale: float = 1.0
 
     def steepness_factor(self, points: FloatArray) -> FloatArray:
         """Factor on the variance at ``points`` (m, 2) that steepness makes: (m,)."""
         return np.asarray(np.exp(self.field.at(points)[0]))
 
-    def deviation(self, grid: Grid, variance: FloatArray) -> FloatArray:
-        """Deviation in metres on ``grid``, where the process has ``variance``, both (rows, cols)."""
-        log_steepness, common = self.field.over(grid)
+    def variance_factor(self, points: FloatArray) -> FloatArray:
+        """Factor on the variance at ``points`` (m, 2) that steepness and misses nearby make: (m,)."""
+        return np.asarray(np.exp(self.field.at(points)[0] + self.misses.at(points)[0]))
+
+    def deviations(self, grid: Grid, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deviation in metres on ``grid``, where the process has ``variance``, both (rows, cols).
+
+        The second is without the misses nearby: they change as soundings come in, and what is claimed must last.
+        """
+        log_steepness, sounding_sd = self.field.over(grid)
         log_scale = self.log_scale_beyond + (self.log_scale - self.log_scale_beyond) * self.support.over(grid)[0]
-        return np.asarray(np.sqrt(variance * np.exp(log_steepness + 2.0 * log_scale) + common**2))
+        even = variance * np.exp(log_steepness + 2.0 * log_scale)
+        own = (COMMON_ERROR**2 + FINE_RELIEF * max(self.noise_scale - 1.0, 0.0)) * sounding_sd**2
+        return np.sqrt(even * np.exp(self.misses.over(grid)[0]) + own), np.sqrt(even + own)
 
 
 def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArray, surrounded: Field) -> Calibration:
-    """Return the calibration before any check: steep places and common errors.
+    """Return the calibration before any check: steep places and the soundings' deviations.
 
     Parameters
     ----------
@@ -79,7 +111,7 @@ def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArr
     tree
         Positions of the soundings.
     sd_m : (n,)
-        Their stated deviations, which tell the common error.
+        Their stated deviations.
     surrounded
         How far soundings surround places.
     """
@@ -88,8 +120,9 @@ def uncalibrated(grid: Grid, relief_m: FloatArray, tree: cKDTree, sd_m: FloatArr
     typical = float(square.mean()) + 1e-30
     _, closest = nearest(tree, grid.centres_m, 1)
     relative = (square + STEEPNESS_FLOOR * typical) / (typical * (1.0 + STEEPNESS_FLOOR))
-    common = COMMON_ERROR * sd_m[closest[:, 0]].reshape(grid.rows, grid.cols)
-    return Calibration(Field(grid, np.array([STEEPNESS_EXPONENT * np.log(relative), common])), surrounded, 0.0, 0.0)
+    sounding_sd = sd_m[closest[:, 0]].reshape(grid.rows, grid.cols)
+    field = Field(grid, np.array([STEEPNESS_EXPONENT * np.log(relative), sounding_sd]))
+    return Calibration(field, surrounded, Field(grid, np.zeros((1, grid.rows, grid.cols))))
 
 
 @dataclass(frozen=True)
@@ -119,12 +152,14 @@ def gaps(tree: cKDTree) -> FloatArray:
     return nearest(tree, np.column_stack([east.ravel(), north.ravel()]), 1)[0][:, 0]
 
 
-def hold_out(process: Conditioned, rows: IntArray, neighbours: tuple[int, int]) -> HeldOut:
-    """Predict the fine soundings ``rows`` across holes as wide as the survey's gaps."""
-    radius = np.maximum(np.quantile(gaps(process.levels.fine_tree), _evenly(len(rows))), 1e-6)
-    return predicted_without(
-        process, rows, process.levels.neighbours_beyond(process.levels.points[rows], radius, *neighbours)
-    )
+def across_gaps(levels: TwoLevels, rows: IntArray, neighbours: tuple[int, int], widened_to_m: float = 0.0) -> IntArray:
+    """Choose neighbours of the fine soundings ``rows`` across holes as wide as the survey's gaps: (h, k), -1 for none.
+
+    With ``widened_to_m`` the holes are ``WIDER`` times as wide, as far as that makes none wider than this.
+    """
+    gap = np.quantile(gaps(levels.fine_tree), _evenly(len(rows)))
+    radius = np.maximum(gap, np.minimum(WIDER * gap, widened_to_m))
+    return levels.neighbours_beyond(levels.points[rows], np.maximum(radius, 1e-6), *neighbours)
 
 
 def hold_out_beyond(process: Conditioned, rows: IntArray, neighbours: tuple[int, int], farthest_m: float) -> HeldOut:
@@ -161,6 +196,26 @@ def predicted_without(process: Conditioned, rows: IntArray, neighbours: IntArray
     return HeldOut(points[rows[known]], error[known], own[known], (noise_part + model_part - own)[known])
 
 
+def together(one: HeldOut, other: HeldOut) -> HeldOut:
+    """Return the predictions of both."""
+    return HeldOut(
+        *(
+            np.concatenate([getattr(one, name), getattr(other, name)])
+            for name in ("points_m", "error_m", "own_variance", "map_variance")
+        )
+    )
+
+
+def misses(held_out: HeldOut, factor: FloatArray) -> HoleErrors:
+    """Return how predictions miss place by place, where the process has ``factor`` (h,) times its variance."""
+    variance = held_out.map_variance * factor
+    return HoleErrors(
+        points_m=held_out.points_m,
+        score=np.clip((held_out.error_m**2 - held_out.own_variance) / variance, *SCORE_RANGE),
+        weight=(variance / (variance + held_out.own_variance)) ** 2,
+    )
+
+
 def error_ratio(refined: HeldOut, plain: HeldOut) -> float:
     """Root mean square error of one process over another's on the same soundings; 1 where there are none."""
     expected = plain.own_variance + plain.map_variance
@@ -180,15 +235,15 @@ def mixed(refined: HeldOut, plain: HeldOut, weight: float) -> HeldOut:
     )
 
 
-def checked_log_scale(calibration: Calibration, held_out: HeldOut) -> float:
-    """Find the logarithm of the factor on deviations.
+def checked_log_scale(held_out: HeldOut, factor: FloatArray) -> float:
+    """Find the logarithm of the factor on deviations where the process has ``factor`` (h,) times its variance.
 
     With it 68 and 95 % of the held-out soundings lie within their intervals, on average of the two. Soundings
     whose own error hides the map's count little; the fewer tell, the closer the answer to ``CELL_EXCESS``.
     """
     if len(held_out.error_m) == 0:
         return CELL_EXCESS
-    variance = held_out.map_variance * calibration.steepness_factor(held_out.points_m)
+    variance = held_out.map_variance * factor
     weight = (variance / (variance + held_out.own_variance)) ** 2
     total = float(weight.sum())
     found = [

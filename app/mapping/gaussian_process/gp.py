@@ -11,14 +11,18 @@ import numpy as np
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.gaussian import GaussianInterpolator
 from app.mapping.gaussian_process.calibration import (
+    APART_UNITS,
+    MISSES_RANGE,
     Calibration,
     HeldOut,
+    across_gaps,
     checked_log_scale,
     error_ratio,
-    hold_out,
     hold_out_beyond,
+    misses,
     mixed,
     predicted_without,
+    together,
     uncalibrated,
 )
 from app.mapping.gaussian_process.learning import ROUGHEST, choose_kernel, conditioned, lengthen, likelihood_of
@@ -56,6 +60,7 @@ REACH_UNITS = 10.0  # how far roughness is carried where nothing was sounded
 RELIEF_UNITS = 3.125  # cell of the coarse map that shows grain and edges
 MOST_RELIEF_CELLS = 256
 MOST_RATIO_CELLS = 128
+MISSES_CELLS = 16  # along the longer side; as many as the checked soundings can tell apart
 
 LEAST_HOLES, MOST_HOLES, SOUNDINGS_PER_HOLE = 800, 4000, 10
 CHECK_POINTS = 800
@@ -253,16 +258,14 @@ class GaussianProcessMap:
             self._calibration = uncalibrated(*relief, self._levels.fine_tree, self._levels.fine.sd_m, self._support)
         if learn:
             self._check()
-        if self._calibration is not None:
-            self._calibration = replace(
-                self._calibration, log_scale=self.log_scale_, log_scale_beyond=self.log_scale_beyond_
-            )
-        self._reach: Reach | None = reach(self._levels, self._unit_m, self._factor) if self.calibrate else None
         best = self._refined if self._refined is not None and self.refinement_ >= 0.5 else self._plain
         self.hyperparameters_ = (
             self._refined_hyperparameters if best is self._refined else self.stationary_hyperparameters_
         )
         self.trend_ = best.trend
+        if self._calibration is not None:
+            self._calibration = self._checked(self._calibration)
+        self._reach: Reach | None = reach(self._levels, self._unit_m, self._factor) if self.calibrate else None
         return self
 
     def learned(self) -> Self:
@@ -317,22 +320,46 @@ class GaussianProcessMap:
         return Field(grid, local_ratio(errors, grid.centres_m, reach).reshape(1, grid.rows, grid.cols))
 
     def _check(self) -> None:
-        """Hold soundings out: how far to trust the nonstationary process, and the factor on deviations."""
+        """Hold soundings out: how far to trust the nonstationary process, and the factors on deviations."""
         n = self._levels.n_fine
         rows = np.unique(np.linspace(0, n - 1, min(n, CHECK_POINTS)).astype(np.int64))
-        held_out = hold_out(self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS)
+        near = across_gaps(self._levels, rows, NEIGHBOURS_OF_LARGE_GRIDS)
+        held_out = predicted_without(self._plain, rows, near)
         if self._refined is not None:
-            refined = hold_out(self._refined, rows, NEIGHBOURS_OF_LARGE_GRIDS)
+            refined = predicted_without(self._refined, rows, near)
             gain = 1.0 - error_ratio(refined, held_out)
             self.refinement_ = float(np.clip(gain / FULL_TRUST_GAIN, 0.0, 1.0))
             held_out = mixed(refined, held_out, self.refinement_)
         if self._calibration is not None:
-            self.log_scale_ = checked_log_scale(self._calibration, held_out)
-            beyond = hold_out_beyond(
-                self._rough or self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS, BEYOND_UNITS * self._unit_m
-            )
-            self.log_scale_beyond_ = max(self.log_scale_, checked_log_scale(self._calibration, beyond))
+            farthest = BEYOND_UNITS * self._unit_m
+            wide = across_gaps(self._levels, rows, NEIGHBOURS_OF_LARGE_GRIDS, farthest)
+            self._learn_calibration(self._calibration, together(held_out, self._predicted(rows, wide)))
+            beyond = hold_out_beyond(self._rough or self._plain, rows, NEIGHBOURS_OF_LARGE_GRIDS, farthest)
+            calibration = replace(self._calibration, misses=self.misses_)
+            log_scale = checked_log_scale(beyond, calibration.variance_factor(beyond.points_m))
+            self.log_scale_beyond_ = max(self.log_scale_, log_scale)
             self._factor = self._checked_factor(self._calibration) if self.claims else UNCHECKED_FACTOR
+
+    def _checked(self, calibration: Calibration) -> Calibration:
+        """Return the calibration with what the checks found."""
+        return replace(
+            calibration,
+            misses=self.misses_,
+            log_scale=self.log_scale_,
+            log_scale_beyond=self.log_scale_beyond_,
+            noise_scale=self.hyperparameters_.noise_scale,
+        )
+
+    def _learn_calibration(self, calibration: Calibration, held_out: HeldOut) -> None:
+        """Learn from held-out soundings where the map misses by more than elsewhere, and by how much on the whole."""
+        steepness = calibration.steepness_factor(held_out.points_m)
+        found, reach = misses(held_out, steepness), REACH_UNITS * self._unit_m
+        low, high = self._levels.fine_tree.mins, self._levels.fine_tree.maxes
+        grid = coarse_grid(low, high, max(float((high - low).max()), 1e-3) / MISSES_CELLS)
+        ratio = np.clip(local_ratio(found, grid.centres_m, reach), *MISSES_RANGE)
+        self.misses_ = Field(grid, np.log(ratio).reshape(1, grid.rows, grid.cols))
+        of_others = local_ratio(found, held_out.points_m, reach, APART_UNITS * self._unit_m)
+        self.log_scale_ = checked_log_scale(held_out, steepness * np.clip(of_others, *MISSES_RANGE))
 
     def _checked_factor(self, calibration: Calibration) -> float:
         """Hold soundings out over longer and longer distances: which factor on the deviation that leaves possible."""
@@ -346,8 +373,8 @@ class GaussianProcessMap:
             strips = strip_neighbours(self._levels, rows, radius)
             enough = (strips >= 0).sum(axis=1) >= LEAST_IN_STRIP
             for held_out in (self._predicted(rows, holes), self._predicted(rows[enough], strips[enough])):
-                steepness = calibration.steepness_factor(held_out.points_m)
-                square = likely_square(held_out, steepness, self.log_scale_, 2.0 * radius)
+                factor = calibration.steepness_factor(held_out.points_m)
+                square = likely_square(held_out, factor, self.log_scale_, 2.0 * radius)
                 squares += [] if square is None else [square]
         return likely_factor(squares)
 
@@ -377,14 +404,16 @@ class GaussianProcessMap:
             raise ValueError(f"mask has shape {wanted.shape}; the grid has {shape}")
         neighbours = self.neighbours or (NEIGHBOURS_OF_SMALL_GRIDS if _small(grid) else NEIGHBOURS_OF_LARGE_GRIDS)
         depth, variance = self._predict(grid, wanted, neighbours)
-        deviation = np.sqrt(variance) if self._calibration is None else self._calibration.deviation(grid, variance)
+        deviation = even = np.sqrt(variance)
+        if self._calibration is not None:
+            deviation, even = self._calibration.deviations(grid, variance)
         process_sd, bound = None, None
         if self._reach is not None:
             distance = nearest(self._levels.fine_tree, grid.centres_m, 1)[0].reshape(shape)
             depth, moved = self._reach.plausible(depth, distance, grid.cell_m)
             deviation = np.hypot(deviation, moved)
             process_sd = deviation
-            bound = self._reach.bound(deviation, distance, grid.cell_m)
+            bound = self._reach.bound(np.hypot(even, moved), distance, grid.cell_m)
             deviation = self._reach.deviation(deviation, distance)
         if not self.claims:
             bound = np.full(shape, np.inf)

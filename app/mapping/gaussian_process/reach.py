@@ -224,12 +224,12 @@ def strip_neighbours(levels: TwoLevels, rows: IntArray, half_width_m: float) -> 
     return found
 
 
-def likely_square(held_out: HeldOut, steepness: FloatArray, log_scale: float, side_m: float) -> float | None:
+def likely_square(held_out: HeldOut, factor: FloatArray, log_scale: float, side_m: float) -> float | None:
     """Return how large the mean square of errors over their deviations may be; None where too few soundings tell.
 
     Parameters
     ----------
-    steepness : (h,)
+    factor : (h,)
         Factor on the variance that the calibration gives these places.
     log_scale
         Of the calibration.
@@ -238,7 +238,7 @@ def likely_square(held_out: HeldOut, steepness: FloatArray, log_scale: float, si
     """
     if len(held_out.error_m) == 0:
         return None
-    variance = held_out.own_variance + held_out.map_variance * steepness * np.exp(2.0 * log_scale)
+    variance = held_out.own_variance + held_out.map_variance * factor * np.exp(2.0 * log_scale)
     score = held_out.error_m**2 / variance
     _, group = np.unique(_squares(held_out.points_m, side_m), axis=0, return_inverse=True)
     mean = np.bincount(group.ravel(), score) / np.bincount(group.ravel())

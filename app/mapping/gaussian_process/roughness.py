@@ -105,18 +105,18 @@ def hole_errors(
     )
 
 
-def local_ratio(errors: HoleErrors, at: FloatArray, reach_m: float) -> FloatArray:
+def local_ratio(errors: HoleErrors, at: FloatArray, reach_m: float, apart_m: float = 0.0) -> FloatArray:
     """Smooth the scores at the positions ``at`` (m, 2), relative to the whole area: (m,), about 1 on average.
 
     A mean of the nearest scores with Gaussian weights, shrunk towards the mean of all scores as if
     ``PRIOR_WEIGHT`` further soundings had scored that. Beyond ``reach_m`` soundings say little, so the ratio
-    returns to 1 where there are none.
+    returns to 1 where there are none. Those nearer than ``apart_m`` say nothing.
     """
     if len(errors.score) == 0:
         return np.ones(len(at))
     typical = max(float(np.average(errors.score, weights=errors.weight)), TYPICAL_FLOOR)
     distance, index = nearest(cKDTree(errors.points_m), at, SMOOTHING_NEIGHBOURS)
     bandwidth = np.clip(SMOOTHING_BANDWIDTH * distance[:, -1:], 1e-9, reach_m)
-    weight = errors.weight[index] * np.exp(-0.5 * (distance / bandwidth) ** 2)
+    weight = errors.weight[index] * np.exp(-0.5 * (distance / bandwidth) ** 2) * (distance >= apart_m)
     total = PRIOR_WEIGHT * typical + (weight * errors.score[index]).sum(axis=1)
     return np.asarray(np.clip(total / (PRIOR_WEIGHT + weight.sum(axis=1)) / typical, *RATIO_RANGE))
