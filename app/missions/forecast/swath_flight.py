@@ -1,8 +1,8 @@
 """A survey with swath sonars flown ahead: its own planner, turning circles, and pings over a floor that is guessed.
 
 Lines follow from what was sounded on the lines before, so what a survey takes depends on how deep its floor is, and how
-rough. A vehicle turns in its circle until it heads for the end of its leg, sounds all the way, and the next leg is
-decided a little before it is there, as at sea.
+rough. A vehicle sounds all the way, its turns too, and the next leg is decided a little before it is at the end of its
+leg, as at sea.
 """
 
 import math
@@ -15,19 +15,17 @@ from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
-from app.exploration.motion.dubins import TURN, Way, poses_along
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
     make_constraints,
-    make_planner,
     swath_sonar,
     swath_task,
 )
 from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M
 from app.missions.forecast.floor import Floor
-from app.missions.forecast.swarm import Flown, Swarm, WholeSurvey
+from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
@@ -92,10 +90,8 @@ class SwathFlight:
     Parameters
     ----------
     starts_m : (vehicles, 2)
-    prior
-        Imported soundings, shape (n, 4).
-    first_step
-        The first one that is still to be flown.
+    so_far
+        What was done of it; of its own soundings one in each cell that is ensonified.
     """
 
     def __init__(
@@ -104,23 +100,27 @@ class SwathFlight:
         spec: MissionSpec,
         members: list[Member],
         starts_m: FloatArray,
-        prior: FloatArray,
-        first_step: int,
+        so_far: SoFar,
     ) -> None:
         self._terrain, self._spec, self._members = floor.terrain, spec, members
         cell_m = swath_cell_m(spec, members, floor.terrain)
         self.builder = MapBuilder(spec.local_area(), cell_m, spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth)
-        self.builder.arrivals.replace(np.zeros((0, 4)), prior)
+        self.builder.arrivals.replace(np.zeros((0, 4)), so_far.prior)
+        if len(so_far.soundings):
+            self.builder.swath.add_placed(*so_far.soundings.T)
         self.builder.build()
         self._cell_m = cell_m
-        self._constraints, self._planner = make_constraints(spec), make_planner(spec)
-        self.swarm = Swarm(spec, members, starts_m, first_step)
+        self._constraints, self._planner = make_constraints(spec), planner_of(spec, so_far)
+        self.swarm = Swarm(spec, members, starts_m, so_far.first_step)
         self._crafts = [
             Craft(swath_sonar(member.spec), [start], [0.0])
             for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
         ]
         self._rng = np.random.default_rng([spec.seed, 1])
         self._specs = [member.spec for member in members]
+        for i in range(len(members)):
+            for end in self.swarm.legs_ahead(i):
+                self._fly_to(i, end, ahead=True)
 
     @property
     def ways_m(self) -> list[FloatArray]:
@@ -172,22 +172,16 @@ class SwathFlight:
         craft.idle = 0
         self._fly_to(i, legs[0].target_m)
 
-    def _fly_to(self, i: int, end: FloatArray) -> None:
+    def _fly_to(self, i: int, end: FloatArray, *, ahead: bool = False) -> None:
         swarm, craft = self.swarm, self._crafts[i]
+        self._take_in(craft)
+        flown = swarm.fly(i, end, ahead=ahead)
         speed_mps = self._spec.speed_of(self._members[i].spec)
-        radius_m = max(swarm.radius_m(i), 0.5)
-        pose = np.array([*swarm.here[i, :2], swarm.heading_rad[i]])
-        way = turn_and_on(pose, end[:2], radius_m)
-        if math.isnan(pose[2]):
-            pose[2] = math.atan2(*(end[:2] - pose[:2]))
         spacing_m = max(speed_mps / craft.sonar.rate_hz if craft.sonar else 0.0, self._cell_m / BEAMS_A_CELL)
-        at = np.append(np.arange(spacing_m, way.length_m, spacing_m), way.length_m)
-        poses = poses_along(pose, way, radius_m, at)
-        flown = np.column_stack([poses, np.full(len(poses), end[2])])
+        pinged = poses_apart(flown, spacing_m)
         late = max(1, math.ceil(LEAD_S * speed_mps / spacing_m))
-        craft.unseen = flown[-late:]
-        self._ping(craft, flown[:-late])
-        swarm.flew(i, end, float(poses[-1, 2]), way.length_m)
+        craft.unseen = pinged[-late:]
+        self._ping(craft, pinged[:-late])
         craft.corners_m.append(np.array(end[:2]))
         craft.clock_s.append(float(swarm.clock_s[i]))
 
@@ -206,36 +200,6 @@ class SwathFlight:
         east, north, depth, sd = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
         sd = np.maximum(self._spec.sounding_noise * sd, LEAST_SD_M)
         self.builder.swath.add_placed(east, north, depth + sd * self._rng.standard_normal(len(sd)), sd)
-
-
-def turn_and_on(pose: FloatArray, place_m: FloatArray, radius_m: float) -> Way:
-    """Return the shortest way from a pose (3,) to a place (2,): along a turning circle, then straight.
-
-    A pose without a heading (NaN) may begin in any.
-    """
-    away = place_m - pose[:2]
-    if math.isnan(pose[2]):
-        return Way("LSL", np.array([0.0, float(np.hypot(*away)), 0.0]))
-    best: Way | None = None
-    for word in ("LSL", "RSR"):
-        side = TURN[word[0]]
-        to_middle = side * radius_m * np.array([math.cos(pose[2]), -math.sin(pose[2])])
-        off = away - to_middle
-        off_m = float(np.hypot(*off))
-        if off_m < radius_m:
-            continue  # inside of this circle: the other one leads there
-        straight_m = math.sqrt(max(off_m**2 - radius_m**2, 0.0))
-        # Where the tangent from the place leaves the circle it heads for the place.
-        leaves_rad = math.atan2(off[0], off[1]) + side * math.asin(min(radius_m / off_m, 1.0))
-        turn_rad = (side * (leaves_rad - pose[2])) % math.tau
-        if turn_rad > math.tau - 1e-6:
-            turn_rad = 0.0
-        way = Way(word, np.array([radius_m * turn_rad, straight_m, 0.0]))
-        if best is None or way.length_m < best.length_m:
-            best = way
-    if best is None:
-        raise ValueError(f"no turn of {radius_m} m leads from {pose} to {place_m}")
-    return best
 
 
 def swath_of(
@@ -266,8 +230,7 @@ def sweep_over(
     spec: MissionSpec,
     members: list[Member],
     starts_m: FloatArray,
-    prior: FloatArray,
-    first_step: int,
+    so_far: SoFar,
     budget_s: float,
     stop: Callable[[], bool] = lambda: False,
 ) -> Flown:
@@ -280,10 +243,10 @@ def sweep_over(
     def over() -> bool:
         return stop() or time.thread_time() > until
 
-    flight = SwathFlight(floor, spec, members, starts_m, prior, first_step)
+    flight = SwathFlight(floor, spec, members, starts_m, so_far)
     swarm, builder = flight.swarm, flight.builder
     ended = flight.fly(over)
-    steps = max(spec.steps - first_step + 1, 0)
+    steps = max(spec.steps - so_far.first_step + 1, 0)
     newest = builder.newest
     done_pct = builder.coverage_pct()
     left_m = swarm.left_m.copy()
@@ -298,7 +261,7 @@ def sweep_over(
         coverage_pct=done_pct if ended else min(done_pct * whole, 100.0),
         remaining_pct=builder.remaining_pct() if ended else max(100.0 - done_pct * whole, 0.0),
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
-        steps=steps if ended else max(int(swarm.legs.max()) - first_step + 1, 0),
+        steps=steps if ended else max(int(swarm.legs.max()) - so_far.first_step + 1, 0),
     )
     swarm.left_m[:] = math.inf
     all_seen = ended and flight.fly(over)

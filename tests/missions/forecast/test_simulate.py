@@ -11,7 +11,7 @@ from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.simulate import Forecast, forecast
-from app.missions.forecast.swarm import Flown
+from app.missions.forecast.swarm import Flown, SoFar
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
@@ -93,7 +93,7 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     starts, _ = request.starts_of(spec, members)
-    found = forecast(spec, members, starts, NONE, budget_s=0.0)
+    found = forecast(spec, members, starts, SoFar(), budget_s=0.0)
     assert found.steps_flown == 1
     view = request._view(spec, found, "", 8)
     # Drawn out: as if every step were as long as the first.
@@ -109,7 +109,7 @@ def test_without_patience_one_floor_is_flown_and_that_is_said() -> None:
     team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     starts, _ = request.starts_of(spec, members)
-    found = forecast(spec, members, starts, NONE, budget_s=0.0, patience_s=0.0)
+    found = forecast(spec, members, starts, SoFar(), budget_s=0.0, patience_s=0.0)
     assert (len(found.flights), len(found.floors)) == (1, 1)
     view = request._view(spec, found, "", 8)
     assert view.floors == 1
