@@ -7,8 +7,13 @@ import numpy as np
 from app.missions.views.base import View
 
 LOW, HIGH = 0.1, 0.9
-LEAST_FLOORS = 9
-"""Of fewer floors one in five missions lies beyond the lowest and the highest figure at least: nothing is wider."""
+
+WAY_SD = 0.02
+"""Standard deviation, as a share, of how much longer or shorter ways come out than they are flown ahead: vehicles wait
+for others, turn wider and drift."""
+
+DRAWS = (0.0, 0.67, -0.67, -1.38, 0.21, -0.21, 1.38, 0.43, -0.43, 0.97, -0.97)
+"""Eleven evenly likely draws of a normal figure, in an order that follows no other."""
 
 
 class ForecastRange(View):
@@ -26,3 +31,8 @@ def range_of(values: Sequence[float]) -> ForecastRange:
     """
     low, high = (float(x) for x in np.quantile(values, [LOW, HIGH], method="weibull"))
     return ForecastRange(low=low, high=high)
+
+
+def with_unforeseen(values: Sequence[float]) -> list[float]:
+    """Return ways, or times, of flights ahead with what they do not know of."""
+    return [value * (1.0 + WAY_SD * DRAWS[k % len(DRAWS)]) for k, value in enumerate(values)]

@@ -16,7 +16,7 @@ from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
 from app.missions.flight.decisions.decision import make_constraints
-from app.missions.forecast.ranges import ForecastRange, range_of
+from app.missions.forecast.ranges import ForecastRange, range_of, with_unforeseen
 from app.missions.forecast.simulate import Forecast, floors_under, fly_over, forecast
 from app.missions.forecast.swarm import SoFar
 from app.missions.forecast.swath_flight import sweeps
@@ -279,9 +279,11 @@ def _view(
         )
 
     sds = [flight.mean_sd_m for flight in flights if flight.mean_sd_m is not None]
-    durations = [flight.duration_s for flight in flights]
+    durations = with_unforeseen([flight.duration_s for flight in flights])
     coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
-    ways = {name: [flight.distances_m[name] for flight in flights] for name in flights[0].distances_m}
+    ways = {
+        name: with_unforeseen([flight.distances_m[name] for flight in flights]) for name in flights[0].distances_m
+    }
     return ForecastView(
         duration_s=_median(durations),
         duration_s_range=range_of(durations),

@@ -24,7 +24,7 @@ STEPS_OF_RADIUS = 4.0
 PASSED_WITHIN_M = 8.0
 """Who passes the end of its leg at most this far to the side has come there, as at sea."""
 
-REACTS_S, LEAST_ARRIVAL_M = 1.0, 0.5
+REACTS_S, LEAST_ARRIVAL_M = 0.25, 0.5
 """So long after it has arrived a vehicle begins to turn to its next leg; it arrives within so many metres all the same."""
 
 STILL_S = 1.0
@@ -110,7 +110,7 @@ class Flown:
 
 @dataclass(frozen=True)
 class StepFlown:
-    """How far vehicles have come after a step: metres each, (vehicles,), and the vehicles' seconds."""
+    """How far vehicles have come when the last of them ends a step: metres each, (vehicles,), and their seconds."""
 
     step: int
     distance_m: FloatArray
@@ -153,7 +153,12 @@ class Swarm:
     def flown(self, step: int) -> StepFlown:
         """Return how far they have come after a step."""
         left_m, seconds = float(self.left_m.sum()), float(self.clock_s.max())
-        return StepFlown(step, self.distance_m.copy(), seconds, left_m, self.here[:, :2].copy())
+        return StepFlown(step, self.circled_m(self.clock_s), seconds, left_m, self.here[:, :2].copy())
+
+    def circled_m(self, ended_s: FloatArray) -> FloatArray:
+        """Return how far each comes, (vehicles,), that goes on in circles from when it ended until the last one has."""
+        way_m: FloatArray = self.distance_m + (ended_s.max() - ended_s) * self._speed_mps
+        return way_m
 
     def due(self, *, apart: bool) -> BoolArray:
         """Return who gets the next leg, (n,): all together, or who ends its last one first, with those right after."""

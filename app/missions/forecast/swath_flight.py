@@ -44,11 +44,11 @@ BEAMS_A_CELL, REACHES = 2.0, 3
 """Beams and pings lie so close together, and where a beam meets the bottom is found in so many steps."""
 
 LEAST_SD_M = 0.01
-IDLE_S = 20.0
+IDLE_S = 10.0
 """A vehicle without a line is looked at again after so long: others may have missed something."""
 
-MOST_IDLE = 3
-"""Who was so often in a row without a line, with all that was sounded known, is done."""
+MOST_IDLE = 2
+"""Who was so often in a row without a line, while nobody flew one, is done."""
 
 
 def sweeps(spec: MissionSpec) -> bool:
@@ -132,6 +132,11 @@ class SwathFlight:
         """When each was there, (k,) seconds each."""
         return [np.array(craft.clock_s) for craft in self._crafts]
 
+    @property
+    def circled_m(self) -> FloatArray:
+        """How far each has come, (vehicles,), if it goes on in circles until the last one is done, as at sea."""
+        return self.swarm.circled_m(np.array([clock_s[-1] for clock_s in self.clocks_s]))
+
     def fly(self, over: Callable[[], bool]) -> bool:
         """Fly until nobody has way left or anything to do; return whether that was so before ``over`` was."""
         for craft in self._crafts:
@@ -169,7 +174,8 @@ class SwathFlight:
             craft.idle += 1
             swarm.clock_s[i] += IDLE_S
             return
-        craft.idle = 0
+        for other in self._crafts:
+            other.idle = 0
         self._fly_to(i, legs[0].target_m)
 
     def _fly_to(self, i: int, end: FloatArray, *, ahead: bool = False) -> None:
@@ -257,7 +263,7 @@ def sweep_over(
         whole = min(1.0 + float(left_m.sum()) / max(goes, 1.0), 100.0 / max(done_pct, 1.0))
     flown = Flown(
         duration_s=max(float(clock[-1]) for clock in flight.clocks_s) * whole,
-        distances_m={member.name: float(swarm.distance_m[i]) * whole for i, member in enumerate(members)},
+        distances_m={member.name: float(way_m) * whole for member, way_m in zip(members, flight.circled_m, strict=True)},
         coverage_pct=done_pct if ended else min(done_pct * whole, 100.0),
         remaining_pct=builder.remaining_pct() if ended else max(100.0 - done_pct * whole, 0.0),
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
