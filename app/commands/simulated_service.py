@@ -30,7 +30,9 @@ def served(sea: "SimulationSettings", time_scale: float, work: "Callable[[Missio
             return runner.run(_served(sea, time_scale, work))
 
 
-async def _served(sea: "SimulationSettings", time_scale: float, work: "Callable[[MissionService], Awaitable[Came]]") -> Came:
+async def _served(
+    sea: "SimulationSettings", time_scale: float, work: "Callable[[MissionService], Awaitable[Came]]"
+) -> Came:
     from app.missions.service import MissionService
     from app.missions.settings import ImcSettings, ServiceSettings
     from app.storage.database import Database

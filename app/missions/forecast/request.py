@@ -145,10 +145,7 @@ class Forecaster:
         if self._compute.elsewhere:
             floors = await asyncio.to_thread(lambda: list(floors_under(spec, ours, so_far, floor_depth_m)))
             flights = await asyncio.gather(
-                *(
-                    self._compute.run(fly_over, floor, spec, ours, starts, so_far, BUDGET_S)
-                    for floor in floors
-                )
+                *(self._compute.run(fly_over, floor, spec, ours, starts, so_far, BUDGET_S) for floor in floors)
             )
             found = Forecast(list(flights), floors)
         else:
@@ -281,9 +278,7 @@ def _view(
     sds = [flight.mean_sd_m for flight in flights if flight.mean_sd_m is not None]
     durations = with_unforeseen([flight.duration_s for flight in flights])
     coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
-    ways = {
-        name: with_unforeseen([flight.distances_m[name] for flight in flights]) for name in flights[0].distances_m
-    }
+    ways = {name: with_unforeseen([flight.distances_m[name] for flight in flights]) for name in flights[0].distances_m}
     return ForecastView(
         duration_s=_median(durations),
         duration_s_range=range_of(durations),

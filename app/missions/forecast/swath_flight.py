@@ -40,7 +40,7 @@ CELLS_OF_HALF = 5.0
 SHOALER = 0.1
 """Share of a floor that is shoaler than that."""
 
-BEAMS_A_CELL, REACHES = 2.0, 3
+BEAMS_A_CELL, REACHES = 4.0, 3
 """Beams and pings lie so close together, and where a beam meets the bottom is found in so many steps."""
 
 LEAST_SD_M = 0.01
@@ -263,7 +263,9 @@ def sweep_over(
         whole = min(1.0 + float(left_m.sum()) / max(goes, 1.0), 100.0 / max(done_pct, 1.0))
     flown = Flown(
         duration_s=max(float(clock[-1]) for clock in flight.clocks_s) * whole,
-        distances_m={member.name: float(way_m) * whole for member, way_m in zip(members, flight.circled_m, strict=True)},
+        distances_m={
+            member.name: float(way_m) * whole for member, way_m in zip(members, flight.circled_m, strict=True)
+        },
         coverage_pct=done_pct if ended else min(done_pct * whole, 100.0),
         remaining_pct=builder.remaining_pct() if ended else max(100.0 - done_pct * whole, 0.0),
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
