@@ -1,4 +1,4 @@
-"""The sea floors that a forecast is flown over: what is known, and guesses of different roughness for the rest."""
+"""The sea floors that a forecast is flown over: what is known, and guesses of different roughness beside."""
 
 import math
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ KINDS: tuple[tuple[str, str, float, float], ...] = (
     ("steep", "smooth", 0.3, -1.4),
 )
 """The guesses, the most telling first: in words, the family of generated floors, the standard deviation of its relief
-as a share of the depth, and how much deeper than the usual guess it is where no depth is told, in standard deviations."""
+as a share of the depth, and how much deeper it is than the usual guess where no depth is told, in deviations."""
 
 DEPTH_SD = 0.4
 """Of the logarithm of a depth that is guessed."""

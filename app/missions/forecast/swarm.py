@@ -13,7 +13,6 @@ from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 
-
 LEAST_RADIUS_M = 0.5
 
 STEP_M = 1.0
@@ -25,7 +24,7 @@ PASSED_WITHIN_M = 8.0
 """Who passes the end of its leg at most this far to the side has come there, as at sea."""
 
 REACTS_S, LEAST_ARRIVAL_M = 0.25, 0.5
-"""So long after it has arrived a vehicle begins to turn to its next leg; it arrives within so many metres all the same."""
+"""So long after it has arrived a vehicle turns to its next leg; it arrives within so many metres all the same."""
 
 STILL_S = 1.0
 """So long takes a leg that ends where it begins: its vehicle is there at once."""
@@ -269,7 +268,7 @@ def steered(
 
 
 def poses_apart(poses: FloatArray, apart_m: float) -> FloatArray:
-    """Return the poses (m, k) along a way (n, k), east and north first, that lie so far apart; the last one is there."""
+    """Return the poses (m, k) along a way (n, k), east and north first, that lie so far apart; the last is there."""
     if len(poses) < 2:
         return poses
     way_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])

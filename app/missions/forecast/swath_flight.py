@@ -15,6 +15,7 @@ from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
+from app.estimation.uncertainty import BeamGeometry, Uncertainty, uncertainty
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.decision import (
     Knowledge,
@@ -107,7 +108,8 @@ class SwathFlight:
         self.builder = MapBuilder(spec.local_area(), cell_m, spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth)
         self.builder.arrivals.replace(np.zeros((0, 4)), so_far.prior)
         if len(so_far.soundings):
-            self.builder.swath.add_placed(*so_far.soundings.T)
+            east, north, depth, sd = so_far.soundings.T
+            self.builder.swath.add_placed(east, north, depth, Uncertainty(sd, np.zeros_like(sd), np.zeros_like(sd)))
         self.builder.build()
         self._cell_m = cell_m
         self._constraints, self._planner = make_constraints(spec), planner_of(spec, so_far)
@@ -203,15 +205,17 @@ class SwathFlight:
         """Sound from poses (n, 4) and take that in."""
         if craft.sonar is None or not len(poses):
             return
-        east, north, depth, sd = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
-        sd = np.maximum(self._spec.sounding_noise * sd, LEAST_SD_M)
-        self.builder.swath.add_placed(east, north, depth + sd * self._rng.standard_normal(len(sd)), sd)
+        east, north, depth, slant_m, down_m = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
+        spec, noise_m = self._spec, np.maximum(self._spec.sounding_noise * slant_m, LEAST_SD_M)
+        went = BeamGeometry(np.arccos(np.clip(down_m / slant_m, 0.0, 1.0)), down_m, np.zeros_like(down_m))
+        depth = depth + noise_m * self._rng.standard_normal(len(depth))
+        self.builder.swath.add_placed(east, north, depth, uncertainty(went, spec.uncertainty))
 
 
 def swath_of(
     sonar: SwathSonar, poses: FloatArray, terrain: Terrain, apart_m: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return what pings from poses (n, 4) meet, (m,) each: east, north, depth, and how long the way there is.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what pings from poses (n, 4) meet, (m,) each: east, north, depth, how long the way there is, and how deep.
 
     ``apart_m`` is how close beams lie on a flat bottom; closer ones are left out.
     """
@@ -228,7 +232,7 @@ def swath_of(
         down_m = np.maximum(depth - poses[:, 3, None], 0.0)
     slant_m = down_m * np.hypot(1.0, slope)
     met = np.isfinite(depth) & (depth > 0.0) & (slant_m <= sonar.range_m) & (down_m > 0.0)
-    return places[..., 0][met], places[..., 1][met], depth[met], slant_m[met]
+    return places[..., 0][met], places[..., 1][met], depth[met], slant_m[met], down_m[met]
 
 
 def sweep_over(

@@ -168,12 +168,13 @@ def test_beams_meet_the_floor_as_far_aside_as_the_sonar_reaches() -> None:
     sonar = SwathSonar(math.radians(120.0), 256, 5.0, 100.0)
     poses = np.array([[100.0, 100.0, 0.0, 2.0]])
     flat = Terrain(np.full((60, 60), 12.0), 5.0)
-    east, north, depth, slant = swath_of(sonar, poses, flat, 1.0)
+    east, north, depth, slant, down = swath_of(sonar, poses, flat, 1.0)
     np.testing.assert_allclose(depth, 12.0)
     np.testing.assert_allclose(north, 100.0)
     assert east.min() == pytest.approx(100.0 - 10.0 * math.tan(math.radians(60.0)))
     assert east.max() == pytest.approx(100.0 + 10.0 * math.tan(math.radians(60.0)))
     assert slant.max() == pytest.approx(20.0)
+    np.testing.assert_allclose(down, 10.0)
     short = SwathSonar(math.radians(120.0), 256, 5.0, 15.0)
     assert np.abs(swath_of(short, poses, flat, 1.0)[0] - 100.0).max() <= math.sqrt(15.0**2 - 10.0**2) + 1e-6
 
