@@ -6,12 +6,14 @@ it is flown by the service with its simulated vehicles in simulated time. Told i
 within the forecast's 10–90 % range (``within``, as so many of 20), how far outcomes lie from the range's middle in its
 width (``off``: the median, -0.5 and 0.5 are its ends), how often they are below and above it, and how wide ranges are
 beside outcomes (``width``: median, share of the outcome; of coverage in percentage points). Even seeds are flown over
-other floors than odd ones.
+other floors than odd ones. A busy machine takes no floor away from a forecast here. After ``--minutes`` no other
+mission is begun.
 """
 
 import argparse
 import asyncio
 import json
+import math
 import os
 import tempfile
 import time
@@ -25,6 +27,7 @@ import numpy as np
 from app.api import logs
 from app.commands.simulated_service import served
 from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.forecast import request
 from app.missions.forecast.ranges import ForecastRange
 from app.missions.forecast.request import ForecastView
 from app.missions.live.mission import LiveMission
@@ -255,6 +258,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--apart", type=int, default=1, help="from one seed to the next; 2: all even, or all odd")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="by the clock")
     parser.add_argument("--terrains", type=Path, default=None, help="folder of real floors")
     return parser.parse_args(arguments)
 
@@ -263,9 +267,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     options = parsed(arguments)
     logs.configure("error", "json")
+    request.PATIENCE_S = math.inf
     seeds = range(options.first, options.first + options.apart * options.missions, options.apart)
-    done = []
+    done: list[dict[str, Any]] = []
+    begun_s = time.monotonic()
     for seed in seeds:
+        if done and time.monotonic() - begun_s > 60.0 * options.minutes:
+            break
         done.append(fly(seed, options.terrains))
         print(json.dumps(done[-1]), flush=True)
     result = summary(done)
@@ -273,7 +281,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     print(json.dumps(result, indent=2))
     title = "Forecasts, and what came"
-    write_section(options.write, FLIGHT, title, result, seeds=seeds, hidden={options.terrains: "TERRAINS"})
+    write_section(options.write, FLIGHT, title, result, seeds=seeds[: len(done)], hidden={options.terrains: "TERRAINS"})
 
 
 if __name__ == "__main__":
