@@ -100,7 +100,7 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     assert found.steps_flown == 1
     view = request._view(spec, found, "", 8)
     # Drawn out: as if every step were as long as the first.
-    assert view.duration_s == pytest.approx(8 * min(8.0 / spec.speed_mps + 2.0, 60.0), rel=0.2)
+    assert view.duration_s == pytest.approx(8 * 8.0 / spec.speed_mps, rel=0.2)
     assert any("1 of 8 steps" in words for words in view.assumptions)
     assert view.steps_flown == view.steps_simulated == 1
     # After one step there is nothing to be sure of, and it is not drawn out to the end.
