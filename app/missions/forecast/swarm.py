@@ -140,7 +140,10 @@ class Swarm:
         n = len(members)
         self.here = np.column_stack([starts_m, np.zeros(n)])
         self.heading_rad = np.array([np.nan if m.report is None else m.report.heading_rad for m in members])
-        self._poses = [(*map(float, start), float(h)) for start, h in zip(starts_m, self.heading_rad, strict=True)]
+        self._poses = [
+            (float(start[0]), float(start[1]), float(heading))
+            for start, heading in zip(starts_m, self.heading_rad, strict=True)
+        ]
         self.clock_s, self.distance_m = np.zeros(n), np.zeros(n)
         self.legs = np.full(n, first_step - 1)
         self._held = np.zeros(n, dtype=bool)
@@ -167,7 +170,7 @@ class Swarm:
         first = int(np.argmin(np.where(able, self.clock_s, np.inf)))
         if self._held[first]:
             # Who held because of others goes on alone: together they would hold for ever.
-            return np.arange(len(able)) == first
+            return np.asarray(np.arange(len(able)) == first)
         soon_s = self.clock_s[first] + HARDLY_BEGUN * self._spec.limits.max_step_m / self._speed_mps
         return np.asarray(able & (self.clock_s <= soon_s))
 
