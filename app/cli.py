@@ -120,7 +120,7 @@ def serve(
         log_format=log_format and log_format.value,
     )
     from app.api import logs
-    from app.compiled import compile_beside
+    from app.compiled.cache import compile_beside
     from app.storage.upkeep.prepare import prepare_database
 
     compile_beside()
@@ -404,11 +404,11 @@ def demo(
     output: Annotated[Path, typer.Option(file_okay=False, help="Folder for the files.")] = DEMO_FOLDER,
 ) -> None:
     """Try it without a vehicle: a whole mission with simulated AUVs that speak IMC, from start to map."""
-    from app.compiled import compile_beside
+    from app.compiled.cache import compile_beside
 
     compile_beside()
-    from app.demo import DemoOptions, run_demo
-    from app.demo_service import DemoError
+    from app.demo.service import DemoError
+    from app.demo.survey import DemoOptions, run_demo
 
     lengths = {"--steps": steps, "--minutes": minutes, "--km": km}
     given = [option for option, value in lengths.items() if value is not None]
@@ -440,8 +440,8 @@ def demo(
 def _search_demo(
     site: str, vehicles: int, window_s: float, speed: float, seed: int, port: int, output: Path, *, keep_serving: bool
 ) -> int:
-    from app.demo_search import SearchDemoOptions, run_search_demo
-    from app.demo_service import DemoError
+    from app.demo.search import SearchDemoOptions, run_search_demo
+    from app.demo.service import DemoError
     from app.missions.search.examples import SITES
 
     if site not in SITES:
@@ -498,7 +498,7 @@ def _with_tokens(database: str | None, run: Any, changing: str = "", target: str
 
 def main() -> None:
     """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
-    from app.compiled import VARIABLE, keep_compiled
+    from app.compiled.cache import VARIABLE, keep_compiled
     from app.storage.private import for_owner_only
 
     try:

@@ -75,7 +75,7 @@ def export(
 
     product = with_missions(settings, run)
     if out == Path("-"):
-        sys.stdout.buffer.write(product.content)
+        sys.stdout.buffer.writelines(product.content.pieces())
         return
     write_product(product, out, settings.output_dir)
 
@@ -122,10 +122,10 @@ def write_product(product: "Product", out: Path | None, folder: Path) -> None:
     path = out or folder / product.filename
     try:
         private.make_folder(path.parent)
-        private.write(path, product.content)
+        private.write(path, product.content.pieces())
     except OSError as error:
         raise CommandError(f"{path} cannot be written: {error.strerror}") from None
-    typer.echo(f"{path}: {len(product.content)} bytes")
+    typer.echo(f"{path}: {product.content.size_bytes} bytes")
 
 
 Url = Annotated[

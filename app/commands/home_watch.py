@@ -105,8 +105,8 @@ class Watch:
             self._compare((a, b), here, there, returning=returning)
 
     def _note(self, member: "Member", seen: Seen, place: Place, left_pct: float) -> None:
-        from app.missions.flight.legs.commit import point_of
         from app.missions.flown import Phase
+        from app.missions.recovery.berths import point_of
 
         if seen.surveys_at_pct is None and member.flown.phase is Phase.SURVEY:
             seen.surveys_at_pct = left_pct

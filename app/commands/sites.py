@@ -90,6 +90,6 @@ def export_site(
 
     product = with_missions(settings, run)
     if out == Path("-"):
-        sys.stdout.buffer.write(product.content)
+        sys.stdout.buffer.writelines(product.content.pieces())
         return
     write_product(product, out, settings.output_dir)

@@ -7,7 +7,7 @@ import asyncio
 from importlib import import_module
 from typing import Any
 
-from app.compiled import PARTS, compile_beside, keep_compiled, wait_for_compiling
+from app.compiled.cache import PARTS, compile_beside, keep_compiled, wait_for_compiling
 
 
 async def dask_setup(_worker: Any) -> None:

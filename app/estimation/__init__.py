@@ -1,6 +1,6 @@
 """What is known: sensor models, landmarks, targets, the vehicles' own places. Pure: numpy in, numpy out."""
 
-import app.compiled_index  # noqa: F401 - before anything compiled is imported
+import app.compiled.index  # noqa: F401 - before anything compiled is imported
 from app.estimation.beams import Attitude, BeamSonar, Dvl, Echoes, Multibeam
 from app.estimation.landmarks import LandmarkEstimator, Landmarks, LandmarkSets, landmark_sets
 from app.estimation.landmarks_3d import Landmark3DEstimator, Landmarks3D

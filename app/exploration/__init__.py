@@ -5,7 +5,7 @@ plan of lines that ``cao`` weighs its moves by, and each other folder a family o
 names: adding one is a class derived from ``planner.base.PlannerBase`` and a line there.
 """
 
-import app.compiled_index  # noqa: F401 - before anything compiled is imported
+import app.compiled.index  # noqa: F401 - before anything compiled is imported
 
 DEFAULT_PLANNER = "cao"
 """Of surveys, unless an operator asks for another one."""

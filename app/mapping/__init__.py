@@ -3,7 +3,7 @@
 import scipy.linalg  # noqa: F401 - its BLAS has to be loaded to be limited
 from threadpoolctl import threadpool_limits
 
-import app.compiled_index  # noqa: F401 - before anything compiled is imported
+import app.compiled.index  # noqa: F401 - before anything compiled is imported
 
 # The matrices here have a few hundred rows. Sharing one between threads gains nothing on an idle machine, costs twenty
 # times as much on a busy one, and makes results depend on the number of cores.

@@ -7,7 +7,7 @@ from concurrent.futures import Executor, Future
 
 import structlog
 
-from app.compiled import FIRST, wait_for_compiling
+from app.compiled.cache import FIRST, wait_for_compiling
 from app.estimation import Sensor, SingleBeam
 from app.estimation.adjustment import warm_up as warm_up_adjustment
 from app.exploration.planners import warm_up_planner

@@ -47,18 +47,23 @@ def open_new(path: Path, mode: Literal["w", "wb"] = "w") -> TextIO | BinaryIO:
     return cast("TextIO | BinaryIO", file)
 
 
-def write(path: Path, content: bytes | str) -> None:
-    """Write a file. One that was there is replaced when all is written, so that no reader gets a half."""
+def write(path: Path, content: bytes | str | Iterable[bytes]) -> None:
+    """Write a file. One that was there is replaced when all is written, so that no reader gets a half.
+
+    ``content`` may come in pieces.
+    """
     data = content.encode() if isinstance(content, str) else content
+    pieces = [data] if isinstance(data, bytes) else data
     if path.exists() and not path.is_file():
-        path.write_bytes(data)  # a terminal or a pipe that the user named
+        with path.open("wb") as named:  # a terminal or a pipe that the user named
+            named.writelines(pieces)
         return
     place = path.resolve()
     part = place.with_name(f".{place.name}.{secrets.token_hex(4)}")
     try:
         with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE), "wb") as file:
             os.fchmod(file.fileno(), FILE_MODE)
-            file.write(data)
+            file.writelines(pieces)
         part.replace(place)
     except BaseException:
         part.unlink(missing_ok=True)

@@ -37,7 +37,9 @@ def create_soak(service: Service, vehicles: int) -> str:
     return service.create(
         name="A day",
         area={"type": "Polygon", "coordinates": [ring]},
-        vehicles=[{"name": f"sim-{v}", "kind": "sim", "sensor": "single_beam"} for v in range(vehicles)],
+        vehicles=[
+            {"name": f"sim-{v}", "kind": "sim", "sensor": "single_beam", "endurance_min": 3000} for v in range(vehicles)
+        ],
         cell_m=2.0,
         steps=4500,
         planner={"name": "cao"},

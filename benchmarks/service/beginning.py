@@ -53,7 +53,7 @@ def listen():
 
 class Finder:
     def find_spec(self, name, path=None, target=None):
-        if name == "app.compiled_index":
+        if name == "app.compiled.index":
             sys.meta_path.remove(self)
             listen()
         return None

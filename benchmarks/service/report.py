@@ -125,13 +125,13 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 begun = time.perf_counter()
                 product = await service.reports.report(live, ReportOptions(kind, language))
                 found[f"{name}_{language}_s"] = round(time.perf_counter() - begun, 2)
-                found[f"{name}_{language}_bytes"] = len(product.content)
+                found[f"{name}_{language}_bytes"] = product.content.size_bytes
                 if options.keep is not None:
-                    (options.keep / f"report-{language}.{name}").write_bytes(product.content)
+                    (options.keep / f"report-{language}.{name}").write_bytes(product.content.whole())
         begun = time.perf_counter()
         product = await export(live, service.maps, service.settings.provider, service.compute, "tif")
         found["map_tif_s"] = round(time.perf_counter() - begun, 2)
-        found["map_tif_bytes"] = len(product.content)
+        found["map_tif_bytes"] = product.content.size_bytes
         begun = time.perf_counter()
         await service.reports.answers(live)
         found["answers_s"] = round(time.perf_counter() - begun, 2)

@@ -145,20 +145,20 @@ async def test_a_mission_from_start_to_products(service: MissionService, databas
         )
         assert (product.filename, product.media_type) == (f"quay.{extension}", kind.media_type)
         if extension == "tif":
-            with rasterio.open(io.BytesIO(product.content)) as image:
+            with rasterio.open(io.BytesIO(product.content.whole())) as image:
                 assert image.shape == (15, 15)
                 north_up = snapshot.built.map.depth_m[::-1]
                 np.testing.assert_allclose(np.abs(image.read(1)), np.abs(north_up), rtol=1e-5)
         elif extension.endswith("png"):
-            assert Image.open(io.BytesIO(product.content)).size > (1, 1)
+            assert Image.open(io.BytesIO(product.content.whole())).size > (1, 1)
         elif extension == "geojson":
-            features = json.loads(product.content)["features"]
+            features = json.loads(product.content.whole())["features"]
             assert {"area", "track"} <= {f["properties"].get("kind") for f in features}
         elif extension == "csv":
-            rows = product.content.decode().splitlines()
+            rows = product.content.whole().decode().splitlines()
             assert len(rows) == 2 + ended.progress.soundings + ended.progress.rejected
         elif extension == "xyz":
-            cells = [row for row in product.content.decode().splitlines() if row and not row.startswith("#")]
+            cells = [row for row in product.content.whole().decode().splitlines() if row and not row.startswith("#")]
             assert len(cells) >= 225
     with pytest.raises(InvalidRequestError, match="there is no format 'doc'") as caught:
         await export(await service.get(created.id), service.maps, service.settings.provider, service.compute, "doc")

@@ -11,6 +11,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema
+from starlette.responses import StreamingResponse
 
 from app.api.access.auth import Reader
 from app.api.http.problems import ProblemError, problems
@@ -401,10 +402,12 @@ def file_answer(product: Product | Response) -> Response:
     """Return what lets a client save a file under its name; an answer stays as it is."""
     if isinstance(product, Response):
         return product
-    return Response(
-        product.content,
+    content = product.content
+    return StreamingResponse(
+        content.pieces(),  # read in a thread
         media_type=product.media_type,
         headers={
+            "Content-Length": str(content.size_bytes),
             "Content-Disposition": f'attachment; filename="{quote(product.filename)}"',
             "Cache-Control": "no-cache",
         },

@@ -41,58 +41,81 @@ def vessel_id(provider: Provider, vehicle: str) -> str:
     return f"{provider.node}-{uuid.uuid5(uuid.NAMESPACE_URL, f'bathyfleet:{provider.organization}:{vehicle}')}"
 
 
-def crowdsourced_geojson(
-    soundings: Iterable[RawSounding], vehicle: str, provider: Provider, *, version: str, created: datetime
-) -> bytes:
-    """Return one vehicle's raw soundings; the format knows one vessel per file.
+@dataclass(frozen=True)
+class CrowdsourcedFile:
+    """A file of one vehicle's raw soundings, part by part; the format knows one vessel per file.
 
-    Parameters
+    Attributes
     ----------
     version
         Of the program that logged them.
+    uncertain
+        Whether any sounding states its position's deviation.
     """
-    identity = vessel_id(provider, vehicle)
-    listed = list(soundings)
-    uncertain = any(s.position_sd_m is not None for s in listed)
-    document = {
-        "type": "FeatureCollection",
-        "crs": {"type": "name", "properties": {"name": "EPSG:4326"}},
+
+    vehicle: str
+    provider: Provider
+    version: str
+    created: datetime
+    uncertain: bool
+
+    def begin(self) -> bytes:
+        """Return everything before the first sounding."""
+        provider, identity = self.provider, vessel_id(self.provider, self.vehicle)
+        document = {
+            "type": "FeatureCollection",
+            "crs": {"type": "name", "properties": {"name": "EPSG:4326"}},
+            "properties": {
+                "trustedNode": {
+                    "providerOrganizationName": provider.organization,
+                    "providerEmail": provider.email,
+                    "uniqueVesselID": identity,
+                    "convention": CONVENTION,
+                    "dataLicense": provider.license,
+                    "providerLogger": "bathyfleet",
+                    "providerLoggerVersion": self.version,
+                    "navigationCRS": "EPSG:4326",
+                    "verticalReferenceOfDepth": "Waterline",
+                    "vesselPositionReferencePoint": "Transducer",
+                },
+                "platform": {
+                    "uniqueID": identity,
+                    "type": "Autonomous underwater vehicle",
+                    "name": self.vehicle,
+                    "soundSpeedDocumented": False,
+                    "positionOffsetsDocumented": False,
+                    # The format counts the estimate of an uncertainty as processing; depths are raw either way.
+                    "dataProcessed": self.uncertain,
+                    "contributorComments": "Depths are the vehicle's depth plus the vertical part of the sonar's "
+                    "range, without tide; positions are those of the footprints, from the vehicle's navigation under "
+                    "water.",
+                },
+                **({"processing": [_uncertainty_step(self.version, self.created)]} if self.uncertain else {}),
+            },
+            "features": [],
+        }
+        return json.dumps(document).removesuffix("]}").encode()
+
+    def part(self, soundings: Iterable[RawSounding], *, first: bool) -> bytes:
+        """Return soundings as features; ``first``: no other ones are before them."""
+        features = ", ".join(json.dumps(_feature(sounding)) for sounding in soundings)
+        return (features if first or not features else f", {features}").encode()
+
+    def end(self) -> bytes:
+        """Return everything after the last sounding."""
+        return b"]}"
+
+
+def _feature(sounding: RawSounding) -> dict[str, object]:
+    return {
+        "type": "Feature",
+        "geometry": {"type": "Point", "coordinates": [round(sounding.lon_deg, 8), round(sounding.lat_deg, 8)]},
         "properties": {
-            "trustedNode": {
-                "providerOrganizationName": provider.organization,
-                "providerEmail": provider.email,
-                "uniqueVesselID": identity,
-                "convention": CONVENTION,
-                "dataLicense": provider.license,
-                "providerLogger": "bathyfleet",
-                "providerLoggerVersion": version,
-                "navigationCRS": "EPSG:4326",
-                "verticalReferenceOfDepth": "Waterline",
-                "vesselPositionReferencePoint": "Transducer",
-            },
-            "platform": {
-                "uniqueID": identity,
-                "type": "Autonomous underwater vehicle",
-                "name": vehicle,
-                "soundSpeedDocumented": False,
-                "positionOffsetsDocumented": False,
-                # The format counts the estimate of an uncertainty as processing; depths are raw either way.
-                "dataProcessed": uncertain,
-                "contributorComments": "Depths are the vehicle's depth plus the vertical part of the sonar's range, "
-                "without tide; positions are those of the footprints, from the vehicle's navigation under water.",
-            },
-            **({"processing": [_uncertainty_step(version, created)]} if uncertain else {}),
+            "depth": round(sounding.depth_m, 3),
+            "time": utc_text(sounding.time_s),
+            **_uncertainty(sounding),
         },
-        "features": [
-            {
-                "type": "Feature",
-                "geometry": {"type": "Point", "coordinates": [round(s.lon_deg, 8), round(s.lat_deg, 8)]},
-                "properties": {"depth": round(s.depth_m, 3), "time": utc_text(s.time_s), **_uncertainty(s)},
-            }
-            for s in listed
-        ],
     }
-    return json.dumps(document).encode()
 
 
 def _uncertainty_step(version: str, created: datetime) -> dict[str, object]:

@@ -45,14 +45,19 @@ def map_xyz(
     return _text(rows, header, [digits, digits, "%.3f", "%.3f", "%d", "%d"], " ")
 
 
-def soundings_xyz(soundings: Soundings, frame: LocalFrame, *, vertical_datum: str, geographic: bool = False) -> bytes:
-    """Return the soundings as XYZ text: position, depth (positive down) and standard deviation per line."""
+def soundings_xyz(
+    soundings: Soundings, frame: LocalFrame, *, vertical_datum: str, geographic: bool = False, headed: bool = True
+) -> bytes:
+    """Return the soundings as XYZ text: position, depth (positive down) and standard deviation per line.
+
+    ``headed``: comments come first; without them it goes on with a file that has them.
+    """
     x, y, names, digits = _positions(soundings.east_m, soundings.north_m, frame, geographic)
     header = (
         f"{names} depth_m sd_m\ndepth positive down, vertical datum: {vertical_datum}\n{_frame_line(frame, geographic)}"
     )
     rows = np.column_stack([x, y, soundings.depth_m, soundings.sd_m])
-    return _text(rows, header, [digits, digits, "%.3f", "%.3f"], " ")
+    return _text(rows, header if headed else "", [digits, digits, "%.3f", "%.3f"], " ")
 
 
 def _positions(

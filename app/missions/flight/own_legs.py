@@ -287,16 +287,17 @@ class OwnLegs:
         return replace(place_ahead(member, self._live), moving=moving, left_m=left_m)
 
     def _next_number(self, member: Member) -> int:
-        """Return the number of a vehicle's next leg: one that joins, or comes back, goes on where the team is."""
+        """Return the number of a vehicle's next leg: one that joins or comes back goes on with what others fly."""
         if member.name in self._taking_part or member.ordered or member.ahead:
             return member.legs + 1
-        reached = min((m.legs for m in self._live.team.present if m is not member), default=self._live.header.step)
+        others = [m.legs - len(m.ahead) for m in self._live.team.present if m is not member]
+        reached = min(others, default=self._live.header.step)
         return max(member.legs, min(reached, self._live.header.step)) + 1
 
     def _who_gets_legs(self) -> list[Member]:
         """Return the vehicles to decide for now: none, or those that need a leg, with others that soon will."""
         now_s = asyncio.get_running_loop().time()
-        self._taking_part -= {member.name for member in self._live.team if not member.present}
+        self._taking_part &= {member.name for member in self._live.team if member.present}
         able = [
             member
             for member in self._live.team.present

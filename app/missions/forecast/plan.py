@@ -36,12 +36,12 @@ from app.missions.flight.decisions.decision import (
     turn_radius_m,
     without_zones,
 )
-from app.missions.flight.legs.commit import home_of
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
 from app.missions.forecast.simulate import fly
 from app.missions.forecast.swarm import Swarm
 from app.missions.forecast.whole_survey import HALVINGS, WholeWay, whole_way
 from app.missions.maps.builder import MapBuilder, make_grid
+from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
@@ -307,7 +307,7 @@ def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: F
     along = _along(corners)
     turn_s, clock_s = _turns_s(spec, member, corners), _clock_s(spec, member, corners)
     circles_s = len(turn_s) * 2.0 * np.pi * radius_m / speed
-    home_m = home_of(member, spec)
+    home_m = home_of(member.spec, member.slot, spec)
     ways_home = None if home_m is None else WaysHome(constraints, home_m)
 
     def home_from(place_m: FloatArray) -> FloatArray | None:

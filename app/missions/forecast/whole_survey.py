@@ -8,8 +8,8 @@ from pydantic import Field
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.missions.flight.legs.commit import home_of
 from app.missions.forecast.ranges import ForecastRange, range_of
+from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
@@ -84,7 +84,7 @@ def whole_way(
     full_s = full_battery_s(spec, member)
     if full_s is None:
         return WholeWay(distance_m * drawn_out, seconds, None)
-    home_m = home_of(member, spec)
+    home_m = home_of(member.spec, member.slot, spec)
     ways_home = None if home_m is None else WaysHome(constraints, home_m)
     speed_mps = spec.speed_of(member.spec)
 

@@ -3,19 +3,18 @@
 import io
 import zipfile
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
 import orjson
 from shapely.geometry import Polygon, mapping
 
-from app import __version__
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
 from app.mapping.products.crossovers import crossovers_csv
-from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
+from app.mapping.products.crowdsourced import Provider
 from app.mapping.products.geotiff import geotiff
 from app.mapping.products.holidays import holidays_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
@@ -23,26 +22,23 @@ from app.mapping.products.netcdf import netcdf
 from app.mapping.products.pictures.overlay import overlay_png
 from app.mapping.products.pictures.picture import picture_png
 from app.mapping.products.s102 import SurveyFacts, file_name, s102
-from app.mapping.products.text import map_xyz, soundings_xyz
+from app.mapping.products.text import map_xyz
 from app.mapping.products.tracks import Track, tracks_geojson, tracks_gpx
 from app.mapping.products.vr_bag import vr_bag
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
-from app.mapping.types import SoundingRows, Soundings
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
+from app.missions.maps.file_content import FileContent
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
-from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
-from app.missions.views.measurements.soundings import Verdict
-from app.storage.models import SoundingRow
 
-MAP, SOUNDINGS, ACCEPTED, LINES, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
+MAP, SOUNDINGS, ACCEPTED, RAW, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
     "map",
     "soundings",
     "accepted soundings",
-    "lines of soundings",
+    "raw soundings of a vehicle",
     "tracks",
     "search",
     "swaths",
@@ -108,9 +104,7 @@ class Material:
     created: datetime
     provider: Provider | None = None
     map: MapSnapshot | None = None
-    soundings: Sequence[SoundingRow] = ()
-    accepted: SoundingRows = field(default_factory=lambda: np.zeros((0, 4)))
-    lines: SoundingLines = field(default_factory=SoundingLines)
+    soundings: FileContent | None = None
     tracks: Sequence[Track] = ()
     search: Search | None = None
     surveyed: Surveyed = Surveyed()
@@ -135,7 +129,7 @@ class Product:
 
     filename: str
     media_type: str
-    content: bytes
+    content: FileContent
 
 
 @dataclass(frozen=True)
@@ -160,7 +154,7 @@ class ProductKind:
     extension: str
     media_type: str
     title: str
-    make: Callable[[Material, ProductOptions], bytes]
+    make: Callable[[Material, ProductOptions], bytes | FileContent]
     needs: Collection[str]
     of_vehicle: bool = False
     filename: Callable[[MissionFacts], str] | None = None
@@ -289,11 +283,6 @@ def _overlay(material: Material, options: ProductOptions) -> bytes:
     return overlay_png(bathymetry.depth_m, bathymetry.sounded, range_m)
 
 
-def _soundings_xyz(material: Material, _: ProductOptions) -> bytes:
-    soundings = Soundings.of_rows(material.accepted)
-    return soundings_xyz(soundings, material.facts.frame, vertical_datum=material.datum, geographic=True)
-
-
 def _obstacles(material: Material, _: ProductOptions) -> bytes:
     if material.search is None:
         raise InvalidRequestError("format", "the mission is no search", "ask for another file")
@@ -334,35 +323,10 @@ def _contours(material: Material, options: ProductOptions) -> list[Contour]:
         raise InvalidRequestError("interval_m", str(error), "choose a larger one") from error
 
 
-def _crowdsourced(material: Material, options: ProductOptions) -> bytes:
-    if material.provider is None:
-        raise InvalidRequestError(
-            "provider",
-            "IHO B-12 asks who hands soundings in, and the settings do not say",
-            "set provider.organization and provider.email in bathyfleet.toml",
-        )
-    name = _only_vehicle(material.soundings, options.vehicle)
-    raw = [
-        RawSounding(row.lon_deg, row.lat_deg, row.raw_depth_m, row.sd_m, row.time_s, row.position_sd_m)
-        for row in material.soundings
-        if row.vehicle == name and row.verdict == Verdict.ACCEPTED
-    ]
-    return crowdsourced_geojson(raw, name, material.provider, version=__version__, created=material.created)
-
-
-def _only_vehicle(soundings: Sequence[SoundingRow], vehicle: str | None) -> str:
-    """Return the vehicle that is meant. Raises InvalidRequestError when that is not clear."""
-    present = sorted({row.vehicle for row in soundings if row.verdict == Verdict.ACCEPTED})
-    if vehicle is None and len(present) == 1:
-        return present[0]
-    if vehicle not in present:
-        said = "several vehicles have soundings" if vehicle is None else f"{vehicle!r} has no accepted sounding"
-        raise InvalidRequestError("vehicle", said, "name one of " + (", ".join(present) or "none so far"))
-    return vehicle
-
-
-def _soundings_csv(material: Material, _: ProductOptions) -> bytes:
-    return material.lines.csv(material.datum)
+def _soundings(material: Material, _: ProductOptions) -> FileContent:
+    if material.soundings is None:
+        raise ValueError("soundings are files already when others are made of them")
+    return material.soundings
 
 
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
@@ -404,18 +368,18 @@ PRODUCTS = {
             filename=lambda facts: file_name(facts.title, facts.mission_id),
         ),
         ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
-        ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {LINES}),
+        ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
         ProductKind(MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}),
         ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}),
         ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
         ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
-        ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings_csv, {LINES}),
+        ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
         ProductKind(
             SOUNDINGS,
             "xyz",
             TEXT,
             "longitude, latitude and corrected depth of accepted soundings",
-            _soundings_xyz,
+            _soundings,
             {ACCEPTED},
         ),
         ProductKind(
@@ -423,8 +387,8 @@ PRODUCTS = {
             "geojson",
             GEOJSON,
             "raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12)",
-            _crowdsourced,
-            {SOUNDINGS},
+            _soundings,
+            {RAW},
             of_vehicle=True,
         ),
         ProductKind(TRACKS, "geojson", GEOJSON, TIMED_TRACKS, lambda m, _: tracks_geojson(m.tracks), {TRACKS}),
@@ -473,10 +437,11 @@ def product_kind(name: str) -> ProductKind:
 def make_product(name: str, material: Material, options: ProductOptions) -> Product:
     """Return one file. Raises InvalidRequestError for an unknown format or options that cannot be."""
     kind = product_kind(name)
-    content = kind.make(material, options)
+    made = kind.make(material, options)
+    content = FileContent(made) if isinstance(made, bytes) else made
     if kind.filename is not None:
         return Product(kind.filename(material.facts), kind.media_type, content)
-    part = _only_vehicle(material.soundings, options.vehicle) if kind.of_vehicle else kind.part.removeprefix(MAP)
+    part = (options.vehicle or "") if kind.of_vehicle else kind.part.removeprefix(MAP)
     return Product(product_name(material.facts, part, kind.extension), kind.media_type, content)
 
 

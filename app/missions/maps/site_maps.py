@@ -20,6 +20,7 @@ from app.mapping.sites import Change, SiteModel, Survey, Volume
 from app.mapping.types import BathymetricMap, Grid
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.errors import MapNotReadyError
+from app.missions.maps.file_content import FileContent
 from app.missions.maps.products import CSV, Product, slug
 from app.missions.views.maps.sites import ChangesView, SiteMapView, SurveyName, VolumeView
 from imc_bridge.printable import printable
@@ -197,13 +198,13 @@ class SiteChange:
 def site_map_file(kind: str, site: SiteMap) -> Product:
     """Return a site's map as a file, a key of ``MAP_FILES``."""
     media_type, _, make = MAP_FILES[kind]
-    return Product(f"{slug(site.facts.name)}.{kind}", media_type, make(site))
+    return Product(f"{slug(site.facts.name)}.{kind}", media_type, FileContent(make(site)))
 
 
 def changes_file(kind: str, change: SiteChange) -> Product:
     """Return what changed as a file, a key of ``CHANGE_FILES``."""
     media_type, _, make = CHANGE_FILES[kind]
-    return Product(f"{slug(change.facts.name)}-changes.{kind}", media_type, make(change))
+    return Product(f"{slug(change.facts.name)}-changes.{kind}", media_type, FileContent(make(change)))
 
 
 def _map_tif(site: SiteMap) -> bytes:

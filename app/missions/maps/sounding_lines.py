@@ -1,8 +1,8 @@
-"""A mission's soundings as lines of CSV, made piece by piece as they are read."""
+"""A mission's soundings as lines of CSV."""
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from app.csv_cells import text_cell
@@ -37,24 +37,17 @@ COLUMNS = (
 )
 
 
-class SoundingLines:
-    """Every sounding that was read so far as a line, rejected ones with their reason; raw and corrected side by side.
+def header_line(datum: str) -> bytes:
+    """Return the begin of a file whose depths are counted from ``datum``: a comment and the names of the columns."""
+    return f"# depth_m: positive down, from {datum}\n".encode() + _lines([COLUMNS])
 
-    A sounding takes some hundred bytes like that, and several thousand as an object with all its fields.
-    """
 
-    def __init__(self) -> None:
-        self._pieces: list[bytes] = []
+def sounding_lines(rows: Iterable[Sequence[Any]]) -> bytes:
+    """Return rows of :data:`COLUMNS` as lines, rejected soundings with their reason; raw and corrected side by side."""
+    return _lines([text_cell(value) for value in row] for row in rows)
 
-    def take(self, rows: Sequence[Any]) -> None:
-        """Take rows of :data:`COLUMNS`."""
-        text = io.StringIO()
-        csv.writer(text).writerows([text_cell(value) for value in row] for row in rows)
-        self._pieces.append(text.getvalue().encode())
 
-    def csv(self, datum: str) -> bytes:
-        """Return the file; ``datum`` is what depths are counted from."""
-        text = io.StringIO()
-        text.write(f"# depth_m: positive down, from {datum}\n")
-        csv.writer(text).writerow(COLUMNS)
-        return b"".join([text.getvalue().encode(), *self._pieces])
+def _lines(rows: Iterable[Sequence[Any]]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text).writerows(rows)
+    return text.getvalue().encode()

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from app.missions.errors import TargetNotFoundError
 from app.missions.live.journals.journal import event_view
 from app.missions.live.mission import LiveMission
-from app.missions.maps.sounding_lines import COLUMNS, SoundingLines
 from app.missions.views.measurements.soundings import Verdict
 from app.missions.views.mission import EventView, Level, StepView, WaypointView
 from app.missions.views.targets import TargetRangePage, TargetRangeView
 from app.missions.views.telemetry import TelemetryView, telemetry_view
-from app.storage.bulk import read_in_pieces
 from app.storage.models import SoundingRow
 from app.storage.queries import events as event_queries
 from app.storage.queries import missions as mission_queries
@@ -70,14 +68,6 @@ async def soundings_of(live: LiveMission) -> Sequence[SoundingRow]:
     await live.journal.flush()
     async with live.database.reading() as session:
         return await sounding_queries.all_soundings(session, live.id)
-
-
-async def sounding_lines(live: LiveMission) -> SoundingLines:
-    """Return every sounding, rejected ones included, as it stands in a file."""
-    await live.journal.flush()
-    lines = SoundingLines()
-    await read_in_pieces(live.database, sounding_queries.columns_query(live.id, COLUMNS), lines.take)
-    return lines
 
 
 async def target_ranges_page(

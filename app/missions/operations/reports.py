@@ -21,6 +21,7 @@ from app.mapping.products.tracks import Track
 from app.mapping.s44 import Order
 from app.missions.clock import now
 from app.missions.live.mission import LiveMission
+from app.missions.maps.file_content import FileContent
 from app.missions.maps.products import (
     PRODUCTS,
     SWATHS,
@@ -32,15 +33,14 @@ from app.missions.maps.products import (
     snapshot_holidays,
 )
 from app.missions.maps.snapshot import MapSnapshot, quality_of
-from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.operations.corrections.adjustment import adjustment_view
 from app.missions.operations.corrections.crossovers import FoundCheck, check_of, crossovers_view
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.review import soundings_page
 from app.missions.operations.corrections.uncertainty_budget import budget_from, travel_depth_m
-from app.missions.operations.history import sounding_lines
 from app.missions.operations.imports.imports import imports_of, reference_of
 from app.missions.operations.maps.mission_maps import newest_map, surveyed, track_lines
+from app.missions.operations.maps.sounding_files import all_lines
 from app.missions.operations.pings import pings_of
 from app.missions.report.answers import Answers, Incident
 from app.missions.report.kinds import ReportKind
@@ -110,7 +110,7 @@ class Reports:
         kind = options.kind
         async with self._turn:
             content = await self._apart(live, options.order, _report, options)
-        return Product(product_name(live.facts, "report", kind.extension), kind.media_type, content)
+        return Product(product_name(live.facts, "report", kind.extension), kind.media_type, FileContent(content))
 
     async def _apart(
         self, live: LiveMission, order: Order, work: "Callable[[_Gathered, Asked], Made]", asked: Asked
@@ -143,7 +143,7 @@ class Reports:
             facts=live.facts,
             created=now(),
             map=snapshot.without_live(),
-            lines=SoundingLines() if many else await sounding_lines(live),
+            soundings=None if many else await all_lines(live),
             tracks=tracks,
             crossovers=found.check,
         )
@@ -255,12 +255,15 @@ def _plain(view: View | Sequence[View] | None) -> Any:
 
 
 def _summed(product: Product, name: str) -> dict[str, Any]:
+    digest = hashlib.sha256()
+    for piece in product.content.pieces():
+        digest.update(piece)
     return {
         "format": name,
         "name": product.filename,
         "title": PRODUCTS[name].title,
-        "size_bytes": len(product.content),
-        "sha256": hashlib.sha256(product.content).hexdigest(),
+        "size_bytes": product.content.size_bytes,
+        "sha256": digest.hexdigest(),
     }
 
 

@@ -23,8 +23,8 @@ import app
 from app.compute.packing import Raised, outcome
 from app.mapping.readers.confinement import ResourceLimits, limit
 from app.missions.errors import ProductUnavailableError
-from app.missions.operations.imports.uploads import unnamed_file
 from app.storage.concurrency.uncancellable import to_the_end
+from app.storage.unnamed_file import unnamed_file
 
 ROOT = str(Path(app.__file__).resolve().parents[1])
 """Where the process finds this program."""

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.missions.flight.decisions.decision import make_constraints
-from app.missions.flight.legs.commit import home_of
 from app.missions.live.mission import LiveMission
-from app.missions.recovery.berths import berth_spacing_m, farthest_m
+from app.missions.recovery.berths import berth_spacing_m, farthest_m, home_of
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.team import Member
@@ -54,7 +53,7 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
 
 
 def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
-    home_m = home_of(member, live.spec)
+    home_m = home_of(member.spec, member.slot, live.spec)
     if home_m is None:
         return
     name, title = f"recovery.{member.name}", f"Way home of {member.name}"

@@ -7,7 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from app.arrays import FloatArray
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec.recovery import Recovery
 from imc_bridge.control.layers import DepthLayer
 from imc_bridge.control.plans import HOME_RADIUS_M
 
@@ -19,6 +21,32 @@ def layer_of(name: str, cruise_m: dict[str, float], spacing_m: float) -> DepthLa
     """Return a vehicle's layer among those that travel at these depths, by name; of equals the first is above."""
     order = sorted(cruise_m, key=lambda one: cruise_m[one])
     return DepthLayer(tuple(cruise_m[one] for one in order), order.index(name), spacing_m)
+
+
+def home_of(vehicle: VehicleSpec, slot: int, spec: MissionSpec) -> FloatArray | None:
+    """Return where a vehicle comes home to, (2,): its own berth about the recovery point; None where it has none."""
+    recovery = spec.recovery_of(vehicle)
+    if recovery is None:
+        return None
+    point_m = point_of(recovery, spec)
+    # A point of its own is nobody else's.
+    if vehicle.recovery_point is not None:
+        return point_m
+    sharing = sum(other.recovery_point is None for other in spec.vehicles)
+    return berth_m(point_m, slot, sharing, berth_spacing_m(spec))
+
+
+def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
+    """Return a recovery point in the mission's frame, (2,)."""
+    return np.array(_local(recovery.point, spec.frame()))
+
+
+@lru_cache(maxsize=256)
+def _local(point: tuple[float, float], frame: LocalFrame) -> tuple[float, float]:
+    """Return a point (longitude, latitude) in a frame: asked for again and again."""
+    lon, lat = point
+    east, north = frame.to_local(np.array(lat), np.array(lon))
+    return float(east), float(north)
 
 
 def berth_m(home_m: FloatArray, slot: int, sharing: int, spacing_m: float) -> FloatArray:

@@ -75,11 +75,10 @@ def accepted_in(mission_id: str, box_m: tuple[float, float, float, float]) -> Se
     )
 
 
-async def vehicles_of(session: AsyncSession, mission_id: str) -> set[str]:
-    """Return the names of those who sounded something."""
-    return set(
-        await session.scalars(select(SoundingRow.vehicle).where(SoundingRow.mission_id == mission_id).distinct())
-    )
+async def vehicles_of(session: AsyncSession, mission_id: str, verdict: str | None = None) -> set[str]:
+    """Return the names of those who sounded something; ``verdict``: of which that is said."""
+    query = select(SoundingRow.vehicle).where(SoundingRow.mission_id == mission_id).distinct()
+    return set(await session.scalars(query if verdict is None else query.where(SoundingRow.verdict == verdict)))
 
 
 def track_query(mission_id: str) -> Select[*tuple[Any, ...]]:
@@ -164,6 +163,18 @@ def columns_query(mission_id: str, names: Sequence[str]) -> Select[*tuple[Any, .
     """Return the query of some columns, numbers and texts, of every sounding, in the order they came."""
     columns = [getattr(SoundingRow, name) for name in names]
     return select(*columns).where(SoundingRow.mission_id == mission_id).order_by(SoundingRow.id)
+
+
+def accepted_columns_query(mission_id: str, vehicle: str, names: Sequence[str]) -> Select[*tuple[Any, ...]]:
+    """Return the query of some columns, numbers and texts, of a vehicle's accepted soundings, as they came."""
+    row = SoundingRow
+    return columns_query(mission_id, names).where(row.vehicle == vehicle, row.verdict == "accepted")
+
+
+async def any_position_sd(session: AsyncSession, mission_id: str, vehicle: str) -> bool:
+    """Whether any accepted sounding of a vehicle states how uncertain its position is."""
+    query = accepted_columns_query(mission_id, vehicle, ["id"]).where(SoundingRow.position_sd_m.is_not(None))
+    return (await session.execute(query.limit(1))).first() is not None
 
 
 async def soundings_after(session: AsyncSession, mission_id: str, after: int, most: int) -> Sequence[SoundingRow]:

@@ -1,5 +1,6 @@
 """The map as JSON, picture and files."""
 
+import errno
 import io
 import zipfile
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import pytest
 import rasterio
 from PIL import Image
 
+from app.missions.maps import file_content
 from app.missions.settings import ProviderSettings
 from app.missions.views.maps.map import MapView
 from app.settings import Settings
@@ -136,6 +138,32 @@ async def test_every_file_is_downloaded_under_its_name(client: httpx.AsyncClient
         if extension == "tif":
             with rasterio.MemoryFile(answer.content) as file, file.open() as raster:
                 assert (raster.height, raster.width) == (shown["rows"], shown["cols"])
+
+
+async def test_files_that_do_not_fit_into_memory_are_the_same(
+    client: httpx.AsyncClient, measured: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("soundings.csv", "soundings.xyz", "map.tif"):
+        kept = await client.get(f"{measured}/{name}")
+        with monkeypatch.context() as patch:
+            patch.setattr(file_content, "MEMORY_BYTES", 50)
+            patch.setattr(file_content, "PIECE_BYTES", 11)
+            spooled = await client.get(f"{measured}/{name}")
+        assert spooled.content == kept.content
+        assert int(spooled.headers["content-length"]) == len(spooled.content) > 50
+
+
+async def test_a_file_that_the_disk_has_no_room_for_is_refused_whole(
+    client: httpx.AsyncClient, measured: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(file_content, "MEMORY_BYTES", 50)
+    monkeypatch.setattr(file_content, "unnamed_file", full)
+    answer = await client.get(f"{measured}/soundings.csv")
+    assert answer.status_code == 503
+    assert "No space left on device" in answer.json()["detail"]
 
 
 async def test_the_list_of_files_is_complete_and_every_path_answers(client: httpx.AsyncClient, measured: str) -> None:

@@ -23,7 +23,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import NODATA, bag
 from app.mapping.products.contours import find_contours
-from app.mapping.products.crowdsourced import Provider, RawSounding, crowdsourced_geojson
+from app.mapping.products.crowdsourced import CrowdsourcedFile, Provider, RawSounding
 from app.mapping.products.kml import contours_kml, tracks_kml
 from app.mapping.products.netcdf import netcdf
 from app.mapping.products.tracks import Track, TrackPoint, tracks_geojson, tracks_gpx
@@ -176,14 +176,15 @@ def test_a_clock_gone_wild_does_not_keep_a_track_from_leaving() -> None:
 def test_crowdsourced_soundings_are_valid_b12(position_sd_m: float | None, tmp_path: Path) -> None:
     raw = [RawSounding(-8.704, 41.185 + 1e-5 * i, 9.876, 0.1, 1.79e9 + 0.25 * i, position_sd_m) for i in range(4)]
     provider = Provider("Harbour & Sons", "map@example.org", "HARBOUR", "CC0 1.0")
-    (path := tmp_path / "b12.geojson").write_bytes(
-        crowdsourced_geojson(raw, "lauv-1", provider, version="1.0", created=CREATED)
-    )
+    file = CrowdsourcedFile("lauv-1", provider, "1.0", CREATED, uncertain=position_sd_m is not None)
+    parts = [file.part(raw[:1], first=True), file.part(raw[1:], first=False), file.part([], first=False)]
+    (path := tmp_path / "b12.geojson").write_bytes(b"".join([file.begin(), *parts, file.end()]))
     valid, found = csbschema.validate_data(path, version="3.1.0-2024-04")
     assert valid, found.get("errors")
     first = json.loads(path.read_text())
     assert [f["properties"]["depth"] for f in first["features"]] == [9.876] * 4
     assert first["features"][1]["properties"]["time"] == "2026-09-21T14:13:20.250Z"
-    again = json.loads(crowdsourced_geojson([], "lauv-1", provider, version="2.0", created=CREATED))
+    later = CrowdsourcedFile("lauv-1", provider, "2.0", CREATED, uncertain=False)
+    again = json.loads(later.begin() + later.end())
     identity = first["properties"]["trustedNode"]["uniqueVesselID"]
     assert identity == again["properties"]["trustedNode"]["uniqueVesselID"]

@@ -19,6 +19,7 @@ from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import NO_LEG, LegCommit
+from app.missions.flight.own_legs import MOST_AHEAD, OwnLegs
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
@@ -28,6 +29,7 @@ from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_state
+from tests.support.waiting import until
 
 APART = {"limits": {"max_step_m": 5.0, "min_separation_m": 0.0}}
 
@@ -188,6 +190,27 @@ async def test_a_vehicle_that_comes_back_while_its_leg_is_written_gets_numbers_o
     assert gone
     assert sorted(row.step for row in rows if row.vehicle == "b") == list(range(1, 16))
     assert max(row.step for row in rows if row.vehicle == "a") == 15
+
+
+async def test_who_comes_back_flies_as_many_legs_as_the_others_have_left_not_as_many_as_are_undecided(
+    service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decisions that take long give vehicles many legs at once, here all of them."""
+    monkeypatch.setattr(OwnLegs, "_legs_at_once", lambda *_: MOST_AHEAD)
+    mission = (await service.create(sim_spec(steps=15, side_m=60.0, **APART))).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: live.team.named("a").legs, "a leg")
+    await service.team_changes.take_out(live, "a", actor="Ana")
+    await until(lambda: live.team.named("b").legs == 15, "all legs of the other one")
+    await service.team_changes.rejoin(live, "a", actor="Ana")
+    of_b = live.team.named("b")
+    flown = of_b.legs - len(of_b.ahead)
+    await until_state(service, mission, MissionState.FINISHED)
+    async with database.reading() as session:
+        rows = (await session.scalars(select(WaypointRow))).all()
+    assert len([row for row in rows if row.vehicle == "b"]) == 15
+    assert len([row for row in rows if row.vehicle == "a" and row.step > flown]) == 15 - flown > 1
 
 
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:

@@ -82,7 +82,9 @@ async def test_letters_of_other_languages_stay_and_marks_that_turn_the_writing_a
 ) -> None:
     for kind in REPORTS.values():
         product = await harbour.service.reports.report(live, ReportOptions(kind, Language.PT))
-        text = text_of(product.content) if kind.extension == "pdf" else unescape(product.content.decode())
+        text = (
+            text_of(product.content.whole()) if kind.extension == "pdf" else unescape(product.content.whole().decode())
+        )
         assert "港湾測量 — порт \\u202egnp.exe" in text
         assert "\u202e" not in text
 
@@ -95,7 +97,7 @@ async def test_a_report_is_made_once_for_all_who_ask_and_is_the_same_for_the_sam
     options = ReportOptions(kind)
     found = await asyncio.gather(*(harbour.service.reports.report(live, options) for _ in range(5)))
     assert len(made) == 1
-    assert len({product.content for product in found}) == 1
+    assert len({product.content.whole() for product in found}) == 1
     answers = await harbour.service.reports.answers(live)
     one, other = (pdf(sections.document_of(answers, Texts(Language.EN))) for _ in range(2))
     assert one == other
@@ -112,7 +114,7 @@ async def test_a_mission_under_way_has_a_report_of_what_is_known(harbour: Harbou
         return live.journal.counts.accepted > 20
 
     await until(sounded, "something was sounded")
-    page = (await harbour.service.reports.report(live, ReportOptions(REPORTS["html"]))).content.decode()
+    page = (await harbour.service.reports.report(live, ReportOptions(REPORTS["html"]))).content.whole().decode()
     assert "The mission has not ended" in page
     assert "Files are not summed" in page
     assert "data:image/svg+xml" in page

@@ -10,9 +10,9 @@ from shapely.geometry import Point, Polygon
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import FaultKind
 from app.missions.fleet.links.sim import SimFleetLink
-from app.missions.flight.legs.commit import home_of
 from app.missions.flown import Phase
 from app.missions.operations.history import events_after
+from app.missions.recovery.berths import home_of
 from app.missions.running.homecoming import call_home, hold
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec, VehicleKind
@@ -124,7 +124,8 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     live = await service.get(mission.id)
     await call_home(live, "a", "Ana")
     on_its_way = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
-    berth_m = home_of(live.team.members["a"], live.spec)
+    vehicle = live.team.members["a"]
+    berth_m = home_of(vehicle.spec, vehicle.slot, live.spec)
     assert berth_m is not None
     lat, lon = live.frame.to_geographic(*berth_m)
     assert on_its_way.way_home[-1] == pytest.approx((float(lon), float(lat)), abs=1e-6)

@@ -99,7 +99,7 @@ async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
     spec = sim_spec(steps=3, planner={"name": "lawnmower"})
 
     async def product() -> bytes:
-        return (await export(live, service.maps, service.settings.provider, service.compute, "tif")).content
+        return (await export(live, service.maps, service.settings.provider, service.compute, "tif")).content.whole()
 
     async def adjusted(mission: LiveMission) -> dict[str, Any]:
         return (await adjust(mission, AdjustmentRequest(), "Ana")).model_dump(exclude={"made_at"})

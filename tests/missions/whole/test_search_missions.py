@@ -75,7 +75,7 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     product = await export(
         await service.get(mission.id), service.maps, service.settings.provider, service.compute, "obstacles.geojson"
     )
-    geo = json.loads(product.content)
+    geo = json.loads(product.content.whole())
     seen = [f for f in geo["features"] if f["properties"]["found"]]
     assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
     assert figures is not None

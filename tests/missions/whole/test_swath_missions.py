@@ -103,7 +103,7 @@ async def test_cells_and_what_was_left_are_the_same_after_the_service_started_ag
         mission = await harbour.service.get(live.id)
         settings = harbour.service.settings
         product = await export(mission, harbour.service.maps, settings.provider, harbour.service.compute, "vr.bag")
-        with h5py.File(io.BytesIO(product.content)) as file:
+        with h5py.File(io.BytesIO(product.content.whole())) as file:
             return [file[f"BAG_root/varres_{name}"][:] for name in ("metadata", "refinements", "nodes")]
 
     places, nodes, samples = await refined()

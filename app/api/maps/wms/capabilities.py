@@ -45,7 +45,7 @@ class Offer:
 def capabilities(offer: Offer, version: str) -> bytes:
     """Return the document that programs begin with."""
     new = version == NEW
-    attributes = {"version": version, "xmlns:xlink": "http://www.w3.org/1999/xlink"}
+    attributes = {"version": version}
     if new:
         attributes |= {
             "xmlns": "http://www.opengis.net/wms",
@@ -149,4 +149,6 @@ def _corners(min_x: float, min_y: float, max_x: float, max_y: float) -> dict[str
 
 
 def _link(parent: ET.Element, address: str) -> None:
-    ET.SubElement(parent, "OnlineResource", {"xlink:type": "simple", "xlink:href": address})
+    # Declared where the DTD of 1.1.1 declares it: it allows that nowhere else.
+    attributes = {"xmlns:xlink": "http://www.w3.org/1999/xlink", "xlink:type": "simple", "xlink:href": address}
+    ET.SubElement(parent, "OnlineResource", attributes)

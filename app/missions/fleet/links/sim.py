@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import structlog
 
-from app.compiled import RAYS, wait_for_compiling
+from app.compiled.cache import RAYS, wait_for_compiling
 from app.missions.clock import now
 from app.missions.fleet.interface import (
     BeamGeometry,

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from shapely import Polygon
@@ -13,16 +12,14 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.motion.turning import disc, turned_over
-from app.mapping.coordinates.georeference import LocalFrame
 from app.missions import metrics, safety
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decisions.decision import Decision, Leg, turn_radius_m
 from app.missions.live.mission import RISES, LiveMission
-from app.missions.recovery.berths import berth_m, berth_spacing_m
+from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.spec.mission import Guidance, MissionSpec
-from app.missions.spec.recovery import Recovery
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
@@ -187,7 +184,7 @@ class LegCommit:
         here = np.append(member.place_m(self._live.frame), depth_m)[None]
         there = np.append(leg.target_m, depth_m)[None]
         constraints = self._constraints
-        if member.withdrawal is not None and (home_m := home_of(member, self._live.spec)) is not None:
+        if member.withdrawal is not None and (home_m := home_of(member.spec, member.slot, self._live.spec)) is not None:
             constraints = homeward_ground(constraints, home_m)
         broken = constraints.violations((member.name,), here, there)
         return next((violation.reason for violation in broken if violation.limit in WHERE), "")
@@ -348,32 +345,6 @@ class LegCommit:
                 continue
             words = f"{member.name} goes on with the mapping" if target is None else f"{member.name} goes for {target}"
             await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
-
-
-def home_of(member: Member, spec: MissionSpec) -> FloatArray | None:
-    """Return where a vehicle comes home to, (2,): its own berth about the recovery point; None where it has none."""
-    recovery = spec.recovery_of(member.spec)
-    if recovery is None:
-        return None
-    point_m = point_of(recovery, spec)
-    # A point of its own is nobody else's.
-    if member.spec.recovery_point is not None:
-        return point_m
-    sharing = sum(vehicle.recovery_point is None for vehicle in spec.vehicles)
-    return berth_m(point_m, member.slot, sharing, berth_spacing_m(spec))
-
-
-def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
-    """Return a recovery point in the mission's frame, (2,)."""
-    return np.array(_local(recovery.point, spec.frame()))
-
-
-@lru_cache(maxsize=256)
-def _local(point: tuple[float, float], frame: LocalFrame) -> tuple[float, float]:
-    """Return a point (longitude, latitude) in a frame: asked for again and again."""
-    lon, lat = point
-    east, north = frame.to_local(np.array(lat), np.array(lon))
-    return float(east), float(north)
 
 
 def way_m(ends_m: Sequence[FloatArray], spec: MissionSpec) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.missions import safety
-from app.missions.flight.legs.commit import LegCommit, home_of
+from app.missions.flight.legs.commit import LegCommit
 from app.missions.live.mission import LiveMission
-from app.missions.recovery.berths import layer_of
+from app.missions.recovery.berths import home_of, layer_of
 from app.missions.recovery.failsafes import drift_reserve_s, with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
@@ -57,7 +57,7 @@ class RangeLeft:
 
     def way(self, member: Member) -> FloatArray | None:
         """Return the corners of a vehicle's way home, (n, 2), from about where it is; None: it has none."""
-        home_m = home_of(member, self._live.spec)
+        home_m = self._home_m(member)
         if home_m is None or member.report is None:
             return None
         here_m = member.place_m(self._live.frame)
@@ -73,7 +73,7 @@ class RangeLeft:
         It may set out from anywhere on that leg. Where something stands between the leg and the way from where the
         vehicle is now, it goes to the leg's end first, along the leg.
         """
-        way_m, home_m, end_m = self.way(member), home_of(member, self._live.spec), member.target_m
+        way_m, home_m, end_m = self.way(member), self._home_m(member), member.target_m
         if way_m is None or home_m is None or end_m is None or not member.ordered or member.withdrawal is not None:
             return way_m
         here_m = member.place_m(self._live.frame)
@@ -91,6 +91,9 @@ class RangeLeft:
         way_m = None if off_land is None else off_land.way(here_m)
         # Better over ground that looks too shallow, at the surface, than not at all.
         return anyhow.way(here_m) if way_m is None else way_m
+
+    def _home_m(self, member: Member) -> FloatArray | None:
+        return home_of(member.spec, member.slot, self._live.spec)
 
     def _ways_to(self, home_m: FloatArray) -> tuple[WaysHome, WaysHome | None]:
         key = (float(home_m[0]), float(home_m[1]))
@@ -145,7 +148,7 @@ class RangeLeft:
 
     def beyond_m(self, member: Member) -> float | None:
         """Return how far a vehicle may be sent beyond its legs, by its energy; None: as far as the mission likes."""
-        home_m, left = home_of(member, self._live.spec), member.energy.left
+        home_m, left = self._home_m(member), member.energy.left
         if home_m is None or left is None or member.report is None:
             return None
         end_m = member.last_end_m(self._live.frame)
@@ -156,7 +159,7 @@ class RangeLeft:
 
     def turn_back(self, member: Member) -> FloatArray | None:
         """Return where on its planned legs it has to turn back at the latest, (2,); None: nowhere, or unknown."""
-        home_m, left = home_of(member, self._live.spec), member.energy.left
+        home_m, left = self._home_m(member), member.energy.left
         if home_m is None or left is None or member.report is None or member.withdrawal is not None:
             return None
         around_s = self._around_s(member, home_m)
@@ -171,7 +174,7 @@ class RangeLeft:
 
     def allows(self, member: Member, target_m: FloatArray) -> bool:
         """Whether a vehicle's energy lasts for one more leg, to a target (2,), and for the way home from there."""
-        home_m, left = home_of(member, self._live.spec), member.energy.left
+        home_m, left = self._home_m(member), member.energy.left
         if home_m is None or left is None or member.report is None:
             return True
         end_m = member.last_end_m(self._live.frame)
@@ -182,7 +185,7 @@ class RangeLeft:
 
     def lasts_for(self, member: Member, start_m: FloatArray, way_m: FloatArray) -> bool:
         """Whether a vehicle's energy lasts for a way (k, 2) from a place (2,), and home from each of its corners."""
-        home_m, left = home_of(member, self._live.spec), member.energy.left
+        home_m, left = self._home_m(member), member.energy.left
         if home_m is None or left is None or member.report is None:
             return True
         speed_mps = self._live.spec.speed_of(member.spec)

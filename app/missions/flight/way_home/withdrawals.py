@@ -9,12 +9,13 @@ import structlog
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointStatus
-from app.missions.flight.legs.commit import LegCommit, home_of, point_of
+from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.range_left import RangeLeft
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission, phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
+from app.missions.recovery.berths import home_of, point_of
 from app.missions.recovery.failsafes import LINK_LOST_S
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.team import Member, Withdrawal
@@ -165,7 +166,7 @@ class Withdrawals:
     async def _go_home(self, member: Member, withdrawal: Withdrawal) -> None:
         """Send a vehicle home from where it is, at its depth, and up there."""
         spec = self._live.spec
-        recovery, home_m = spec.recovery_of(member.spec), home_of(member, spec)
+        recovery, home_m = spec.recovery_of(member.spec), home_of(member.spec, member.slot, spec)
         here_m = member.place_m(self._live.frame)
         if recovery is None or home_m is None:
             await self._end(member, withdrawal, f"{member.name} has no recovery point and stops where it is")

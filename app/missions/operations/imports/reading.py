@@ -30,8 +30,9 @@ from app.mapping.readers.types import (
     ReadOptions,
 )
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
-from app.missions.operations.imports.uploads import Upload, unnamed_file
+from app.missions.operations.imports.uploads import Upload
 from app.storage.concurrency.uncancellable import to_the_end
+from app.storage.unnamed_file import unnamed_file
 
 log = structlog.get_logger(__name__)
 

@@ -4,7 +4,6 @@ import asyncio
 import errno
 import hashlib
 import os
-import tempfile
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import IO, Any
 
 from app.missions.errors import FileTooLargeError, ImportUnavailableError
 from app.storage.concurrency.uncancellable import to_the_end
+from app.storage.unnamed_file import unnamed_file
 
 MAX_AT_ONCE = 8
 """Of each the disk holds at most ``max_import_bytes``."""
@@ -89,24 +89,6 @@ def open_upload(path: Path) -> Upload:
         file.close()
         raise
     return Upload(file, size, digest)
-
-
-def unnamed_file() -> IO[bytes]:
-    """Return a new file without a name, which only this process can open.
-
-    It lies where ``TMPDIR`` says, else in ``/var/tmp``, which is on disk where ``/tmp`` is memory, else in the working
-    directory. Raises OSError.
-    """
-    given = os.environ.get("TMPDIR")
-    for folder in (given,) if given else ("/var/tmp", "."):  # noqa: S108 - the file has no name
-        try:
-            return tempfile.TemporaryFile(dir=folder, prefix="bathyfleet-")
-        except (PermissionError, FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError as error:
-            if error.errno != errno.EROFS:
-                raise
-    return tempfile.TemporaryFile(prefix="bathyfleet-")
 
 
 async def _spool(parts: AsyncIterator[bytes], file: IO[bytes], max_bytes: int) -> tuple[int, str]:

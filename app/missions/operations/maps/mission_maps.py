@@ -1,23 +1,22 @@
 """A mission's map as it is asked for: the newest, the one of a step, what changed in it, and the files made of it."""
 
 import asyncio
-from collections.abc import Sequence
-
-import numpy as np
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from app.compute.compute import Compute
 from app.mapping.products.tracks import Track, TrackPoint
-from app.mapping.types import SoundingRows
 from app.missions.clock import now
-from app.missions.errors import MapNotReadyError
+from app.missions.errors import MapNotReadyError, ProductUnavailableError
 from app.missions.live.mission import LiveMission
 from app.missions.live.sounding_store import accepted
 from app.missions.maps.builder import BuiltMap
+from app.missions.maps.file_content import FileContent
 from app.missions.maps.products import (
     ACCEPTED,
     CROSSOVERS,
-    LINES,
     MAP,
+    RAW,
     SEARCH,
     SOUNDINGS,
     SURVEY,
@@ -30,9 +29,8 @@ from app.missions.maps.products import (
     product_kind,
 )
 from app.missions.maps.snapshot import MapSnapshot
-from app.missions.maps.sounding_lines import SoundingLines
 from app.missions.operations.corrections.crossovers import check_of
-from app.missions.operations.history import sounding_lines, soundings_of
+from app.missions.operations.maps.sounding_files import accepted_xyz, all_lines, crowdsourced, only_vehicle
 from app.missions.operations.scans import search_of
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
@@ -40,8 +38,6 @@ from app.missions.views.measurements.soundings import Verdict
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import pings as ping_queries
 from app.storage.queries import soundings as sounding_queries
-
-NONE: SoundingRows = np.zeros((0, 4))
 
 
 async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True) -> MapSnapshot:
@@ -119,31 +115,43 @@ async def export(
     ProductUnavailableError
         When the process that makes files of large maps was ended.
     """
-    needs = product_kind(name).needs
+    kind, chosen = product_kind(name), options or ProductOptions()
+    needs = kind.needs
+    if kind.of_vehicle:
+        chosen = replace(chosen, vehicle=await only_vehicle(live, chosen.vehicle))
     snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
     material = Material(
         facts=live.facts,
         created=now(),
         provider=provider.named(),
         map=None if snapshot is None else snapshot.without_live(),
-        soundings=await soundings_of(live) if SOUNDINGS in needs else (),
-        accepted=await _accepted_of(live) if ACCEPTED in needs else NONE,
-        lines=await sounding_lines(live) if LINES in needs else SoundingLines(),
+        soundings=await _sounding_file(live, provider, needs, chosen),
         tracks=await track_lines(live) if TRACKS in needs else (),
         search=search_of(live) if SEARCH in needs else None,
         surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
         crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
     )
-    chosen = options or ProductOptions()
     if snapshot is not None and snapshot.large:
         return await compute.make(make_product, name, material, chosen)
     return await live.in_thread(make_product, name, material, chosen)
 
 
-async def _accepted_of(live: LiveMission) -> SoundingRows:
-    """Return the accepted soundings, (n, 4)."""
-    await live.journal.flush()
-    return (await accepted(live.database, live.id, live.journal.counts.accepted)).table
+async def _sounding_file(
+    live: LiveMission, provider: ProviderSettings, needs: Collection[str], options: ProductOptions
+) -> FileContent | None:
+    """Return the file of soundings that is asked for. Raises ProductUnavailableError where the disk has no room."""
+    try:
+        if SOUNDINGS in needs:
+            return await all_lines(live)
+        if ACCEPTED in needs:
+            return await accepted_xyz(live)
+        if RAW in needs and options.vehicle is not None:
+            return await crowdsourced(live, provider.named(), options.vehicle)
+    except OSError as error:
+        raise ProductUnavailableError(
+            f"the file cannot be kept while it is sent: {error.strerror}", "make room on the service's disk"
+        ) from None
+    return None
 
 
 async def surveyed(live: LiveMission) -> Surveyed:

@@ -156,6 +156,14 @@ def test_colours_of_ones_own_are_in_maps_and_what_leads_to_them(gis: Gis) -> Non
     assert all("?COLORSCALERANGE=0.0%2C60.0&" in link for link in links)
 
 
+def test_the_older_version_declares_names_where_its_document_type_does(gis: Gis) -> None:
+    """WMS_MS_Capabilities.dtd gives OnlineResource the declaration of xlink, and no other element."""
+    begin = {"SERVICE": "WMS", "REQUEST": "GetCapabilities", "VERSION": "1.1.1"}
+    text = gis.client.get(f"{gis.url}/wms/missions/{gis.single}", params=begin).text
+    assert text.count("<OnlineResource ") > 4
+    assert text.count('<OnlineResource xmlns:xlink="http://www.w3.org/1999/xlink"') == text.count("xmlns:")
+
+
 def online_resources(capabilities: str) -> set[str]:
     found = [one for one in ET.fromstring(capabilities).iter() if one.tag.endswith("OnlineResource")]  # noqa: S314 - ours
     return {one.attrib["{http://www.w3.org/1999/xlink}href"] for one in found}

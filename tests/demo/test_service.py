@@ -8,7 +8,7 @@ import httpx
 import pytest
 from rich.console import Console
 
-from app.demo_service import client, get, serve_during
+from app.demo.service import client, get, serve_during
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from numba.core.caching import IndexDataCacheFile, _SourceFileBackedLocatorMixin
 
-from app.compiled_sources import digest_of, is_ours
+from app.compiled.sources import digest_of, is_ours
 
 _load_index: Callable[[IndexDataCacheFile], dict[Any, str]] = IndexDataCacheFile._load_index
 _stamp: Callable[[_SourceFileBackedLocatorMixin], object] = _SourceFileBackedLocatorMixin.get_source_stamp

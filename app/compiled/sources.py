@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("app", "simulator", "imc_bridge")
 _NAME = rf"(?:{'|'.join(PACKAGES)})(?:\.\w+)*"
 _IMPORT = re.compile(

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from app import compiled
-from app.compiled import FIRST, PARTS, PROCESSES, compile_beside, wait_for_compiling
+from app.compiled import cache as compiled
+from app.compiled.cache import FIRST, PARTS, PROCESSES, compile_beside, wait_for_compiling
 from tests.support.faults.other_users import SERVICE, as_user, needs_root
 from tests.support.paths import PROJECT
 
 PROGRAM = """
-from app.compiled import keep_compiled
+from app.compiled.cache import keep_compiled
 folder = keep_compiled()
 import app.mapping.gaussian
 print(folder, f"{folder.stat().st_mode & 0o777:o}" if folder else "-")
@@ -136,15 +136,15 @@ def scaled(x):
     return FACTOR * x
 """
 REPORT = (
-    "import app.compiled_index; from app.whole import whole; print(whole(2.0), sum(whole.stats.cache_hits.values()))"
+    "import app.compiled.index; from app.whole import whole; print(whole(2.0), sum(whole.stats.cache_hits.values()))"
 )
 
 
 def test_a_function_is_compiled_again_when_one_that_it_calls_or_a_constant_of_that_changed(tmp_path: Path) -> None:
     package = tmp_path / "app"
     package.mkdir()
-    for name in ("__init__.py", "compiled_index.py", "compiled_sources.py"):
-        shutil.copy(PROJECT / "app" / name, package / name)
+    shutil.copy(PROJECT / "app" / "__init__.py", package)
+    shutil.copytree(PROJECT / "app" / "compiled", package / "compiled")
 
     def result(*, factor: float, imported: str = "scaled", aside: str = "") -> list[float]:
         (package / "sizes.py").write_text(f"FACTOR = {factor}\n")

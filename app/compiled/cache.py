@@ -17,7 +17,7 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from app.compiled_sources import digest_of, module_file
+from app.compiled.sources import digest_of, module_file
 
 VARIABLE = "NUMBA_CACHE_DIR"
 PATIENCE_S = 120.0
@@ -57,7 +57,7 @@ FIRST = ("constraints", "plans")
 PROCESSES = ((RAYS, "constraints", "maps"), ("plans", "search", "checks"))
 """Who compiles what, in which order."""
 
-_PROGRAM = "import sys; from app.compiled import compile_parts; compile_parts(sys.argv[1:])"
+_PROGRAM = "import sys; from app.compiled.cache import compile_parts; compile_parts(sys.argv[1:])"
 _beside: dict[str, subprocess.Popen[bytes]] = {}
 """The process that compiles each part."""
 
@@ -160,7 +160,7 @@ def _mark(part: str) -> Path:
 def _usual() -> list[Path]:
     """Where numba looks: beside the code, and in the user's folder for what can be made again."""
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - a user may have no home
-    return [Path(__file__).parent / "mapping" / "__pycache__", Path(cache) / "numba"]
+    return [Path(__file__).parents[1] / "mapping" / "__pycache__", Path(cache) / "numba"]
 
 
 def _writable(folder: Path) -> bool:

@@ -10,7 +10,7 @@ import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from app.demo_service import DemoError, check, client, get, post, serve_during
+from app.demo.service import DemoError, check, client, get, post, serve_during
 from app.missions.search.examples import example
 from app.settings import Settings
 from app.storage import private

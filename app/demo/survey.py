@@ -24,7 +24,7 @@ from rich.table import Table
 from rich.text import Text
 
 from app.arrays import FloatArray
-from app.demo_service import DemoError, check, client, get, post, serve_during
+from app.demo.service import DemoError, check, client, get, post, serve_during
 from app.evaluation.survey.baselines import Baseline, lawnmower_baselines
 from app.exploration.core.constraints import Constraints
 from app.mapping.compare import difference

@@ -1,0 +1,89 @@
+"""A mission's soundings as files, made piece by piece as they are read: however many there are, few are in memory."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from app import __version__
+from app.arrays import FloatArray
+from app.mapping.products.crowdsourced import CrowdsourcedFile, Provider, RawSounding
+from app.mapping.products.text import soundings_xyz
+from app.mapping.types import Soundings
+from app.missions.clock import now
+from app.missions.errors import InvalidRequestError
+from app.missions.live.mission import LiveMission
+from app.missions.maps.file_content import FileContent
+from app.missions.maps.sounding_lines import COLUMNS, header_line, sounding_lines
+from app.missions.views.measurements.soundings import Verdict
+from app.storage.bulk import read_in_pieces, read_numbers
+from app.storage.queries import soundings as sounding_queries
+
+RAW = ("lon_deg", "lat_deg", "raw_depth_m", "sd_m", "time_s", "position_sd_m")
+"""Columns of a :class:`RawSounding`, in its order."""
+
+
+async def all_lines(live: LiveMission) -> FileContent:
+    """Return every sounding, rejected ones included, as CSV."""
+    await live.journal.flush()
+    content = FileContent(header_line(live.facts.vertical_datum.statement))
+    query = sounding_queries.columns_query(live.id, COLUMNS)
+    await read_in_pieces(live.database, query, lambda rows: content.add(sounding_lines(rows)))
+    return content
+
+
+async def accepted_xyz(live: LiveMission) -> FileContent:
+    """Return the accepted soundings as XYZ text: longitude, latitude, depth, deviation."""
+    await live.journal.flush()
+    content, facts = FileContent(), live.facts
+
+    def take(rows: FloatArray) -> None:
+        soundings = Soundings.of_rows(rows[:, :4])
+        datum = facts.vertical_datum.statement
+        text = soundings_xyz(
+            soundings, facts.frame, vertical_datum=datum, geographic=True, headed=not content.size_bytes
+        )
+        content.add(text)
+
+    take(np.zeros((0, 5)))  # the header, also where nothing was accepted
+    await read_numbers(live.database, sounding_queries.accepted_query(live.id), take)
+    return content
+
+
+async def crowdsourced(live: LiveMission, provider: Provider | None, vehicle: str) -> FileContent:
+    """Return the raw accepted soundings of a vehicle as IHO B-12 has them.
+
+    Raises InvalidRequestError where nobody is named who hands them in.
+    """
+    if provider is None:
+        raise InvalidRequestError(
+            "provider",
+            "IHO B-12 asks who hands soundings in, and the settings do not say",
+            "set provider.organization and provider.email in bathyfleet.toml",
+        )
+    async with live.database.reading() as session:
+        uncertain = await sounding_queries.any_position_sd(session, live.id, vehicle)
+    file = CrowdsourcedFile(vehicle, provider, __version__, now(), uncertain)
+    content, first = FileContent(file.begin()), True
+
+    def take(rows: Sequence[Sequence[Any]]) -> None:
+        nonlocal first
+        content.add(file.part((RawSounding(*row) for row in rows), first=first))
+        first = False
+
+    await read_in_pieces(live.database, sounding_queries.accepted_columns_query(live.id, vehicle, RAW), take)
+    content.add(file.end())
+    return content
+
+
+async def only_vehicle(live: LiveMission, vehicle: str | None) -> str:
+    """Return the vehicle whose soundings are meant. Raises InvalidRequestError when that is not clear."""
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        present = sorted(await sounding_queries.vehicles_of(session, live.id, Verdict.ACCEPTED))
+    if vehicle is None and len(present) == 1:
+        return present[0]
+    if vehicle not in present:
+        said = "several vehicles have soundings" if vehicle is None else f"{vehicle!r} has no accepted sounding"
+        raise InvalidRequestError("vehicle", said, "name one of " + (", ".join(present) or "none so far"))
+    return vehicle
