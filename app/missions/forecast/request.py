@@ -110,7 +110,8 @@ class Forecaster:
         async with live.database.reading() as session:
             prior = await sounding_queries.imported_arrays(session, live.id)
             step = await mission_queries.last_step(session, live.id)
-        team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in live.team]
+        flying = live.team.surveying or list(live.team)
+        team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in flying]
         return await self.make(
             live.spec,
             members=team,

@@ -80,6 +80,8 @@ class Craft:
     sonar: SwathSonar | None
     corners_m: list[FloatArray]
     clock_s: list[float]
+    position_sd_m: float
+    """What it says of how well it knows its place; NaN: it does not say."""
     unseen: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
     """Poses (n, 4): east, north, heading and depth."""
     idle: int = 0
@@ -115,7 +117,7 @@ class SwathFlight:
         self._constraints, self._planner = make_constraints(spec), planner_of(spec, so_far)
         self.swarm = Swarm(spec, members, starts_m, so_far.first_step)
         self._crafts = [
-            Craft(swath_sonar(member.spec), [start], [0.0])
+            Craft(swath_sonar(member.spec), [start], [0.0], position_sd_m(member))
             for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
         ]
         self._rng = np.random.default_rng([spec.seed, 1])
@@ -209,7 +211,17 @@ class SwathFlight:
         spec, noise_m = self._spec, np.maximum(self._spec.sounding_noise * slant_m, LEAST_SD_M)
         went = BeamGeometry(np.arccos(np.clip(down_m / slant_m, 0.0, 1.0)), down_m, np.zeros_like(down_m))
         depth = depth + noise_m * self._rng.standard_normal(len(depth))
-        self.builder.swath.add_placed(east, north, depth, uncertainty(went, spec.uncertainty))
+        self.builder.swath.add_placed(
+            east, north, depth, uncertainty(went, spec.uncertainty, np.full_like(down_m, craft.position_sd_m))
+        )
+
+
+def position_sd_m(member: Member) -> float:
+    """Return what a vehicle says of how well it knows its place; NaN: it does not say."""
+    if member.report is not None and member.report.position_sd_m is not None:
+        return member.report.position_sd_m
+    # Simulated ones do, before anyone has launched them.
+    return 0.0 if member.capabilities.simulated else math.nan
 
 
 def swath_of(
