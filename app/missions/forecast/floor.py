@@ -64,9 +64,9 @@ def forecast_cell_m(spec: MissionSpec) -> float:
     return float(max(spec.cell_m, np.sqrt(Polygon(spec.local_area()).area / CELLS)))
 
 
-def one_a_cell(rows: FloatArray, cell_m: float) -> FloatArray:
-    """Return the last of the soundings (n, 4) in each square of half a cell."""
-    squares = np.floor(rows[::-1, :2] / (0.5 * cell_m)).astype(np.int64)
+def thinned(rows: FloatArray, side_m: float) -> FloatArray:
+    """Return the last of the soundings (n, 4) in each square of this side."""
+    squares = np.floor(rows[::-1, :2] / side_m).astype(np.int64)
     _, last = np.unique(squares, axis=0, return_index=True)
     return rows[::-1][np.sort(last)]
 
@@ -90,7 +90,7 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
     guess = max(LEAST_GUESS_M, deepest_m + spec.limits.min_altitude_m + ROOM_M)
     known, doubt, share = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan), 0.0
     if len(rows):
-        imported = prior_map(Soundings.of_rows(one_a_cell(rows, cell_m)), grid, mask)
+        imported = prior_map(Soundings.of_rows(thinned(rows, 0.5 * cell_m)), grid, mask)
         known, doubt = imported.depth_m, imported.sd_m
         share = float(np.mean(imported.prior[mask])) if imported.prior is not None else 0.0
     has = np.isfinite(known)

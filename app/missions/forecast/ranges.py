@@ -12,6 +12,9 @@ WAY_SD = 0.02
 """Standard deviation, as a share, of how much longer or shorter ways come out than they are flown ahead: vehicles wait
 for others, turn wider and drift."""
 
+DEVIATION_SD = 0.05
+"""The same of a map's mean deviation: fewer soundings are flown ahead than at sea."""
+
 DRAWS = (0.0, 0.67, -0.67, -1.38, 0.21, -0.21, 1.38, 0.43, -0.43, 0.97, -0.97)
 """Eleven evenly likely draws of a normal figure, in an order that follows no other."""
 
@@ -33,6 +36,6 @@ def range_of(values: Sequence[float]) -> ForecastRange:
     return ForecastRange(low=low, high=high)
 
 
-def with_unforeseen(values: Sequence[float]) -> list[float]:
-    """Return ways, or times, of flights ahead with what they do not know of."""
-    return [value * (1.0 + WAY_SD * DRAWS[k % len(DRAWS)]) for k, value in enumerate(values)]
+def with_unforeseen(values: Sequence[float], sd: float) -> list[float]:
+    """Return figures of flights ahead with what they do not know of; ``sd`` is the deviation of that as a share."""
+    return [value * (1.0 + sd * DRAWS[k % len(DRAWS)]) for k, value in enumerate(values)]

@@ -16,8 +16,9 @@ from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
 from app.missions.flight.decisions.decision import make_constraints
-from app.missions.forecast.ranges import ForecastRange, range_of, with_unforeseen
-from app.missions.forecast.simulate import Forecast, floors_under, fly_over, forecast
+from app.missions.forecast.floor import forecast_cell_m, thinned
+from app.missions.forecast.ranges import DEVIATION_SD, WAY_SD, ForecastRange, range_of, with_unforeseen
+from app.missions.forecast.simulate import SOUNDINGS_A_CELL, Forecast, floors_under, fly_over, forecast
 from app.missions.forecast.swarm import SoFar
 from app.missions.forecast.swath_flight import sweeps
 from app.missions.forecast.whole_survey import WholeSurveyView, whole_view, whole_way
@@ -110,12 +111,13 @@ class Forecaster:
         async with live.database.reading() as session:
             prior = await sounding_queries.imported_arrays(session, live.id)
             step = await mission_queries.last_step(session, live.id)
+        sounded = await asyncio.to_thread(sounded_so_far, live)
         flying = live.team.surveying or list(live.team)
         team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in flying]
         return await self.make(
             live.spec,
             members=team,
-            so_far=SoFar(live.header.step + 1, prior, sounded_so_far(live), b"" if step is None else step.memory),
+            so_far=SoFar(live.header.step + 1, prior, sounded, b"" if step is None else step.memory),
             floor_depth_m=floor_depth_m,
         )
 
@@ -185,11 +187,14 @@ class Forecaster:
 
 
 def sounded_so_far(live: LiveMission) -> FloatArray:
-    """Return what a mission has sounded itself, (n, 4): of what swath sonars saw one sounding in each cell."""
+    """Return what a mission has sounded itself, (n, 4), as densely as it is flown ahead.
+
+    Of what swath sonars saw it is one sounding in each cell.
+    """
     rows = np.concatenate([live.builder.soundings, *live.builder.arrivals.noted()])
     built = live.builder.newest
     if not live.builder.swath.beams or built is None:
-        return rows
+        return thinned(rows, forecast_cell_m(live.spec) / SOUNDINGS_A_CELL)
     seen = built.map.sounded & np.isfinite(built.map.depth_m) & np.isfinite(built.map.sd_m)
     return np.column_stack([built.map.grid.centres_m[seen.ravel()], built.map.depth_m[seen], built.map.sd_m[seen]])
 
@@ -276,10 +281,13 @@ def _view(
             "after as many."
         )
 
-    sds = [flight.mean_sd_m for flight in flights if flight.mean_sd_m is not None]
-    durations = with_unforeseen([flight.duration_s for flight in flights])
+    sds = with_unforeseen([f.mean_sd_m for f in flights if f.mean_sd_m is not None], DEVIATION_SD)
+    durations = with_unforeseen([flight.duration_s for flight in flights], WAY_SD)
     coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
-    ways = {name: with_unforeseen([flight.distances_m[name] for flight in flights]) for name in flights[0].distances_m}
+    ways = {
+        name: with_unforeseen([flight.distances_m[name] for flight in flights], WAY_SD)
+        for name in flights[0].distances_m
+    }
     return ForecastView(
         duration_s=_median(durations),
         duration_s_range=range_of(durations),
