@@ -40,7 +40,8 @@ DEPTH_SD = 0.4
 """Of the logarithm of a depth that is guessed."""
 
 USUAL_RELIEF = 0.1
-"""Between soundings a floor that is this high differs from their map as that map's deviation says."""
+"""Between soundings a floor that is this high differs from their map as that map's deviation says, and never more than
+its relief is high."""
 
 CELLS = 2500
 """Cells of a forecast's map at most: more make it slower, hardly other."""
@@ -110,7 +111,8 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
             # Outside of the area, and where no map reaches, it goes on from the nearest place that is known.
             near = tuple(distance_transform_edt(~has, return_distances=False, return_indices=True))
             inner, hills = z[: grid.rows, : grid.cols], unit[: grid.rows, : grid.cols]
-            apart_m = np.where(has, doubt * math.sqrt(relief / USUAL_RELIEF), relief * middle) * hills
+            between_m = np.minimum(doubt * math.sqrt(relief / USUAL_RELIEF), relief * middle)
+            apart_m = np.where(has, between_m, relief * middle) * hills
             inner[:] = known[near] + apart_m - np.where(has, 0.0, relief * middle * hills[near])
             words = f"as soundings have it, in {100 * share:.0f} % of the cells, and {kind} between them"
         yield Floor(Terrain(np.maximum(z, 0.2), cell_m, name="forecast"), words, kind, share)

@@ -8,7 +8,7 @@ leg, as at sea.
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -44,7 +44,7 @@ SHOALER = 0.1
 BEAMS_A_CELL, REACHES = 4.0, 3
 """Beams and pings lie so close together, and where a beam meets the bottom is found in so many steps."""
 
-LEAST_SD_M = 0.01
+LEAST_SD_M, LEAST_AVERAGED_M = 0.01, 0.001
 IDLE_S = 10.0
 """A vehicle without a line is looked at again after so long: others may have missed something."""
 
@@ -82,6 +82,10 @@ class Craft:
     clock_s: list[float]
     position_sd_m: float
     """What it says of how well it knows its place; NaN: it does not say."""
+    spacing_m: float
+    """How far its pings are apart that are flown ahead,"""
+    share: float
+    """and which share of those at sea they are."""
     unseen: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
     """Poses (n, 4): east, north, heading and depth."""
     idle: int = 0
@@ -117,14 +121,19 @@ class SwathFlight:
         self._constraints, self._planner = make_constraints(spec), planner_of(spec, so_far)
         self.swarm = Swarm(spec, members, starts_m, so_far.first_step)
         self._crafts = [
-            Craft(swath_sonar(member.spec), [start], [0.0], position_sd_m(member))
-            for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
+            self._craft(member, start) for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
         ]
         self._rng = np.random.default_rng([spec.seed, 1])
         self._specs = [member.spec for member in members]
         for i in range(len(members)):
             for end in self.swarm.legs_ahead(i):
                 self._fly_to(i, end, ahead=True)
+
+    def _craft(self, member: Member, start_m: FloatArray) -> Craft:
+        sonar = swath_sonar(member.spec)
+        apart_m = self._spec.speed_of(member.spec) / sonar.rate_hz if sonar else math.inf
+        spacing_m = max(apart_m, self._cell_m / BEAMS_A_CELL)
+        return Craft(sonar, [start_m], [0.0], position_sd_m(member), spacing_m, apart_m / spacing_m)
 
     @property
     def ways_m(self) -> list[FloatArray]:
@@ -186,10 +195,8 @@ class SwathFlight:
         swarm, craft = self.swarm, self._crafts[i]
         self._take_in(craft)
         flown = swarm.fly(i, end, ahead=ahead)
-        speed_mps = self._spec.speed_of(self._members[i].spec)
-        spacing_m = max(speed_mps / craft.sonar.rate_hz if craft.sonar else 0.0, self._cell_m / BEAMS_A_CELL)
-        pinged = poses_apart(flown, spacing_m)
-        late = max(1, math.ceil(LEAD_S * speed_mps / spacing_m))
+        pinged = poses_apart(flown, craft.spacing_m) if craft.sonar else flown[:0]
+        late = max(1, math.ceil(LEAD_S * self._spec.speed_of(self._members[i].spec) / craft.spacing_m))
         craft.unseen = pinged[-late:]
         self._ping(craft, pinged[:-late])
         craft.corners_m.append(np.array(end[:2]))
@@ -210,9 +217,12 @@ class SwathFlight:
         east, north, depth, slant_m, down_m = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
         spec, noise_m = self._spec, np.maximum(self._spec.sounding_noise * slant_m, LEAST_SD_M)
         went = BeamGeometry(np.arccos(np.clip(down_m / slant_m, 0.0, 1.0)), down_m, np.zeros_like(down_m))
-        depth = depth + noise_m * self._rng.standard_normal(len(depth))
+        sd = uncertainty(went, spec.uncertainty, np.full_like(down_m, craft.position_sd_m))
+        # Each beam stands for those beside it that are left out, whose errors average.
+        averaged = math.sqrt(min(craft.share * len(depth) / (len(poses) * craft.sonar.beams), 1.0))
+        depth = depth + averaged * noise_m * self._rng.standard_normal(len(depth))
         self.builder.swath.add_placed(
-            east, north, depth, uncertainty(went, spec.uncertainty, np.full_like(down_m, craft.position_sd_m))
+            east, north, depth, replace(sd, scattered_sd_m=np.maximum(averaged * sd.scattered_sd_m, LEAST_AVERAGED_M))
         )
 
 
