@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from imc_bridge.control.control import Phase
 from imc_bridge.control.controls import Crew
-from imc_bridge.control.layers import ALONE, DepthLayer
+from imc_bridge.control.depth_layers import ALONE, DepthLayer
 from imc_bridge.control.way_home import MOST_PLACES, guarded
 from imc_bridge.events import (
     BridgeEvent,

@@ -16,7 +16,7 @@ from enum import StrEnum
 
 import imcpy
 
-from imc_bridge.control.guard import AltitudeGuard
+from imc_bridge.control.altitude_guard import AltitudeGuard
 from imc_bridge.control.orders import Order
 from imc_bridge.control.plan_end import Evidence, judge_ending
 from imc_bridge.control.plans import (

@@ -13,8 +13,8 @@ from shapely.geometry import LineString, Point, Polygon
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
-from app.missions import safety
 from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
+from app.missions.safety import free_space, travel_depth, waypoint_check
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
 from tests.support.missions.specs import make_spec, rectangle
 
@@ -55,7 +55,7 @@ moves = st.lists(st.tuples(metres, metres, st.floats(-3, 30) | st.just(math.nan)
 def test_whatever_is_proposed_what_comes_out_breaks_no_limit(rows: list[tuple[float, float, float]]) -> None:
     origin = origins()
     proposed = np.array(rows)
-    checked = safety.check_step(NAMES, origin, proposed, LIMITS, BOTTOM)
+    checked = waypoint_check.check_step(NAMES, origin, proposed, LIMITS, BOTTOM)
     assert np.isfinite(checked.positions).all()
     final = checked.positions.copy()
     for name in checked.refusals:
@@ -75,7 +75,7 @@ def test_whatever_is_proposed_what_comes_out_breaks_no_limit(rows: list[tuple[fl
 @given(moves)
 def test_checked_waypoints_keep_the_limits_by_plain_geometry(rows: list[tuple[float, float, float]]) -> None:
     origin = origins()
-    checked = safety.check_step(NAMES, origin, np.array(rows), LIMITS, BOTTOM)
+    checked = waypoint_check.check_step(NAMES, origin, np.array(rows), LIMITS, BOTTOM)
     area, zone = Polygon(AREA), Polygon(KEEP_OUT)
     sent = [i for i, name in enumerate(NAMES) if name not in checked.refusals]
     for i in sent:
@@ -94,7 +94,7 @@ def test_checked_waypoints_keep_the_limits_by_plain_geometry(rows: list[tuple[fl
 def test_a_proposal_that_is_no_place_makes_the_vehicle_hold() -> None:
     proposed = origins()
     proposed[1] = math.nan
-    checked = safety.check_step(NAMES, origins(), proposed, LIMITS, BOTTOM)
+    checked = waypoint_check.check_step(NAMES, origins(), proposed, LIMITS, BOTTOM)
     np.testing.assert_array_equal(checked.positions[1], origins()[1])
     assert "which is no place; the vehicle holds" in checked.corrections["b"]
     assert checked.refusals == {}
@@ -103,14 +103,14 @@ def test_a_proposal_that_is_no_place_makes_the_vehicle_hold() -> None:
 def test_holding_one_vehicle_makes_another_hold_that_would_have_passed_it() -> None:
     origin = np.array([[10.0, 10.0, 1.0], [18.0, 10.0, 1.0]])
     proposed = np.array([[30.0, 10.0, 1.0], [12.0, 10.0, 1.0]])  # too far; and to where the first stays
-    checked = safety.check_step(("a", "b"), origin, proposed, LIMITS, BOTTOM)
+    checked = waypoint_check.check_step(("a", "b"), origin, proposed, LIMITS, BOTTOM)
     np.testing.assert_array_equal(checked.positions, origin)
     assert set(checked.corrections) == {"a", "b"}
 
 
 def test_a_vehicle_that_cannot_even_hold_gets_no_waypoint() -> None:
     aground = np.array([[10.0, 10.0, 3.5]])  # half a metre above a bottom of four metres
-    checked = safety.check_step(("a",), aground, aground + np.array([0.0, 5.0, 0.2]), LIMITS, BOTTOM)
+    checked = waypoint_check.check_step(("a",), aground, aground + np.array([0.0, 5.0, 0.2]), LIMITS, BOTTOM)
     assert "clearance" in checked.refusals["a"]
     assert checked.corrections == {}
 
@@ -125,9 +125,9 @@ def test_a_vehicle_that_cannot_even_hold_gets_no_waypoint() -> None:
 def test_depth_of_travel_is_as_wanted_or_leaves_the_clearance(
     start: tuple[float, float], end: tuple[float, float], wanted_m: float, clearance_m: float
 ) -> None:
-    depth = safety.travel_depth_m(np.array(start), np.array(end), wanted_m, BOTTOM, clearance_m)
+    depth = travel_depth.travel_depth_m(np.array(start), np.array(end), wanted_m, BOTTOM, clearance_m)
     assert 0.0 <= depth <= wanted_m
-    along = np.linspace(0, 1, safety.LEG_SAMPLES)[:, None] * (np.array(end) - start) + start
+    along = np.linspace(0, 1, travel_depth.LEG_SAMPLES)[:, None] * (np.array(end) - start) + start
     shallowest = np.nanmin(BOTTOM.at(along))
     assert depth == pytest.approx(min(wanted_m, max(0.0, shallowest - clearance_m)))
 
@@ -143,7 +143,7 @@ def test_a_height_above_the_bottom_is_kept_or_more(
     start: tuple[float, float], end: tuple[float, float], altitude_m: float, clearance_m: float
 ) -> None:
     limits = replace(LIMITS, min_altitude_m=clearance_m, max_depth_m=7.0)
-    depth = safety.depth_above_bottom_m(np.array(start), np.array(end), altitude_m, 2.0, BOTTOM, limits)
+    depth = travel_depth.depth_above_bottom_m(np.array(start), np.array(end), altitude_m, 2.0, BOTTOM, limits)
 
     def deepest_m(samples: int) -> float:
         below = BOTTOM.at(np.linspace(0, 1, samples)[:, None] * (np.array(end) - start) + start)
@@ -151,7 +151,7 @@ def test_a_height_above_the_bottom_is_kept_or_more(
         known = below[np.isfinite(below)]
         return min(wanted_m, max(float(known.min()) - max(altitude_m, clearance_m), 0.0) if len(known) else math.inf)
 
-    assert depth <= deepest_m(safety.LEG_SAMPLES) + 1e-9
+    assert depth <= deepest_m(travel_depth.LEG_SAMPLES) + 1e-9
     assert depth >= deepest_m(3001) - 1e-9
 
 
@@ -161,7 +161,7 @@ def test_a_vehicle_that_keeps_a_height_can_turn_anywhere_after_its_leg(
 ) -> None:
     start = np.array(end) - 10.0 * np.array([math.sin(course_rad), math.cos(course_rad)])
     limits = replace(LIMITS, max_depth_m=7.0)
-    depth = safety.depth_above_bottom_m(start, np.array(end), altitude_m, 2.0, BOTTOM, limits, radius_m)
+    depth = travel_depth.depth_above_bottom_m(start, np.array(end), altitude_m, 2.0, BOTTOM, limits, radius_m)
     for side in (1.0, -1.0):
         turned = np.linspace(0.0, math.pi, 30)
         ahead, aside = radius_m * np.sin(turned), side * radius_m * (1.0 - np.cos(turned))
@@ -173,12 +173,12 @@ def test_a_vehicle_that_keeps_a_height_can_turn_anywhere_after_its_leg(
         )
         room = BOTTOM.at(arc) - max(altitude_m, limits.min_altitude_m)
         # It rises while it turns; bottom cells are 2 m wide, and 0.2 m apart in depth.
-        low = room + safety.CLIMB * radius_m * turned + 0.25 < depth
+        low = room + travel_depth.CLIMB * radius_m * turned + 0.25 < depth
         assert not low[room > 0.0].any()
 
 
 def test_over_an_unknown_bottom_the_wanted_depth_counts() -> None:
-    assert safety.travel_depth_m(np.zeros(2), np.ones(2), 4.0, Bottom.unknown(), 2.0) == 4.0
+    assert travel_depth.travel_depth_m(np.zeros(2), np.ones(2), 4.0, Bottom.unknown(), 2.0) == 4.0
 
 
 def test_a_vehicle_goes_as_deep_as_its_height_above_the_bottom_asks_where_the_bottom_is_known() -> None:
@@ -339,7 +339,7 @@ def test_without_a_margin_legs_may_pass_along_a_zone() -> None:
 
 def test_a_circle_lies_inside_clear_of_keep_outs_and_apart_from_others() -> None:
     start, target, radius = np.array([45.0, 5.0]), np.array([50.0, 12.0]), 8.0
-    centre = safety.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
+    centre = free_space.circling_room(LIMITS, start, target, radius, [np.array([[40.0, 30.0], [30.0, 40.0]])])
     assert centre is not None
     circle = Point(centre).buffer(radius - 0.1)
     assert Polygon(AREA).contains(circle)
@@ -361,11 +361,11 @@ def test_where_there_is_no_room_for_a_circle_none_is_given(
     start: tuple[float, float], target: tuple[float, float], radius: float, taken: list[list[list[float]]]
 ) -> None:
     ways = [np.array(way) for way in taken]
-    assert safety.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
+    assert free_space.circling_room(LIMITS, np.array(start), np.array(target), radius, ways) is None
 
 
 @pytest.mark.parametrize(
     ("water_level_m", "below_m"), [(0.0, 10.0), (-1.5, 8.5), (2.0, 10.0)], ids=["datum", "low water", "high water"]
 )
 def test_depths_below_the_surface_are_on_the_safe_side(water_level_m: float, below_m: float) -> None:
-    assert safety.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)
+    assert travel_depth.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)

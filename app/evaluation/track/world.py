@@ -35,7 +35,7 @@ from app.evaluation.explore.world import (
 from app.evaluation.track.plain_ekf import PlainEkf
 from app.evaluation.track.presumed import Presumed
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.dynamic import Localization, Targets, dynamic_cost
+from app.exploration.core.moving_targets import Localization, Targets, dynamic_cost
 from app.exploration.core.objective import MED13_K, med13_objective
 from app.exploration.core.problem import Belief, Situation
 from simulator.floors.terrain import Terrain

@@ -17,7 +17,7 @@ from app.arrays import FloatArray
 from app.estimation.targets import foretold_sd
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.dynamic import Localization, Targets
+from app.exploration.core.moving_targets import Localization, Targets
 
 LEAVES_AT = 0.9
 """Part of the accuracy threshold at which a target is about to leave ``A``."""

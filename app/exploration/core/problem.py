@@ -13,7 +13,7 @@ import numpy as np
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import SwathTask
-from app.exploration.core.dynamic import Localization, Targets
+from app.exploration.core.moving_targets import Localization, Targets
 from app.exploration.core.search_task import SearchTask
 
 

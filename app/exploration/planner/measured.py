@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from app.arrays import FloatArray
 from app.estimation import LandmarkSets, RangeSensor
-from app.exploration.core.dynamic import dynamic_cost
+from app.exploration.core.moving_targets import dynamic_cost
 from app.exploration.core.objective import (
     MED13_K,
     ObjectiveWeights,

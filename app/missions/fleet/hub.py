@@ -19,7 +19,7 @@ from app.missions.fleet.interface import (
     WaypointOrder,
 )
 from app.missions.spec.mission import VehicleKind
-from imc_bridge.control.layers import ALONE, DepthLayer
+from imc_bridge.control.depth_layers import ALONE, DepthLayer
 
 VehicleKey = tuple[VehicleKind, str]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.missions.spec.mission import MissionSpec, VehicleSpec
-from imc_bridge.control.layers import ALONE, DepthLayer
+from imc_bridge.control.depth_layers import ALONE, DepthLayer
 from simulator.obstacles.obstacles import ObstacleWorld
 
 

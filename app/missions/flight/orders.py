@@ -21,7 +21,7 @@ from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.clock import now
 from app.missions.errors import ConflictError
 from app.missions.flight.legs.dispatch import Dispatch
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
 from app.missions.spec.orders import OPEN, OrderKind, OrderState
@@ -50,7 +50,7 @@ class Flight:
 
     planner: OrderedPlanner
     constraints: Constraints
-    range_left: RangeLeft
+    energy_range: EnergyRange
     dispatch: Dispatch
     apart: bool
     """Whether vehicles have legs of their own."""
@@ -166,7 +166,7 @@ class OrderBook:
                 f"that takes {needs_m:.0f} m of {name!r}, and {max(left_m, 0.0):.0f} m are left of its way",
                 "choose a smaller part or lines farther apart, another vehicle, or bring it home",
             )
-        if not flight.range_left.lasts_for(member, here, way):
+        if not flight.energy_range.lasts_for(member, here, way):
             raise ConflictError(
                 f"the energy of {name!r} does not last for {needs_m:.0f} m and its way home from there",
                 "choose a place nearer to its recovery point, or another vehicle",

@@ -19,8 +19,8 @@ from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.exchange import LegExchange
-from app.missions.flight.legs.range_left import RangeLeft
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
@@ -74,10 +74,10 @@ class OwnLegs:
         waiting: Waiting,
         constraints: Constraints,
         time_scale: float,
-        range_left: RangeLeft,
+        energy_range: EnergyRange,
         orders: OrderBook,
     ) -> None:
-        self._range = range_left
+        self._range = energy_range
         self._orders = orders
         self._constraints = constraints
         self._live = live
@@ -87,7 +87,7 @@ class OwnLegs:
         self._dispatch = dispatch
         self._maps = maps
         self._waiting = waiting
-        self._exchange = LegExchange(live, decider, committing, range_left, time_scale)
+        self._exchange = LegExchange(live, decider, committing, energy_range, time_scale)
         self._time_scale = time_scale
         self._watched = bool(live.spec.targets) or live.spec.surface_policy is not None
         self._measured = live.spec.planner.name in COVERERS

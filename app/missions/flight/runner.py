@@ -21,7 +21,7 @@ from app.missions.flight.decisions.decision import make_constraints, make_planne
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit, committed_leg
 from app.missions.flight.legs.dispatch import Dispatch
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
@@ -75,7 +75,7 @@ class Runner:
         self._committing = LegCommit(live, constraints, leads=not self._lookout.needed)
         self._dispatch = Dispatch(live, hub, self._committing, time_scale, persistent=self._apart)
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
-        self._range = RangeLeft(live, constraints, self._committing)
+        self._range = EnergyRange(live, constraints, self._committing)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)

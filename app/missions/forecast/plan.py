@@ -26,7 +26,6 @@ from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 from app.mapping.types import Grid
-from app.missions import safety
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
@@ -45,6 +44,7 @@ from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
+from app.missions.safety import free_space
 from app.missions.spec.mission import MissionSpec, PlannerSpec
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
@@ -150,7 +150,7 @@ def plan(
     depth_m = floor_depth_m or max(LEAST_GUESS_M, cruise_m + spec.limits.min_altitude_m + ROOM_M)
     constraints = make_constraints(spec)
     inner = Polygon(constraints.area)
-    begin_m = np.array([safety.nearest_inside(inner, start) for start in starts_m])
+    begin_m = np.array([free_space.nearest_inside(inner, start) for start in starts_m])
 
     def over() -> bool:
         return stop() or time.thread_time() > until

@@ -14,7 +14,7 @@ from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks
-from app.missions.safety import WAITING_CIRCLE_M
+from app.missions.safety.free_space import WAITING_CIRCLE_M
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.team import Member
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView

@@ -10,7 +10,7 @@ from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
 from app.missions.spec.recovery import Recovery
-from imc_bridge.control.layers import DepthLayer
+from imc_bridge.control.depth_layers import DepthLayer
 from imc_bridge.control.plans import HOME_RADIUS_M
 
 STOPS_WITHIN_M = 2.0

@@ -15,7 +15,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.estimation.sensors import RangeSensor
 from app.estimation.targets import TargetEstimator, TargetTrack, expected_range
-from app.exploration.core.dynamic import Targets
+from app.exploration.core.moving_targets import Targets
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import RangeReport

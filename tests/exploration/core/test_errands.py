@@ -10,8 +10,8 @@ import pytest
 from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.dynamic import FICTITIOUS_WEIGHT, Localization, Targets, dynamic_cost
 from app.exploration.core.information_need import lacking
+from app.exploration.core.moving_targets import FICTITIOUS_WEIGHT, Localization, Targets, dynamic_cost
 from app.exploration.core.problem import Belief
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions

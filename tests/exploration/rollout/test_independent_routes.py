@@ -12,7 +12,7 @@ from app.arrays import FloatArray
 from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.dynamic import Targets
+from app.exploration.core.moving_targets import Targets
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner

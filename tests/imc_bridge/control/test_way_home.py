@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, LinkChange, NodeState, RefusedError, Waypoint, WaypointStatus
-from imc_bridge.control.guard import AltitudeGuard
-from imc_bridge.control.layers import DepthLayer
+from imc_bridge.control.altitude_guard import AltitudeGuard
+from imc_bridge.control.depth_layers import DepthLayer
 from imc_bridge.control.plans import HOME_RADIUS_M
 from imc_bridge.control.way_home import guarded, home_plan
 from imc_bridge.nodes.node import Node

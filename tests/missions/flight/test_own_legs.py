@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from shapely import Point, Polygon
 from sqlalchemy import select
 
-from app.missions import safety
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight.decisions import deciding
@@ -23,6 +22,7 @@ from app.missions.flight.own_legs import MOST_AHEAD, OwnLegs
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
+from app.missions.safety import free_space
 from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.missions.team import Member
@@ -252,7 +252,7 @@ async def test_who_has_flown_everything_circles_inside_the_area(
     assert flown.held["fast"]
     for place in flown.held["fast"]:
         east, north = spec.frame().to_local(np.array(place.lat_deg), np.array(place.lon_deg))
-        assert Polygon(spec.local_area()).buffer(-safety.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
+        assert Polygon(spec.local_area()).buffer(-free_space.CIRCLE_M + 0.01).contains(Point(float(east), float(north)))
 
 
 @given(st.integers(0, 10_000))

@@ -51,7 +51,7 @@ from imc_bridge import (
     Waypoint,
     WaypointChange,
 )
-from imc_bridge.control.layers import ALONE, DepthLayer
+from imc_bridge.control.depth_layers import ALONE, DepthLayer
 from imc_bridge.doctor.diagnosis import drop_words, radio_gap_words
 from imc_bridge.doctor.doctor import Diagnosis, judge
 from imc_bridge.network.consoles import Mark

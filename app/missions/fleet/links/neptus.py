@@ -12,7 +12,6 @@ from collections.abc import Coroutine, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.missions import safety
 from app.missions.fleet.interface import (
     EventSink,
     LinkCapabilities,
@@ -27,6 +26,7 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.visiting import VisitedLink, Visitor
+from app.missions.safety import travel_depth
 from app.missions.settings import NeptusSettings
 from imc_bridge.neptus import (
     Area,
@@ -189,7 +189,7 @@ class NeptusFleetLink(VisitedLink):
         if craft.state is not LinkState.ENGAGED:
             raise VehicleRefusedError(order.vehicle, "does not follow this service now", "press START in the panel")
         # Decisions heed it, too; this is the last look before anything is sent.
-        if reason := safety.too_deep(craft.depth_m, order.position.depth_m):
+        if reason := travel_depth.too_deep(craft.depth_m, order.position.depth_m):
             craft.order, craft.published, craft.status = None, False, None
             craft.refused_step = fleet.time_step
             self._publish_soon(fleet)

@@ -15,14 +15,14 @@ from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage, SwathTask
-from app.exploration.core.dynamic import Localization, Targets
 from app.exploration.core.errands import due_to_rise
+from app.exploration.core.moving_targets import Localization, Targets
 from app.exploration.core.problem import Belief, Planner, Situation
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
-from app.missions import safety
 from app.missions.flight.decisions.zone_clearance import room_around
+from app.missions.safety import free_space, travel_depth, waypoint_check
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec import mission
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec
@@ -87,8 +87,8 @@ class Place:
         """Return how deep it travels from one place (2,) to another over a pessimistic sea floor."""
         if math.isnan(self.altitude_m):
             least_m = constraints.min_altitude_m
-            return safety.travel_depth_m(origin_m, target_m, self.cruise_depth_m, bottom, least_m)
-        return safety.depth_above_bottom_m(
+            return travel_depth.travel_depth_m(origin_m, target_m, self.cruise_depth_m, bottom, least_m)
+        return travel_depth.depth_above_bottom_m(
             origin_m, target_m, self.altitude_m, self.cruise_depth_m, bottom, constraints, self.turn_radius_m
         )
 
@@ -155,7 +155,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     """Return a mission's limits in its local frame."""
     limits = spec.limits
     zones = [spec.to_local(zone) for zone in spec.keep_out]
-    margins = [safety.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
+    margins = [free_space.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     area = spec.local_inner_area()
     # A search keeps off everything by more than a vehicle's arrival radius.
     room_m = spec.arrival_radius_m + REACTS_WITHIN_M if spec.search is None else 0.0
@@ -165,7 +165,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
         keep_out=(*zones, *margins),
         around=room_around(area, margins or zones, room_m),
         max_step_m=limits.max_step_m,
-        # Depths are chosen here and may be shallower than asked where the water is; see safety.travel_depth_m.
+        # Depths are chosen here and may be shallower than asked where the water is; see travel_depth.travel_depth_m.
         min_depth_m=0.0,
         max_depth_m=limits.max_depth_m,
         min_altitude_m=limits.min_altitude_m,
@@ -281,7 +281,7 @@ def decide(
             proposed[i] = origin[i]
         depth_m = place.travel_depth_m(start, proposed[i, :2], floor.cautious, constraints)
         proposed[i, 2] = min(proposed[i, 2], depth_m)
-    checked = safety.check_step(situation.vehicles, origin, proposed, constraints, floor.likely)
+    checked = waypoint_check.check_step(situation.vehicles, origin, proposed, constraints, floor.likely)
     resting = {place.vehicle for place in team if not place.moving or place.vehicle in proposal.done}
     told = (checked.corrections | checked.refusals).items()
     notes += [f"{name}: {reason}" for name, reason in told if name not in resting]
@@ -290,7 +290,7 @@ def decide(
             continue
         refusal = checked.refusals.get(place.vehicle, "")
         if not refusal and place.keeps_depth:
-            refusal = safety.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
+            refusal = travel_depth.too_deep(place.cruise_depth_m, float(checked.positions[i, 2]))
             notes += [f"{place.vehicle}: {refusal}"] if refusal else []
         legs.append(Leg(place.vehicle, checked.positions[i], refusal, bool(up[i])))
     pursuits = {name: spec.targets[number].name for name, number in proposal.errands.items() if number >= 0}
@@ -321,7 +321,7 @@ def _planned_for(
     legs: list[Leg] = []
     nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
     for place in places:
-        outside_m = safety.distance_outside_m(polygon, place.en_m)
+        outside_m = free_space.distance_outside_m(polygon, place.en_m)
         if outside_m > nearby_m and not place.moving:
             continue
         if outside_m > nearby_m and site_unknown:
@@ -337,7 +337,7 @@ def _planned_for(
             notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
             legs.append(leg)
         elif outside_m > 0:
-            border = safety.nearest_inside(polygon, place.en_m)
+            border = free_space.nearest_inside(polygon, place.en_m)
             team.append(replace(place, en_m=border))
         else:
             team.append(place)
@@ -357,8 +357,8 @@ class _Floor:
     def of(cls, knowledge: Knowledge) -> "_Floor":
         """Return the sea floor that a map tells of, at this level of the water."""
         belief = knowledge.belief
-        depth_m = safety.below_surface_m(belief.depth_m, knowledge.water_level_m)
-        shallow_m = np.where(np.isfinite(belief.sd_m), depth_m - safety.UNCERTAINTY_FACTOR * belief.sd_m, np.nan)
+        depth_m = travel_depth.below_surface_m(belief.depth_m, knowledge.water_level_m)
+        shallow_m = np.where(np.isfinite(belief.sd_m), depth_m - travel_depth.UNCERTAINTY_FACTOR * belief.sd_m, np.nan)
         return cls(Bottom.from_landmarks(belief.xy_m, depth_m), Bottom.from_landmarks(belief.xy_m, shallow_m))
 
 
@@ -452,7 +452,7 @@ def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[boo
 
 def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) -> Leg:
     """Send a vehicle that is far outside to the area's border, clear of keep-out zones and of others (n of (2,))."""
-    goal = safety.way_in(constraints, place.en_m, INSET_M, taken)
+    goal = free_space.way_in(constraints, place.en_m, INSET_M, taken)
     if goal is None:
         return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every straight way in")
     # The bottom on the way is unknown: it comes at the surface.

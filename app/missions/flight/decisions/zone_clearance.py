@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from app.arrays import FloatArray
-from app.missions import safety
+from app.missions.safety import free_space
 
 SMALLER = (1.0, 0.5, 0.25)
 """Parts of the room that are tried where all of it would close a way."""
@@ -42,7 +42,7 @@ def room_around(area: FloatArray, zones: Sequence[FloatArray], room_m: float) ->
     parts, left, around = _parts(ground), ground, []
     for zone in zones:
         for part in SMALLER:
-            wide = safety.widened(zone, part * room_m)
+            wide = free_space.widened(zone, part * room_m)
             tried = left.difference(Polygon(wide))
             if _hold_together(parts, tried):
                 around.append(wide)

@@ -12,13 +12,14 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.motion.turning import disc, turned_over
-from app.missions import metrics, safety
+from app.missions import metrics
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decisions.decision import Decision, Leg, turn_radius_m
 from app.missions.live.mission import RISES, LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
+from app.missions.safety import free_space, travel_depth
 from app.missions.spec.mission import Guidance, MissionSpec
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
@@ -77,7 +78,7 @@ class LegCommit:
 
     def _water_below_datum_m(self) -> float:
         level_m = self._live.gate.corrections.water_level_m(now().timestamp())
-        return -float(safety.below_surface_m(np.zeros(1), level_m)[0])
+        return -float(travel_depth.below_surface_m(np.zeros(1), level_m)[0])
 
     async def commit(self, decision: Decision, numbers: dict[str, int]) -> None:
         """Make a decision durable, its legs and the planner's memory together; then the vehicles have these legs ahead.
@@ -203,11 +204,11 @@ class LegCommit:
             place = replace(place, depth_m=depth_m)
         if member.report is not None and self._leads:
             start = member.place_m(self._live.frame)
-            beyond = safety.lead_point(self._constraints, start, target, LEAD_M)
+            beyond = free_space.lead_point(self._constraints, start, target, LEAD_M)
             on = target + np.linspace(0.0, 1.0, LEAD_SAMPLES)[:, None] * (beyond - target)
-            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, safety.CIRCLE_M)])
+            depth_m = self._depth_m(member, place.depth_m, [on, disc(beyond, free_space.CIRCLE_M)])
             lead = self._position(beyond[0], beyond[1], depth_m)
-            known = safety.bottom_on_way(np.array([start, target, beyond]), self.bottom)
+            known = travel_depth.bottom_on_way(np.array([start, target, beyond]), self.bottom)
             bottom = tuple(self._position(east, north, depth) for east, north, depth in known)
             circle = self._circle(member, start, target)
         order = WaypointOrder(
@@ -234,11 +235,11 @@ class LegCommit:
         """Return an order that keeps a vehicle circling near where it is; None where there is no room for that."""
         if member.report is None or member.order is None:
             return None
-        inside = safety.nearest_inside(Polygon(self._constraints.area), member.place_m(self._live.frame))
+        inside = free_space.nearest_inside(Polygon(self._constraints.area), member.place_m(self._live.frame))
         centre_m = self._room(member, inside, inside)
         if centre_m is None:
             return None
-        ways = [*self._turning(member, inside, centre_m), disc(centre_m, safety.CIRCLE_M)]
+        ways = [*self._turning(member, inside, centre_m), disc(centre_m, free_space.CIRCLE_M)]
         wanted_m = member.order.position.depth_m
         if member.withdrawal is not None and member.withdrawal.below:
             wanted_m = self._depth_below_m(member, wanted_m)
@@ -263,14 +264,14 @@ class LegCommit:
         report = member.report
         heading_rad = math.nan if report is None or report.heading_rad is None else report.heading_rad
         radius_m = turn_radius_m(self._live.spec, member.spec)
-        straight = start + np.linspace(0.0, 1.0, safety.LEG_SAMPLES)[:, None] * (target - start)
+        straight = start + np.linspace(0.0, 1.0, travel_depth.LEG_SAMPLES)[:, None] * (target - start)
         return [straight, turned_over(start, heading_rad, target, radius_m)]
 
     def _depth_m(self, member: Member, depth_m: float, ways: list[FloatArray]) -> float:
         """Return a depth, or what a vehicle's height above the bottom leaves of it over what it passes."""
         least_m = self._live.spec.limits.min_altitude_m
         height_m = least_m if member.withdrawal is not None else float(np.fmax(least_m, member.altitude_m))
-        return safety.depth_over_m(depth_m, ways, self.bottom, height_m)
+        return travel_depth.depth_over_m(depth_m, ways, self.bottom, height_m)
 
     def _circle(self, member: Member, start: FloatArray, target: FloatArray) -> Position | None:
         """Return where a vehicle that is led by legs may circle down, apart from the others' ways and circles."""
@@ -289,9 +290,9 @@ class LegCommit:
             way += [] if other.target_m is None else [other.target_m]
             way += [leg.target_m for leg in other.ahead]
             if other.order is not None and other.order.circle is not None:
-                taken.append(safety.CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
+                taken.append(free_space.CIRCLE_M * UNIT_SQUARE + self._local(other.order.circle))
             taken.append(np.array(way))
-        return safety.circling_room(self._constraints, start, target, safety.CIRCLE_M, taken)
+        return free_space.circling_room(self._constraints, start, target, free_space.CIRCLE_M, taken)
 
     def _local(self, position: Position) -> FloatArray:
         east, north = self._live.frame.to_local(np.array(position.lat_deg), np.array(position.lon_deg))

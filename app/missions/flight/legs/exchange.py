@@ -16,7 +16,7 @@ from app.missions.flight.decisions.deciding import Decider, place_ahead
 from app.missions.flight.decisions.decision import Decision, Leg, Place, planned_way_m
 from app.missions.flight.decisions.separation import too_close
 from app.missions.flight.legs.commit import LegCommit, way_m
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.live.mission import LiveMission
 from app.missions.team import CommittedLeg, Member
 
@@ -37,12 +37,12 @@ class LegExchange:
     """
 
     def __init__(
-        self, live: LiveMission, decider: Decider, committing: LegCommit, range_left: RangeLeft, time_scale: float
+        self, live: LiveMission, decider: Decider, committing: LegCommit, energy_range: EnergyRange, time_scale: float
     ) -> None:
         self._live = live
         self._decider = decider
         self._committing = committing
-        self._range = range_left
+        self._range = energy_range
         self._time_scale = time_scale
         self._looked_at: object = None
         """The newest map when legs were last decided anew."""

@@ -11,7 +11,7 @@ import structlog
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FaultKind, LinkState
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.failsafes import (
@@ -47,10 +47,10 @@ log = structlog.get_logger(__name__)
 class FailsafeWatch:
     """Judges the vehicles of one running mission by the table."""
 
-    def __init__(self, live: LiveMission, hub: FleetHub, range_left: RangeLeft, time_scale: float) -> None:
+    def __init__(self, live: LiveMission, hub: FleetHub, energy_range: EnergyRange, time_scale: float) -> None:
         self._live = live
         self._hub = hub
-        self._range = range_left
+        self._range = energy_range
         self._time_scale = time_scale
         self._judges: dict[str, FailsafeJudge] = {}
         self._told: dict[str, list[Active]] = {}

@@ -8,7 +8,7 @@ import structlog
 from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleRefusedError
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import LEAST_LOOK_S
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import MissionSpec
@@ -27,9 +27,9 @@ log = structlog.get_logger(__name__)
 class OnboardWays:
     """Keeps the ways home of one running mission's vehicles on board, and takes them away with its end."""
 
-    def __init__(self, live: LiveMission, hub: FleetHub, range_left: RangeLeft, time_scale: float) -> None:
+    def __init__(self, live: LiveMission, hub: FleetHub, energy_range: EnergyRange, time_scale: float) -> None:
         self._time_scale = time_scale
-        self._range = range_left
+        self._range = energy_range
         self._live = live
         self._hub = hub
         self._kept: dict[str, FloatArray] = {}

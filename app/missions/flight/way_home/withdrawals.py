@@ -11,7 +11,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission, phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
@@ -45,14 +45,14 @@ class Withdrawals:
         hub: FleetHub,
         committing: LegCommit,
         dispatch: Dispatch,
-        range_left: RangeLeft,
+        energy_range: EnergyRange,
         time_scale: float,
     ) -> None:
         self._live = live
         self._hub = hub
         self._committing = committing
         self._dispatch = dispatch
-        self._range = range_left
+        self._range = energy_range
         self._time_scale = time_scale
         self._stranded: set[str] = set()
         self._ending: set[str] = set()

@@ -13,7 +13,7 @@ from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
 from app.missions.recovery.failsafes import with_reserve_s
-from app.missions.safety import CIRCLE_M
+from app.missions.safety.free_space import CIRCLE_M
 from app.missions.spec.mission import MissionSpec, SurfacePolicy
 from app.missions.spec.orders import OrderKind
 from app.missions.team import Member, Swath, Team

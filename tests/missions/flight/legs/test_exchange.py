@@ -16,8 +16,8 @@ from app.missions.flight.decisions.deciding import Decider, moved_on, place_ahea
 from app.missions.flight.decisions.decision import Decision, decide, make_constraints, make_planner
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.exchange import LegExchange
-from app.missions.flight.legs.range_left import RangeLeft
 from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
 from app.missions.team import Member
@@ -47,7 +47,7 @@ class Flight:
         self.committing = LegCommit(live, constraints, leads=False)
         maps = StepMaps(live, executor, TIME_SCALE, _at_once)
         self.decider = Decider(live, constraints, self.planner, maps, executor)
-        ways = RangeLeft(live, constraints, self.committing)
+        ways = EnergyRange(live, constraints, self.committing)
         self.exchange = LegExchange(live, self.decider, self.committing, ways, TIME_SCALE)
 
     async def begin(self) -> None:

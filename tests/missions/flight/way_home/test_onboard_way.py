@@ -10,7 +10,7 @@ import pytest
 from app.missions.fleet.interface import LinkState, Position, VehicleReport
 from app.missions.flight.way_home.onboard_way import PERIOD_S, OnboardWays
 from app.missions.service import MissionService
-from imc_bridge.control.layers import ALONE
+from imc_bridge.control.depth_layers import ALONE
 from simulator.event_loop import SimulatedTimeLoop
 from tests.support.missions.harbour import sim_spec
 

@@ -10,7 +10,7 @@ from shapely import LineString, Polygon
 from app.exploration.core.bottom import Bottom
 from app.missions.fleet.interface import Position, VehicleReport, WaypointOrder
 from app.missions.flight.decisions.decision import make_constraints
-from app.missions.flight.legs.range_left import RangeLeft
+from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.onboard_way import positions
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec
@@ -25,10 +25,10 @@ async def test_each_piece_of_a_way_keeps_its_height_above_the_bottom(service: Mi
     depth = np.full((10, 10), 30.0)
     depth[8:, 4:6] = 4.0
     bottom = Bottom(0.0, 0.0, 10.0, depth)
-    range_left = RangeLeft(live, make_constraints(live.spec), cast("Any", SimpleNamespace(bottom=bottom)))
+    energy_range = EnergyRange(live, make_constraints(live.spec), cast("Any", SimpleNamespace(bottom=bottom)))
     way = np.array([[5.0, 95.0], [95.0, 95.0], [95.0, 5.0]])
     member = live.team.members["a"]
-    assert range_left.depths_m(member, np.array([5.0, 5.0]), way) == [6.0, 3.0, 6.0]
+    assert energy_range.depths_m(member, np.array([5.0, 5.0]), way) == [6.0, 3.0, 6.0]
 
 
 @pytest.mark.parametrize(
@@ -51,13 +51,13 @@ async def test_a_vehicle_that_is_left_alone_on_a_leg_comes_home_round_zones_from
     live = await service.get(view.id)
     bottom = Bottom(0.0, 0.0, 10.0, np.full((10, 10), 30.0))
     committing = SimpleNamespace(bottom=bottom, followed_to_m=lambda _member, end_m: end_m)
-    range_left = RangeLeft(live, make_constraints(live.spec), cast("Any", committing))
+    energy_range = EnergyRange(live, make_constraints(live.spec), cast("Any", committing))
     member = live.team.members["a"]
     lon, lat = lon_lat(*start)
     member.report = VehicleReport("a", 0.0, Position(lat, lon, 2.0))
     order = WaypointOrder(live.id, 1, "a", Position(lat, lon, 2.0), 1.0, 3.0, min_altitude_m=1.0)
     member.set_order(order, np.array(end))
-    way = range_left.way_left_alone(member)
+    way = energy_range.way_left_alone(member)
     assert way is not None
     assert bool(np.hypot(*(way[0] - end)) < 1e-9) is first
     obstacle = Polygon(zone)
@@ -74,9 +74,9 @@ async def test_vehicles_go_home_at_depths_apart_where_the_water_is_too_shallow_f
     view = await service.create(sim_spec("a", "b", side_m=100.0, limits=limits))
     live = await service.get(view.id)
     bottom = Bottom(0.0, 0.0, 10.0, np.full((10, 10), 4.0))
-    range_left = RangeLeft(live, make_constraints(live.spec), cast("Any", SimpleNamespace(bottom=bottom)))
+    energy_range = EnergyRange(live, make_constraints(live.spec), cast("Any", SimpleNamespace(bottom=bottom)))
     here, way = np.array([5.0, 5.0]), np.array([[95.0, 5.0]])
-    depths = {name: range_left.depths_m(live.team.members[name], here, way) for name in ("a", "b")}
+    depths = {name: energy_range.depths_m(live.team.members[name], here, way) for name in ("a", "b")}
     assert depths == {"a": [2.0], "b": [3.0]}
     # And on board, too: along the way below, up only at its place.
     places = positions(live.spec, way, depths["b"])

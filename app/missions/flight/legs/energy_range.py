@@ -8,15 +8,15 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.missions import safety
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of, layer_of
 from app.missions.recovery.failsafes import drift_reserve_s, with_reserve_s
 from app.missions.recovery.turn_back import turn_back_place
 from app.missions.recovery.way_home import WaysHome, way_time_s
+from app.missions.safety import travel_depth
 from app.missions.team import Member
-from imc_bridge.control.layers import DepthLayer
+from imc_bridge.control.depth_layers import DepthLayer
 
 LAND_PERIOD_S = 10.0
 """How often is looked whether the map shows other shallows, seconds of the event loop's time."""
@@ -31,7 +31,7 @@ LEAST_DEPTH_M = 0.5
 """Water with less room than the least altitude and this is land to vehicles."""
 
 
-class RangeLeft:
+class EnergyRange:
     """Ways home of the vehicles of one running mission, and what their energy leaves beside them."""
 
     def __init__(self, live: LiveMission, constraints: Constraints, committing: LegCommit) -> None:
@@ -78,7 +78,7 @@ class RangeLeft:
             return way_m
         here_m = member.place_m(self._live.frame)
         last_m = self._committing.followed_to_m(member, end_m)
-        on_leg = here_m + np.linspace(0.0, 1.0, safety.LEG_SAMPLES)[:, None] * (last_m - here_m)
+        on_leg = here_m + np.linspace(0.0, 1.0, travel_depth.LEG_SAMPLES)[:, None] * (last_m - here_m)
         if self._ways_to(home_m)[0].sees(on_leg, np.broadcast_to(way_m[0], on_leg.shape)).all():
             return way_m
         beyond = self.way_from(end_m, home_m)
@@ -110,7 +110,7 @@ class RangeLeft:
         """
         limits, bottom, layer = self._live.spec.limits, self._committing.bottom, self.layer(member)
         return [
-            layer.depth_m(safety.travel_depth_m(a, b, layer.deepest_m, bottom, limits.min_altitude_m))
+            layer.depth_m(travel_depth.travel_depth_m(a, b, layer.deepest_m, bottom, limits.min_altitude_m))
             for a, b in pairwise(np.vstack([here_m, way_m]))
         ]
 

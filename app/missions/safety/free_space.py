@@ -1,0 +1,143 @@
+"""Where there is room in the area: beside zones and other vehicles, for circles, ways in and what lies beyond a leg."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
+from shapely.ops import nearest_points, unary_union
+
+from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
+from imc_bridge.control.plans import CIRCLE_RADIUS_M
+
+LEAST_LEG_M = 0.5
+ENTRY_POINTS = 400
+LEAD_CLEARANCE_M = 0.5
+WAITING_CIRCLE_M = 10.0
+"""How far from its waypoint a vehicle comes that waits there in circles: 7.5 m of radius, and what it overshoots."""
+CIRCLE_M = CIRCLE_RADIUS_M + 2.5
+"""Radius of the room for a circle: it is not flown on rails."""
+CIRCLE_WITHIN = 2.5
+"""A circle farther from the target than so many radii is none of its leg's."""
+START_OUTSIDE_M = 2.0
+"""A vehicle drifts at the surface: so far outside the area it may be when its leg begins."""
+
+
+def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, lead_m: float) -> FloatArray:
+    """Return how far a leg may be followed beyond its target, at most ``lead_m``: inside the area, clear of keep-outs.
+
+    Parameters
+    ----------
+    start, target : (2,)
+        Ends of the leg. The target itself is returned when the leg has no direction.
+    """
+    along = target - start
+    length = float(np.linalg.norm(along))
+    if length < LEAST_LEG_M:
+        return target
+    ray = LineString([target, target + along / length * lead_m])
+    free: BaseGeometry = Polygon(constraints.area)
+    for zone in constraints.keep_out:
+        free = free.difference(Polygon(zone).buffer(LEAD_CLEARANCE_M))
+    part = ray.intersection(free.buffer(-LEAD_CLEARANCE_M))
+    pieces = [piece for piece in getattr(part, "geoms", [part]) if isinstance(piece, LineString) and not piece.is_empty]
+    first = next((piece for piece in pieces if piece.distance(Point(target)) < LEAD_CLEARANCE_M), None)
+    if first is None:
+        return target
+    ends = np.array(first.coords)
+    return np.asarray(ends[np.argmax(np.linalg.norm(ends - target, axis=1))])
+
+
+def circling_room(
+    constraints: Constraints, start: FloatArray, target: FloatArray, radius_m: float, taken: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Return the centre of a circle near a leg's target in which a vehicle may descend; None where there is no room.
+
+    The circle lies inside the area, clear of keep-outs and of other vehicles, and so does every straight way from the
+    leg's start to it and from it to the target, but for a start at the border.
+
+    Parameters
+    ----------
+    start, target : (2,)
+        Ends of the leg.
+    radius_m
+        Of the circle as it is flown.
+    taken : sequence of (n, 2)
+        Ways of other vehicles, from which the circle keeps the least separation.
+    """
+    area = Polygon(constraints.area)
+    zones = [Polygon(zone).buffer(LEAD_CLEARANCE_M) for zone in constraints.keep_out]
+    free: BaseGeometry = area
+    for zone in zones:
+        free = free.difference(zone)
+    others = [LineString(way) if len(way) > 1 else Point(way[0]) for way in taken]
+    for way in others:
+        free = free.difference(way.buffer(constraints.min_separation_m))
+    centres = free.buffer(-radius_m)
+    if centres.is_empty:
+        return None
+    centre, _ = nearest_points(centres, Point(target))
+    if centre.distance(Point(target)) > CIRCLE_WITHIN * radius_m:
+        return None
+    swept = unary_union([centre.buffer(radius_m), Point(start), Point(target)]).convex_hull
+    ahead = [zone for zone in zones if not zone.contains(Point(start))]
+    if any(barrier.intersects(swept) for barrier in [*ahead, *others]) or not area.buffer(START_OUTSIDE_M).contains(
+        swept
+    ):
+        return None
+    return np.array([centre.x, centre.y])
+
+
+def widened(zone: FloatArray, margin_m: float) -> FloatArray:
+    """Return a keep-out zone (n, 2) with a margin around it, (m, 2), counter-clockwise and not closed."""
+    wide = orient(Polygon(zone).buffer(margin_m, join_style="mitre"))
+    return np.asarray(wide.exterior.coords)[:-1]
+
+
+def nearest_inside(area: Polygon, place: FloatArray) -> FloatArray:
+    """Return the point of the area that is nearest to ``place`` (2,)."""
+    goal, _ = nearest_points(area, Point(place))
+    return np.array([goal.x, goal.y])
+
+
+def way_in(
+    constraints: Constraints, place: FloatArray, inset_m: float, taken: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Return the nearest point of the area that a vehicle outside of it may go straight to; None when there is none.
+
+    Parameters
+    ----------
+    place : (2,)
+        Where the vehicle is.
+    inset_m
+        How far inside the border the point should lie.
+    taken : sequence of (2,)
+        Places of other vehicles, from which the point keeps the least separation.
+    """
+    zones = [Polygon(zone) for zone in constraints.keep_out]
+    ahead = [zone for zone in zones if not zone.contains(Point(place))]
+    free: BaseGeometry = Polygon(constraints.area).buffer(-inset_m)
+    if free.is_empty:
+        free = Polygon(constraints.area)
+    for zone in zones:
+        free = free.difference(zone.buffer(LEAD_CLEARANCE_M))
+    if free.is_empty:
+        return None
+    border = free.boundary
+    spacing = max(border.length / ENTRY_POINTS, inset_m)
+    along = np.arange(0.0, border.length, spacing)
+    points = [nearest_points(free, Point(place))[0], *(border.interpolate(distance) for distance in along)]
+    for goal in sorted(points, key=Point(place).distance):
+        leg = LineString(np.array([place, (goal.x, goal.y)]))
+        apart = all(goal.distance(Point(other)) >= constraints.min_separation_m for other in taken)
+        if apart and not any(zone.intersects(leg) for zone in ahead):
+            return np.array([goal.x, goal.y])
+    return None
+
+
+def distance_outside_m(area: Polygon, place: FloatArray) -> float:
+    """Return how far a place (2,) lies outside the area; 0 inside."""
+    return float(shapely.distance(area, Point(place)))
