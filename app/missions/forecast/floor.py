@@ -40,8 +40,7 @@ DEPTH_SD = 0.4
 """Of the logarithm of a depth that is guessed."""
 
 USUAL_RELIEF = 0.1
-"""Between soundings a floor that is this high differs from their map as that map's deviation says, and never more than
-its relief is high."""
+"""Between soundings a floor that is this high differs from their map as that map's deviation says."""
 
 CELLS = 2500
 """Cells of a forecast's map at most: more make it slower, hardly other."""
@@ -111,7 +110,9 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
             # Outside of the area, and where no map reaches, it goes on from the nearest place that is known.
             near = tuple(distance_transform_edt(~has, return_distances=False, return_indices=True))
             inner, hills = z[: grid.rows, : grid.cols], unit[: grid.rows, : grid.cols]
-            between_m = np.minimum(doubt * math.sqrt(relief / USUAL_RELIEF), relief * middle)
+            # Early maps of smooth floors doubt too much, those of rough ones do not: every other floor bounds the doubt.
+            most_m = relief * middle if number % 2 == 0 else math.inf
+            between_m = np.minimum(doubt * math.sqrt(relief / USUAL_RELIEF), most_m)
             apart_m = np.where(has, between_m, relief * middle) * hills
             inner[:] = known[near] + apart_m - np.where(has, 0.0, relief * middle * hills[near])
             words = f"as soundings have it, in {100 * share:.0f} % of the cells, and {kind} between them"
