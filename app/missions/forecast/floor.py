@@ -110,7 +110,7 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
             # Outside of the area, and where no map reaches, it goes on from the nearest place that is known.
             near = tuple(distance_transform_edt(~has, return_distances=False, return_indices=True))
             inner, hills = z[: grid.rows, : grid.cols], unit[: grid.rows, : grid.cols]
-            # Early maps of smooth floors doubt too much, those of rough ones do not: every other floor bounds the doubt.
+            # Early maps of smooth floors doubt too much, those of rough ones do not: every other floor bounds it.
             most_m = relief * middle if number % 2 == 0 else math.inf
             between_m = np.minimum(doubt * math.sqrt(relief / USUAL_RELIEF), most_m)
             apart_m = np.where(has, between_m, relief * middle) * hills
