@@ -51,6 +51,7 @@ class AlarmKind(StrEnum):
     NO_WATER_LEVEL = "no_water_level"
     DATABASE_UNWRITABLE = "database_unwritable"
     MISSION_FAILED = "mission_failed"
+    NOT_BEGUN = "not_begun"
     TEST = "test"
 
 
@@ -150,6 +151,12 @@ ALARMS: Mapping[AlarmKind, AlarmRule] = {
         "a mission ended by an error; its vehicles are stopped",
         "recover them; report the error",
         "state",
+    ),
+    AlarmKind.NOT_BEGUN: AlarmRule(
+        _MAJOR,
+        "a mission that follows another one does not begin by itself",
+        "read why; start it, or bring its vehicles in",
+        "waiting",
     ),
     AlarmKind.TEST: AlarmRule(_MINOR, "somebody tries who is told", "nothing", "test"),
 }

@@ -49,6 +49,7 @@ from app.missions.running.team_changes import TeamChanges, vehicle_row
 from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, Action, MissionState
+from app.missions.succession import Succession
 from app.missions.traffic.watch import Traffic
 from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
 from app.missions.views.mission import ActionView, Level, MissionSummary, MissionView, VehicleView
@@ -157,6 +158,8 @@ class MissionService:
         """Reports of surveys."""
         self.sites = Sites(database, self.get, self.maps, self.imports, lambda: self._started)
         """Places that are surveyed again and again."""
+        self._succession = Succession(database, self.get, self._start_following)
+        self._supervisor.ended = self._succession.ended
         self._started = False
 
     # Life of the service
@@ -173,6 +176,7 @@ class MissionService:
         self._registry.share(self.process, self._failover.may_take_up, self._taken_up)
         await self._failover.begin()
         self.alarms.start()
+        await self._succession.begin()
         self._started = True
 
     async def shutdown(self) -> None:
@@ -181,6 +185,7 @@ class MissionService:
         Running missions stay running: another process takes them up, or this one at its next start.
         """
         self._started = False
+        await self._succession.close()
         await self._processes.close()
         self.compute.end()
         await self._failover.end()
@@ -237,6 +242,7 @@ class MissionService:
         """Store a new mission; it is ready when it has a vehicle. Raises InvalidRequestError, ConflictError."""
         check_spec(spec, self.hub.kinds)
         await self.sites.check(spec)
+        await self._succession.check(spec)
         created = now()
         row = MissionRow(
             id=str(uuid.uuid4()),
@@ -336,6 +342,9 @@ class MissionService:
                 live.publish_summary()
         return action_view(live, stops)
 
+    async def _start_following(self, live: LiveMission, why: str) -> None:
+        await self.act(live, Action.START, actor="service", note=why)
+
     async def send_on(self, live: LiveMission, name: str, actor: str) -> None:
         """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
         await send_on(live, self._supervisor, name, actor)
@@ -344,6 +353,7 @@ class MissionService:
         """Describe a mission anew that has not started. Raises InvalidRequestError, ConflictError."""
         check_spec(spec, self.hub.kinds)
         await self.sites.check(spec)
+        await self._succession.check(spec, live.id, live.spec.after)
         async with self._supervisor.acting(live.id):
             await describe_anew(live, spec, actor)
             await self._registry.forget(live, "the mission was described anew")

@@ -35,6 +35,26 @@ FLAGS = [
     "--enable-precise-memory-info",
 ]
 
+# Turns the view by its keys as often as the page draws; a frame of the page may show the same picture once more, so
+# the pictures themselves are counted, with their points.
+SPIN = """() => {
+  const [times, points] = (window.__pictures = [[], []]);
+  const context = WebGL2RenderingContext.prototype, draw = context.drawElements;
+  context.drawElements = function (mode, count, ...rest) {
+    if (mode === this.POINTS) { times.push(performance.now()); points.push(count); }
+    return draw.call(this, mode, count, ...rest);
+  };
+  const canvas = document.querySelector(".space canvas");
+  const key = { code: "ArrowLeft", key: "ArrowLeft", shiftKey: true, bubbles: true };
+  window.__spins = true;
+  const spin = () => {
+    if (!window.__spins) return;
+    canvas.dispatchEvent(new KeyboardEvent("keydown", key));
+    requestAnimationFrame(spin);
+  };
+  spin();
+}"""
+
 
 def cpu_s(pid: int) -> float:
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
@@ -100,7 +120,20 @@ class Bench:
             page.get_by_test_id("toggle-lasso").press("Enter")
             page.wait_for_timeout(3000)
             what = f"{self.options.soundings} soundings in 3-D, turned, software rendering"
-            self._count(page, what, drags=True, asked="usable")
+            self._count(page, what, drags=True, asked=">= 10")
+            page.evaluate(SPIN)
+            page.wait_for_timeout(1000 * self.options.seconds)
+            times, points = page.evaluate("() => { window.__spins = false; return window.__pictures; }")
+            rate = 1000 * (len(times) - 1) / (times[-1] - times[0])
+            drawn = (
+                f"{rate:.1f} a second, of {statistics.median(points):.0f} points in the median; "
+                f"load of the machine {os.getloadavg()[0]:.1f}"
+            )
+            self.note("Pictures of them, turned with every frame", drawn, ">= 10")
+            page.wait_for_timeout(3000)
+            self.note(
+                "Points in the picture when it is still", str(page.evaluate("window.__pictures[1].at(-1)")), "all"
+            )
 
     def _count(self, page: Any, what: str, *, drags: bool, asked: str = ">= 10") -> None:
         """Count the frames while nothing is done, or while what is shown is dragged to and fro."""

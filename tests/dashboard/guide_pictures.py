@@ -7,6 +7,7 @@ Real missions of simulated vehicles over generated sea floors, in Chromium witho
 import argparse
 import io
 import json
+import socket
 import tempfile
 import time
 from collections.abc import Callable
@@ -18,10 +19,12 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from tests.dashboard.conftest import CHROMIUM, FLAGS
+from tests.support.ais import named, nmea, position
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, show
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.paths import PROJECT
+from tests.support.ports import free_ports
 
 IMAGES = PROJECT / "docs" / "images"
 COLOURS = 192
@@ -35,6 +38,12 @@ WHOLE_M = 3 * 1000.0 * KM_EACH
 ZONE = rectangle(300, 60, 340, 100)
 HOME = lon_lat(-25.0, 20.0)
 HELD = ("lauv-2", "lauv-3")
+PASSING = 263000001
+BLOCKS = (
+    [(520, 200), (800, 220), (790, 420), (530, 400)],
+    [(560, 500), (760, 510), (750, 700), (570, 690)],
+    [(900, 260), (1040, 250), (1060, 640), (920, 660)],
+)
 LOOK_S = 0.3
 TIME_SCALE = "6"
 """Faster, a busy machine's vehicles circle while they wait for decisions."""
@@ -46,6 +55,7 @@ class Guide:
 
     service: Service
     browser: Browser
+    ais_port: int
     missions: dict[str, str] = field(default_factory=dict)
 
     def page(self, size: tuple[int, int], theme: str) -> Page:
@@ -62,6 +72,17 @@ class Guide:
         """Wait until a mission is as it should be."""
         while not enough(self.service.get(f"/missions/{mission}")):
             time.sleep(LOOK_S)
+
+    def tell_of_ships(self) -> None:
+        """Send what an AIS receiver and the own ship's GPS and compass say."""
+        (own_lon, own_lat), (lon, lat) = lon_lat(-30.0, 150.0), lon_lat(60.0, -28.0)
+        north, west = ((int(abs(deg)), 60.0 * (abs(deg) % 1.0)) for deg in (own_lat, own_lon))
+        fix = f"{north[0]:02d}{north[1]:07.4f},N,{west[0]:03d}{west[1]:07.4f},W"
+        words = [nmea(f"GPGGA,092750,{fix},1,8,1.0,2.0,M,55.2,M,,"), nmea("HEHDT,75.0,T")]
+        words += [*named(PASSING, "ESTRELA"), *[position(PASSING, lat, lon, knots=1.0, course_deg=95.0)] * 3]
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for line in words:
+                sender.sendto(line + b"\r\n", ("127.0.0.1", self.ais_port))
 
     def survey(self, share: float) -> str:
         """The survey of three vehicles, once so much of its length is flown."""
@@ -116,6 +137,20 @@ def watch_done(guide: Guide, page: Page) -> None:
         by_id(page, f"resume-{name}").click()
 
 
+def ships(guide: Guide, page: Page) -> None:
+    """The own ship, a ship that passes, and the circle of a vehicle that waits."""
+    mission = guide.survey(0.3)
+    show(page, mission)
+    by_id(page, "range-low").wait_for()
+    by_id(page, f"hold-{HELD[0]}").click()
+    guide.wait(mission, lambda one: any(v["waiting_circle"] and v["withdrawn"] for v in one["vehicles"]))
+    guide.tell_of_ships()
+
+
+def ships_done(guide: Guide, page: Page) -> None:
+    by_id(page, f"resume-{HELD[0]}").click()
+
+
 def phone(guide: Guide, page: Page) -> None:
     """The watch on a phone at night."""
     show(page, guide.survey(0.5))
@@ -132,6 +167,26 @@ def planning(guide: Guide, page: Page) -> None:
     click_round(page, [(520, 300), (980, 330), (940, 640), (540, 600)])
     page.wait_for_selector('[data-testid="planned"][data-plan="new"]')
     by_id(page, "planned-whole").scroll_into_view_if_needed()
+
+
+def blocks(guide: Guide, page: Page) -> None:
+    """Several areas that are flown one after the other."""
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Roads")
+    by_id(page, "planner-lawnmower").click()
+    by_id(page, "field-length").select_option("spacing_m")
+    by_id(page, "field-spacing_m").fill("12")
+    for number, corners in enumerate(BLOCKS, start=1):
+        if number > 1:
+            by_id(page, "another-block").click()
+        by_id(page, "draw-polygon").click()
+        page.wait_for_selector('[data-testid="drawing"][data-ready="true"]')
+        click_round(page, corners)
+    for number, name in enumerate(("Mole", "Anchorage", "Fairway"), start=1):
+        by_id(page, f"block-name-{number}").fill(name)
+    page.wait_for_selector('[data-testid="planned"][data-plan="new"]')
+    by_id(page, "in-blocks").evaluate("table => table.scrollIntoView()")
 
 
 def checklist(guide: Guide, page: Page) -> None:
@@ -206,17 +261,19 @@ def swath(guide: Guide, page: Page) -> None:
 SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = {
     # Before there is any mission.
     "planning": (planning, WIDE, "light"),
+    "blocks": (blocks, WIDE, "light"),
     "checklist": (checklist, WIDE, "dark"),
     "dashboard": (dashboard, WIDE, "light"),
     "phone": (phone, PHONE, "night"),
     "watch": (watch, WIDE, "light"),
+    "ships": (ships, WIDE, "light"),
     "swath": (swath, WIDE, "light"),
     "space": (space, WIDE, "dark"),
     "profile": (profile, WIDE, "light"),
     "charts": (charts, WIDE, "light"),
     "dashboard-replay": (dashboard_replay, WIDE, "light"),
 }
-AFTERWARDS = {"watch": watch_done}
+AFTERWARDS = {"watch": watch_done, "ships": ships_done}
 
 
 def keep(picture: bytes, path: Path) -> None:
@@ -229,12 +286,14 @@ def main() -> None:
     parser.add_argument("names", nargs="*", choices=[*SCENES, []], metavar="NAME", help=", ".join(SCENES))
     parser.add_argument("--out", type=Path, default=IMAGES)
     options = parser.parse_args()
+    [ais_port] = free_ports(1)
     settings = {"simulation__family": "canyon", "time_scale": TIME_SCALE}
+    settings |= {"ais__udp_address": "127.0.0.1", "ais__udp_port": str(ais_port), "ais__cpa_m": "10"}
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         service = Service(Path(folder), **settings)
         service.start()
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        guide = Guide(service, browser)
+        guide = Guide(service, browser, ais_port)
         try:
             for name in options.names or SCENES:
                 scene, size, theme = SCENES[name]

@@ -174,7 +174,9 @@ def test_no_serious_fault_for_people_who_see_or_steer_otherwise(page: Page, serv
         assert serious == [], prepare
 
 
-def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(page: Page, service: Service) -> None:
+@pytest.fixture
+def sixty_four(service: Service) -> str:
+    """A mission with as many soundings in a square."""
     mission = service.create(vehicles=[{"name": "rover", "kind": "rest"}])
     items = [
         {"vehicle": "rover", "time_s": 1.79e9 + 30 * i, "lat_deg": 41.1851 + 4e-5 * (i // 8), "depth_m": 2.0}
@@ -182,11 +184,56 @@ def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(page
         for i in range(64)
     ]
     service.post(f"/missions/{mission}/measurements", {"items": items})
+    return mission
+
+
+def show_points(page: Page, mission: str) -> None:
+    """Open a mission's soundings in space."""
     show(page, mission)
     by_id(page, "open-3d").click()
     by_id(page, "toggle-points").click()
+    expect(by_id(page, "points-chosen")).to_contain_text("64 soundings")
+
+
+def test_fewer_soundings_are_drawn_while_a_slow_machine_turns_them_and_all_when_they_are_still(
+    page: Page, sixty_four: str
+) -> None:
+    show_points(page, sixty_four)
+    canvas, lasso, chosen = page.locator(".space canvas"), by_id(page, "lasso"), by_id(page, "points-chosen")
+    expect(canvas).to_have_attribute("data-points", "64")
+    # Every picture comes late.
+    page.evaluate(
+        """() => { const late = () => { const until = performance.now() + 120; while (performance.now() < until);
+        window.late = requestAnimationFrame(late); }; late(); }"""
+    )
+    box = lasso.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    drawn = set()
+    for turn in range(40):
+        page.mouse.wheel(0, 40 if turn % 2 else -40)
+        drawn.add(int(canvas.get_attribute("data-points") or 0))
+        if len(drawn) > 2:
+            break
+    assert min(drawn) < 64, "the first half of them at most"
+    lasso.focus()
+    page.keyboard.press("Enter")
+    expect(chosen).to_contain_text("of 64 soundings chosen")
+    while_turned = chosen.inner_text()
+    page.evaluate("cancelAnimationFrame(window.late)")
+    expect(canvas).to_have_attribute("data-points", "64")
+    page.keyboard.press("Escape")
+    expect(chosen).to_contain_text("Draw round")
+    page.keyboard.press("Enter")
+    expect(chosen).to_have_text(while_turned)
+
+
+def test_soundings_are_chosen_in_space_with_a_lasso_rejected_and_taken_back(
+    page: Page, service: Service, sixty_four: str
+) -> None:
+    mission = sixty_four
+    show_points(page, mission)
     chosen = by_id(page, "points-chosen")
-    expect(chosen).to_contain_text("64 soundings")
     expect(by_id(page, "points-reject")).to_be_disabled()
 
     def states() -> dict[str, int]:

@@ -1,27 +1,19 @@
 """How well a survey agrees with itself, in Chromium."""
 
-import os
 import re
-from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, colours_in_the_middle, show
+from tests.support.dashboard.steps import by_id, colours_in_the_middle, picture, show
 from tests.support.missions.specs import rectangle
 from tests.support.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
 START_S = 1_795_225_140.0
-
-
-def picture(page: Page, name: str) -> None:
-    """Keep a picture to look at where ``DASHBOARD_LOOK`` names a folder."""
-    if folder := os.environ.get("DASHBOARD_LOOK"):
-        page.screenshot(path=Path(folder) / f"{name}.png")
 
 
 @pytest.fixture

@@ -12,12 +12,10 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, expect_state, show
-from tests.support.paths import PROJECT
+from tests.support.dashboard.steps import by_id, expect_state, show, violations
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
-AXE = PROJECT / "app" / "dashboard" / "web" / "node_modules" / "axe-core" / "axe.min.js"
 LINE = "41.18505, -8.70490; 41.18545, -8.70440"
 
 
@@ -48,15 +46,6 @@ def shared(browser: Browser, service: Service, surveyed: str) -> Iterator[Page]:
     context.close()
 
 
-def faults(page: Page) -> list[str]:
-    """What axe finds wrong with the page as it is."""
-    if not AXE.is_file():
-        pytest.skip("axe-core is missing: npm ci in app/dashboard/web")
-    page.evaluate(AXE.read_text())
-    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
-    return [f"{one['id']}: {[node['target'] for node in one['nodes']]}" for one in found["violations"]]
-
-
 def test_the_browsers_language_is_spoken_until_another_is_chosen(shared: Page) -> None:
     page = shared
     expect(page.locator("html")).to_have_attribute("lang", "pt")
@@ -71,9 +60,9 @@ def test_the_browsers_language_is_spoken_until_another_is_chosen(shared: Page) -
     by_id(page, "units").select_option("nautical")
     by_id(page, "theme").select_option("night")
     expect(page.locator("html")).to_have_attribute("data-theme", "night")
-    assert faults(page) == []
+    assert violations(page) == []
     by_id(page, "settings-close").click()
-    assert faults(page) == []
+    assert violations(page) == []
     page.reload()
     expect(by_id(page, "abort")).to_have_text("Abort all")
     expect(page.locator("html")).to_have_attribute("data-theme", "night")
@@ -83,7 +72,7 @@ def test_keys_do_what_their_sheet_says_and_nothing_while_one_types(shared: Page)
     page = shared
     page.keyboard.press("?")
     expect(by_id(page, "keys")).to_contain_text("Ask whether to abort all")
-    assert faults(page) == []
+    assert violations(page) == []
     page.keyboard.press("Escape")
     expect(by_id(page, "keys-dialog")).not_to_be_visible()
     page.keyboard.press("l")
@@ -131,7 +120,7 @@ def test_a_survey_is_cut_along_a_line_and_given_as_a_table(shared: Page, service
     expect(by_id(page, "profile-difference")).to_contain_text("deeper than Quay on average")
     by_id(page, "profile-layer").select_option("slope")
     expect(by_id(page, "profile-layer-values")).to_contain_text("Quay: Slope")  # shown once it has come
-    assert faults(page) == []
+    assert violations(page) == []
     with page.expect_download() as begun:
         by_id(page, "profile-csv").click()
     rows = Path(begun.value.path()).read_text(encoding="utf-8").splitlines()
@@ -197,7 +186,7 @@ def test_the_first_mission_is_guided_by_what_is_really_done(page: Page, service:
     tour = by_id(page, "tour")
     expect(tour).to_have_attribute("data-step", "checklist")
     expect(page.locator('[data-testid="start"].tour-mark')).to_be_visible()
-    assert faults(page) == []
+    assert violations(page) == []
     by_id(page, "start").click()
     expect(tour).to_have_attribute("data-step", "start")
     expect(by_id(page, "preflight")).to_have_attribute("data-ready", "true")

@@ -7,8 +7,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.mapping.s44 import Order, strictest_sd_m
+from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, click_round
+from tests.support.dashboard.steps import by_id, click_round, expect_state, picture, show, start, violations
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -125,3 +126,76 @@ def test_the_plan_is_drawn_before_the_start_and_follows_the_area_as_it_is_dragge
 def middle_of(page: Page) -> bytes:
     """What the map shows inside the area that is drawn."""
     return page.screenshot(clip={"x": 560, "y": 340, "width": 280, "height": 220})
+
+
+def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Watched, service: Service) -> None:
+    page = watched.page
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Bay")
+    by_id(page, "planner-lawnmower").click()
+    by_id(page, "field-steps").fill("3")
+    by_id(page, "another-block").click()
+    for number, name in enumerate(("West", "East"), start=1):
+        by_id(page, f"block-name-{number}").fill(name)
+    # Typed, the second lies beside the first; a third one is drawn.
+    expect(by_id(page, "block-2")).to_have_attribute("aria-pressed", "true")
+    by_id(page, "another-block").click()
+    by_id(page, "draw-polygon").click()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
+    click_round(page, [(620, 560), (760, 570), (750, 680), (630, 670)])
+    expect(by_id(page, "in-block-3")).to_contain_text(re.compile(r"Block 3\d"))
+    expect(by_id(page, "in-blocks-all")).to_contain_text(re.compile(r"In all.*\d"))
+    by_id(page, "block-earlier-3").click()
+    expect(by_id(page, "in-block-2")).to_contain_text("Block 2")
+    by_id(page, "block-3").click()
+    expect(by_id(page, "block-3")).to_have_attribute("aria-pressed", "true")
+    expect(by_id(page, "editing")).to_have_attribute("data-ready", "true")
+    picture(page, "blocks-wide")
+    assert violations(page) == []
+    page.set_viewport_size({"width": 390, "height": 844})
+    by_id(page, "blocks").scroll_into_view_if_needed()
+    picture(page, "blocks-phone")
+    page.set_viewport_size({"width": 1440, "height": 900})
+    by_id(page, "block-remove-2").click()
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Bay – West")
+    [west], [east] = named(service, "Bay – West"), named(service, "Bay – East")
+    assert service.get(f"/missions/{east}")["after"] == west
+    expect(by_id(page, f"mission-{east}")).to_contain_text("Begins by itself after Bay – West")
+
+    # Whoever watches the first goes on with the vehicles, and could stop them.
+    start(page)
+    expect(by_id(page, "mission-name")).to_have_text("Bay – East", timeout=120_000)
+    expect(by_id(page, "abort")).to_be_visible()
+    assert service.get(f"/missions/{west}")["state"] == "finished"
+    assert watched.complaints == []
+
+
+def test_who_finishes_a_block_early_is_told_that_the_next_does_not_begin(page: Page, service: Service) -> None:
+    sims = [{"name": "first", "kind": "sim"}]
+    west = service.create(name="Early", vehicles=sims, steps=500)
+    east = service.create(name="Late", vehicles=sims, after=west)
+    show(page, west)
+    start(page)
+    by_id(page, "finish").click()
+    expect(by_id(page, "does-not-follow")).to_contain_text("Late, which follows, does not begin by itself")
+    by_id(page, "confirm-finish").click()
+    expect_state(page, "finished")
+    assert service.get(f"/missions/{east}")["state"] == "ready"
+    expect(by_id(page, f"mission-{east}")).not_to_contain_text("Begins by itself")
+
+
+def test_a_block_that_cannot_begin_by_itself_is_shown_with_its_alarm(page: Page, service: Service) -> None:
+    sims = [{"name": name, "kind": "sim"} for name in ("kept", "lost")]
+    west = service.create(name="Flown", vehicles=sims, steps=20)
+    east = service.create(name="Waiting", vehicles=sims, after=west)
+    show(page, west)
+    start(page)
+    service.post(f"/missions/{west}/vehicles/lost/abort", {})
+    expect(by_id(page, "mission-name")).to_have_text("Waiting", timeout=120_000)
+    expect(by_id(page, "alarms")).to_contain_text("does not begin by itself: lost left 'Flown'")
+    expect_state(page, "ready")
+    expect(by_id(page, "abort")).to_be_enabled()
+    assert service.get(f"/missions/{east}")["state"] == "ready"

@@ -1,27 +1,19 @@
 """Swath surveys in Chromium, against the real service with its own simulation."""
 
-import os
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, colours_in_the_middle, expect_state, show, start
+from tests.support.dashboard.steps import by_id, colours_in_the_middle, expect_state, picture, show, start
 from tests.support.missions.specs import lon_lat, rectangle
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
 SIDE_M, CELL_M = 60, 2
-
-
-def picture(page: Page, name: str) -> None:
-    """Keep a picture to look at where ``DASHBOARD_LOOK`` names a folder."""
-    if folder := os.environ.get("DASHBOARD_LOOK"):
-        page.screenshot(path=Path(folder) / f"{name}.png")
 
 
 @pytest.fixture
@@ -91,6 +83,22 @@ def test_a_swath_survey_is_described_started_and_followed(watched: Watched, serv
     by_id(page, "aperture_deg-sim-1").fill("100")
     by_id(page, "beams-sim-1").fill("128")
     picture(page, "form")
+    # Its plan and its forecast tell of the whole area, whatever the length is.
+    by_id(page, "field-length").select_option("minutes")
+    by_id(page, "field-minutes").fill("2")
+    expect(by_id(page, "planned").get_by_test_id("whole-survey")).to_contain_text("sim-1")
+    by_id(page, "ask-forecast").click()
+    forecast = by_id(page, "forecast")
+    expect(forecast).to_contain_text("Ensonified", timeout=120_000)
+    expect(by_id(page, "forecast-duration")).to_have_text(re.compile(r"\d"))
+    share = re.match(r"(\d+)", by_id(page, "forecast-coverage").inner_text())
+    assert share is not None
+    assert 0 < int(share.group(1)) < 100, "two minutes are not enough"
+    expect(forecast.get_by_test_id("whole-survey")).to_have_class("reason")
+    picture(page, "forecast")
+    by_id(page, "field-minutes").fill("60")
+    expect(forecast).not_to_contain_text("Ensonified")
+    expect(by_id(page, "planned").get_by_test_id("whole-survey")).to_have_class("hint")
     by_id(page, "create-mission").click()
     expect(by_id(page, "mission-name")).to_have_text("Full coverage")
     (made,) = [m for m in service.get("/missions") if m["name"] == "Full coverage"]

@@ -29,6 +29,7 @@ from app.mapping.types import Grid
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
+    from_outside,
     make_constraints,
     make_planner,
     swath_sonar,
@@ -177,8 +178,16 @@ def plan(
         )
     else:
         routes, whole = _planned(spec, members, constraints, begin_m, depth_m, over)
+    ways_in_m = np.where(
+        [from_outside(start, inner, spec) for start in starts_m], np.hypot(*(begin_m - starts_m).T), 0.0
+    )
     ways = [
-        _way(spec, constraints, member, _cut(np.vstack([starts_m[i], begin_m[i], route]), member.way_left_m(spec)))
+        _way(
+            spec,
+            constraints,
+            member,
+            _cut(np.vstack([starts_m[i], begin_m[i], route]), ways_in_m[i] + member.way_left_m(spec)),
+        )
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
     return Plan(ways, whole, own, depth_m, all_swept)

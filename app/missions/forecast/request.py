@@ -209,14 +209,17 @@ def described_team(hub: FleetHub, spec: MissionSpec) -> list[Member]:
 
 
 def starts_of(spec: MissionSpec, members: list[Member]) -> tuple[FloatArray, str]:
-    """Return where the vehicles begin, (vehicles, 2), and that in words: where they are, or in the area's corner."""
+    """Return where the vehicles begin, (vehicles, 2), and that in words: where they are, or in the area's corner.
+
+    Before a mission that follows another one they will be elsewhere.
+    """
     frame, area = spec.frame(), Polygon(spec.local_area())
     width = float(np.ptp(spec.local_area()[:, 0]))
     starts, reported = [], 0
     for index, member in enumerate(members):
         corner = np.array([START_MARGIN_M + index * START_SPACING_M % max(width - START_MARGIN_M, 1.0), START_MARGIN_M])
         place = corner
-        if member.report is not None:
+        if member.report is not None and spec.after is None:
             here = member.place_m(frame)
             if area.distance(Point(here)) <= NEAR_M:
                 place, reported = here, reported + 1

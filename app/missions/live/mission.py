@@ -654,6 +654,7 @@ class LiveMission:
             created_at=header.created_at,
             updated_at=header.updated_at,
             ending=None if self.ending is None or header.state in ENDED else self.ending.state,
+            after=self.spec.after,
             progress=self.progress(),
         )
 

@@ -7,14 +7,16 @@ import numpy as np
 from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
+from app.arrays import FloatArray
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState
+from app.missions.flight.decisions.decision import INSET_M, from_outside, make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks
-from app.missions.safety.free_space import WAITING_CIRCLE_M
+from app.missions.safety.free_space import WAITING_CIRCLE_M, way_in
 from app.missions.spec.mission import MissionSpec, VehicleSpec
 from app.missions.team import Member
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
@@ -76,7 +78,9 @@ def _vehicles(live: LiveMission) -> Iterator[CheckView]:
                 title=title,
                 status=PROBLEM,
                 message=f"it takes part in mission {owner}",
-                remedy="Finish or abort that mission, or take the vehicle out of one of them",
+                remedy="This mission follows that one, and begins by itself when that one is flown to its end"
+                if owner == live.spec.after
+                else "Finish or abort that mission, or take the vehicle out of one of them",
             )
             continue
         status, message, remedy = OK, f"{info.state}".replace("_", " "), ""
@@ -121,6 +125,8 @@ def _batteries(live: LiveMission) -> Iterator[CheckView]:
 def _places(live: LiveMission) -> Iterator[CheckView]:
     area = Polygon(live.area)
     zones = [Polygon(live.spec.to_local(zone)) for zone in live.spec.keep_out]
+    constraints = make_constraints(live.spec)
+    inner = Polygon(constraints.area)
     for member in live.team:
         place = _place(live, member)
         if place is None:
@@ -135,6 +141,14 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
                 message="it lies in a keep-out zone",
                 remedy="Bring it out of there, or change the zone",
             )
+        elif from_outside(_en_m(place), inner, live.spec) and way_in(constraints, _en_m(place), INSET_M, []) is None:
+            yield CheckView(
+                id=name,
+                title=title,
+                status=PROBLEM,
+                message=f"it is {distance:.0f} m from the area, and a keep-out zone bars every straight way in",
+                remedy="Bring it to another side of the area, or change the zone",
+            )
         elif distance > FAR_M:
             yield CheckView(
                 id=name,
@@ -146,6 +160,10 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
         else:
             words = "in the area" if distance == 0 else f"{distance:.0f} m from the area"
             yield CheckView(id=name, title=title, status=OK, message=words)
+
+
+def _en_m(place: Point) -> FloatArray:
+    return np.array([place.x, place.y])
 
 
 def _place(live: LiveMission, member: Member) -> Point | None:

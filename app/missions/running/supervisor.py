@@ -65,6 +65,8 @@ class MissionSupervisor:
         """Step loops that were cancelled and have not ended yet."""
         self._unwritten: dict[str, asyncio.Task[None]] = {}
         """States that are in force and will be written down when that is possible again."""
+        self.ended: Callable[[LiveMission, str], None] = _nobody_follows
+        """Called when a mission has ended: with it, and with the reason if it was flown to its end, else ''."""
 
     def acting(self, mission_id: str) -> asyncio.Lock:
         """Return the lock under which a mission's state changes.
@@ -113,6 +115,8 @@ class MissionSupervisor:
                 await to_the_end(self._conclude(live, target, reason, alarm))
             finally:
                 self.runs.pop(live.id, None)
+        to_its_end = target is MissionState.FINISHED and live.ending is None
+        self.ended(live, reason if to_its_end else "")
 
     async def _conclude(self, live: LiveMission, target: MissionState, reason: str, alarm: AlarmKind | None) -> None:
         """Bring a mission whose flight ended to its end."""
@@ -186,9 +190,10 @@ class MissionSupervisor:
         live.publish_summary()
 
     def dismiss(self, live: LiveMission) -> None:
-        """Give up the vehicles of a mission that ended; its last map is made meanwhile."""
+        """Give up the vehicles of a mission that was ended; its last map is made meanwhile."""
         self._claims.release_team(live)
         self._maps.map_last(live)
+        self.ended(live, "")
 
     async def halt(self, live: LiveMission) -> list[StopReceipt]:
         """End the flight and stop the vehicles, at once and not only when the loop has ended."""
@@ -306,7 +311,9 @@ class MissionSupervisor:
         words = f"{state} by {actor}" + (f": {reason}" if reason else "")
         facts: dict[str, Any] = {"state": state, "actor": actor}
         if state in ENDED:
-            facts[ENDS] = [str(kind) for kind in OF_A_MISSION]
+            facts[ENDS] = [str(kind) for kind in (*OF_A_MISSION, AlarmKind.NOT_BEGUN)]
+        elif state is MissionState.RUNNING:
+            facts[ENDS] = [str(AlarmKind.NOT_BEGUN)]
         if alarm is None:
             line = live.journal.line(Level.INFO, "state", words, **facts)
         else:
@@ -318,6 +325,10 @@ class MissionSupervisor:
             await add_lines(session, [line])
         live.enter(state, reason, changed_at)
         live.journal.tell(line)
+
+
+def _nobody_follows(_live: LiveMission, _reason: str) -> None:
+    return None
 
 
 def _log_failure(mission_id: str, done: asyncio.Task[None]) -> None:

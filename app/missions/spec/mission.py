@@ -32,6 +32,7 @@ from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
 
 Speed = Annotated[float, Field(gt=0, le=5)]
+MissionId = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$")]
 ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
 ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
 
@@ -458,6 +459,12 @@ class MissionSpec(Model):
     )
     site_prior: bool = Field(
         default=True, description="With a site: begin with the depths that its earlier surveys found"
+    )
+    after: MissionId | None = Field(
+        default=None,
+        description="The mission that it follows, for example with the next area: it begins by itself once that one "
+        "was flown to its end and its vehicles are fit to go on; not when that one was ended by a person, aborted or "
+        "failed. null: it begins when it is started",
     )
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of every random decision")
 

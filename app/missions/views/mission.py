@@ -228,6 +228,7 @@ class MissionSummary(View):
     ending: MissionState | None = Field(
         default=None, description="What it becomes once all its vehicles are home; null while it goes on"
     )
+    after: str | None = Field(default=None, description="The mission that it follows; null: it follows none")
     progress: Progress
 
     @computed_field  # type: ignore[prop-decorator]

@@ -7,9 +7,9 @@ from typing import Any
 
 from sqlalchemy import Select, func, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
-from sqlalchemy.orm import defer
+from sqlalchemy.orm import aliased, defer
 
-from app.storage.models import MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
+from app.storage.models import EventRow, MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
 
 ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id)
 """The ids of all missions, newest first."""
@@ -19,6 +19,28 @@ async def oldest_first(session: AsyncSession, mission_id: str | None = None) -> 
     """Return all missions in the order in which they were created, or only the one of an id."""
     query = select(MissionRow).order_by(MissionRow.created_at, MissionRow.id)
     return (await session.scalars(query if mission_id is None else query.where(MissionRow.id == mission_id))).all()
+
+
+async def followers(session: AsyncSession, mission_id: str) -> Sequence[str]:
+    """Return the ids of the missions that are to begin after one, and have not, oldest first."""
+    follows = MissionRow.spec["after"].as_string() == mission_id
+    query = select(MissionRow.id).where(follows, MissionRow.state == "ready").order_by(MissionRow.created_at)
+    return (await session.scalars(query)).all()
+
+
+async def forgotten_followers(session: AsyncSession) -> Sequence[tuple[str, str]]:
+    """Return missions that are to begin after one that finished, and nobody has been told why they did not.
+
+    With the name of the one before.
+    """
+    before = aliased(MissionRow)
+    told = select(EventRow.id).where(EventRow.mission_id == MissionRow.id, EventRow.kind == "waiting").exists()
+    query = (
+        select(MissionRow.id, before.name)
+        .join(before, before.id == MissionRow.spec["after"].as_string())
+        .where(MissionRow.state == "ready", before.state == "finished", ~told)
+    )
+    return [(mission_id, name) for mission_id, name in await session.execute(query)]
 
 
 async def newest_named(session: AsyncSession, name: str) -> MissionRow | None:

@@ -24,6 +24,16 @@ async def test_a_new_mission_is_found_where_the_answer_says(client: httpx.AsyncC
     assert [m["id"] for m in (await client.get("/missions")).json()] == [created["id"]]
 
 
+async def test_a_mission_names_the_one_that_it_follows(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    following = (await client.post("/missions", json=mission_spec(after=mission["id"]))).json()
+    assert following["after"] == following["spec"]["after"] == mission["id"]
+    listed = {one["id"]: one["after"] for one in (await client.get("/missions")).json()}
+    assert listed == {mission["id"]: None, following["id"]: mission["id"]}
+    refused = await client.post("/missions", json=mission_spec(after="nobody"))
+    assert refused.status_code == 422
+    assert [fault["field"] for fault in refused.json()["errors"]] == ["after"]
+
+
 async def test_a_mission_without_a_vehicle_is_a_draft_until_it_gets_one(client: httpx.AsyncClient) -> None:
     draft = (await client.post("/missions", json=mission_spec(vehicles=[]))).json()
     assert draft["state"] == "draft"

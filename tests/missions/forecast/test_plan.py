@@ -12,6 +12,7 @@ from shapely.geometry import LineString, Polygon
 
 from app.exploration.swath.flown_ahead import seen_from
 from app.missions.errors import InvalidRequestError
+from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.forecast import preview
 from app.missions.forecast.plan import Plan, _flying, _level, plan
 from app.missions.forecast.request import starts_of
@@ -168,3 +169,24 @@ async def test_whoever_leaves_ends_its_plan_and_one_that_waits_never_begins(
     await until(ended.is_set, "it ends")
     await asyncio.gather(first, second, return_exceptions=True)
     assert begun == ["first"]
+
+
+def test_a_plan_of_a_mission_that_follows_comes_from_where_its_vehicles_are_then() -> None:
+    asked = {"planner": {"name": "lawnmower"}, "budget": {"km_per_vehicle": 0.2}}
+    vehicle = {"name": "a", "kind": "imc", "start": list(lon_lat(-50.0, 10.0))}
+    spec = make_spec(60.0, vehicles=[vehicle], after="earlier", **asked)
+    [member] = members_of(spec)
+    # Now it is somewhere else.
+    lon, lat = lon_lat(30.0, 30.0)
+    report = VehicleReport("a", 0.0, Position(lat, lon, 0.0), None, None, None, None)
+    starts_m, _ = starts_of(spec, [replace(member, report=report)])
+    assert starts_m == pytest.approx(np.array([[-50.0, 10.0]]), abs=0.1)
+    [way] = plan(spec, [member], starts_m, budget_s=AMPLE_S).ways
+    assert way.corners_m[0] == pytest.approx([-50.0, 10.0], abs=0.1)
+    # The way in takes nothing of what is flown in the area.
+    [inside] = plan(spec, [member], np.array([[0.0, 10.0]]), budget_s=AMPLE_S).ways
+    assert way.distance_m == pytest.approx(inside.distance_m + 50.0, abs=1.0)
+    assert way.distance_m > 200.0
+    alone = make_spec(60.0, vehicles=[vehicle], **asked)
+    here_m, _ = starts_of(alone, [replace(member, report=report)])
+    assert here_m == pytest.approx(np.array([[30.0, 30.0]]), abs=0.1)

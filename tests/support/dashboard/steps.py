@@ -1,10 +1,17 @@
 """What tests of the page do again and again."""
 
 import io
+import os
+from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 from playwright.sync_api import Locator, Page, expect
+
+from tests.support.paths import PROJECT
+
+AXE = PROJECT / "app" / "dashboard" / "web" / "node_modules" / "axe-core" / "axe.min.js"
 
 
 def by_id(page: Page, name: str) -> Locator:
@@ -59,3 +66,18 @@ def drag(page: Page, start: tuple[int, int], end: tuple[int, int]) -> None:
         # A browser joins moves that come between two pictures, and what begins too far from a handle drags nothing.
         page.evaluate("() => new Promise(requestAnimationFrame)")
     page.mouse.up()
+
+
+def picture(page: Page, name: str) -> None:
+    """Keep a picture to look at where ``DASHBOARD_LOOK`` names a folder."""
+    if folder := os.environ.get("DASHBOARD_LOOK"):
+        page.screenshot(path=Path(folder) / f"{name}.png")
+
+
+def violations(page: Page) -> list[str]:
+    """What axe finds wrong with the page as it is."""
+    if not AXE.is_file():
+        pytest.skip("axe-core is missing: npm ci in app/dashboard/web")
+    page.evaluate(AXE.read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+    return [f"{one['id']}: {[node['target'] for node in one['nodes']]}" for one in found["violations"]]

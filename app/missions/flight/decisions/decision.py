@@ -102,6 +102,8 @@ class Leg:
     refusal: str = ""
     surfacing: bool = False
     """Whether it comes up, or stays up, for a fix."""
+    comes_in: bool = False
+    """Whether it leads into the area from far outside: that takes nothing of the way that is to be flown there."""
 
 
 @dataclass(frozen=True)
@@ -319,18 +321,18 @@ def _planned_for(
     notes: list[str] = []
     team: list[Place] = []
     legs: list[Leg] = []
-    nearby_m = NEARBY_OUTSIDE_M + spec.limits.border_margin_m
     for place in places:
         outside_m = free_space.distance_outside_m(polygon, place.en_m)
-        if outside_m > nearby_m and not place.moving:
+        far = from_outside(place.en_m, polygon, spec)
+        if far and not place.moving:
             continue
-        if outside_m > nearby_m and site_unknown:
+        if far and site_unknown:
             refusal = (
                 f"it is {outside_m:.0f} m outside the site, and what lies between is not known: bring it to the entry"
             )
             notes.append(f"{place.vehicle}: {refusal}")
             legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
-        elif outside_m > nearby_m:
+        elif far:
             others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
             leg = _come_in(place, constraints, others)
             what = leg.refusal or "it is sent to the border"
@@ -342,6 +344,11 @@ def _planned_for(
         else:
             team.append(place)
     return team, legs, notes
+
+
+def from_outside(place_m: FloatArray, area: Polygon, spec: MissionSpec) -> bool:
+    """Return whether a vehicle is so far outside the area, without its margin, that it is sent to its border first."""
+    return free_space.distance_outside_m(area, place_m) > NEARBY_OUTSIDE_M + spec.limits.border_margin_m
 
 
 @dataclass(frozen=True)
@@ -456,7 +463,7 @@ def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) ->
     if goal is None:
         return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every straight way in")
     # The bottom on the way is unknown: it comes at the surface.
-    return Leg(place.vehicle, np.append(goal, 0.0))
+    return Leg(place.vehicle, np.append(goal, 0.0), comes_in=True)
 
 
 def _within_step(origin: FloatArray, target: FloatArray, max_step_m: float) -> FloatArray:

@@ -117,7 +117,8 @@ class LegCommit:
                 now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
             if member is None or member is not now_of_name or member.left_at is not None:
                 continue
-            member.committed_m += way_m([starts_m[row.vehicle], leg.target_m[:2]], live.spec)
+            if not leg.comes_in:
+                member.committed_m += way_m([starts_m[row.vehicle], leg.target_m[:2]], live.spec)
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
             elif member.withdrawal is None:  # it may have been called home meanwhile

@@ -15,7 +15,7 @@ from bathyfleet.client.model import Model, Open
 Action: TypeAlias = Annotated[Literal["start", "pause", "resume", "abort", "finish"], Open]
 """What operators and consoles may ask of a mission."""
 
-AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "test"], Open]
+AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "not_begun", "test"], Open]
 """What is raised as an alarm. Those of failsafes have the failsafes' names."""
 
 AlarmSeverity: TypeAlias = Annotated[Literal["minor", "major", "critical"], Open]
@@ -1039,6 +1039,11 @@ class MissionSpec(Model):
     """The site that it surveys, which keeps what it finds; null: none"""
     site_prior: bool = True
     """With a site: begin with the depths that its earlier surveys found"""
+    after: str | None = None
+    """The mission that it follows, for example with the next area: it begins by itself once that one was flown to
+    its end and its vehicles are fit to go on; not when that one was ended by a person, aborted or failed. null:
+    it begins when it is started
+    """
     seed: int = 0
     """Seed of every random decision"""
 
@@ -1055,6 +1060,8 @@ class MissionSummary(Model):
     updated_at: datetime
     ending: MissionState | None
     """What it becomes once all its vehicles are home; null while it goes on"""
+    after: str | None
+    """The mission that it follows; null: it follows none"""
     progress: Progress
     allowed_actions: list[Action]
     """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
@@ -1072,6 +1079,8 @@ class MissionView(Model):
     updated_at: datetime
     ending: MissionState | None
     """What it becomes once all its vehicles are home; null while it goes on"""
+    after: str | None
+    """The mission that it follows; null: it follows none"""
     progress: Progress
     spec: MissionSpec
     """A mission as an operator describes it."""

@@ -2096,7 +2096,7 @@ export interface components {
          * @description What is raised as an alarm. Those of failsafes have the failsafes' names.
          * @enum {string}
          */
-        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "test";
+        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "not_begun" | "test";
         /**
          * AlarmMessage
          * @description An alarm was raised or acknowledged; by its id the page knows whether it has it already.
@@ -3928,6 +3928,11 @@ export interface components {
              */
             site_prior: boolean;
             /**
+             * After
+             * @description The mission that it follows, for example with the next area: it begins by itself once that one was flown to its end and its vehicles are fit to go on; not when that one was ended by a person, aborted or failed. null: it begins when it is started
+             */
+            after?: string | null;
+            /**
              * Seed
              * @description Seed of every random decision
              * @default 0
@@ -3968,6 +3973,11 @@ export interface components {
             updated_at: string;
             /** @description What it becomes once all its vehicles are home; null while it goes on */
             ending: components["schemas"]["MissionState"] | null;
+            /**
+             * After
+             * @description The mission that it follows; null: it follows none
+             */
+            after: string | null;
             progress: components["schemas"]["Progress"];
             /**
              * Allowed Actions
@@ -4003,6 +4013,11 @@ export interface components {
             updated_at: string;
             /** @description What it becomes once all its vehicles are home; null while it goes on */
             ending: components["schemas"]["MissionState"] | null;
+            /**
+             * After
+             * @description The mission that it follows; null: it follows none
+             */
+            after: string | null;
             progress: components["schemas"]["Progress"];
             /**
              * MissionSpec
@@ -4126,6 +4141,11 @@ export interface components {
                  * @default true
                  */
                 site_prior: boolean;
+                /**
+                 * After
+                 * @description The mission that it follows, for example with the next area: it begins by itself once that one was flown to its end and its vehicles are fit to go on; not when that one was ended by a person, aborted or failed. null: it begins when it is started
+                 */
+                after?: string | null;
                 /**
                  * Seed
                  * @description Seed of every random decision

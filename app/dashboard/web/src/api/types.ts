@@ -79,6 +79,7 @@ export type FieldProblem = Complete<Schemas["FieldProblem"]>;
 
 /** What a request says of a vehicle; whatever is left out takes the service's default. */
 export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor"> & {
+  start?: LngLat | null;
   depth_m?: number;
   speed_mps?: number;
   altitude_m?: number;
@@ -94,6 +95,7 @@ export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_ou
   kind?: Schemas["MissionKind"];
   site?: string | null;
   site_prior?: boolean;
+  after?: string | null;
   vehicles: VehicleSpec[];
   budget?: Schemas["Budget"];
   speed_mps?: number;

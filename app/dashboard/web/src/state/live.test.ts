@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { AlarmView, EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
-import { ageSeconds, EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
+import { ageSeconds, EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
 
 const vehicle = (
   name: string,
@@ -228,5 +228,27 @@ describe("alarms", () => {
     expect(view.alarms).toEqual([sooner]);
     expect(view.taken?.acknowledged_by).toBe("Ana");
     expect(reduce(view, snapshot("other"), 4).taken).toBeNull();
+  });
+});
+
+describe("who follows a mission", () => {
+  const finished = (by: string) => ({
+    mission: { ...mission("m"), state: "finished" as const },
+    events: [{ kind: "state", data: { state: "finished", actor: by } }] as never,
+  });
+  const list = [
+    { id: "other", after: null, state: "running" as const },
+    { id: "next", after: "m", state: "ready" as const },
+  ];
+
+  it("is the one that begins, or waits for a person, once that one was flown to its end", () => {
+    expect(nextOf(finished("service"), list)).toBe("next");
+    expect(nextOf(finished("service"), [{ id: "next", after: "m", state: "running" }])).toBe("next");
+    expect(nextOf(finished("service"), [{ id: "next", after: "m", state: "aborted" }])).toBeNull();
+    expect(nextOf({ ...finished("service"), mission: mission("m") }, list)).toBeNull();
+  });
+
+  it("is nobody after what a person finished: what vehicles answered is still to be read", () => {
+    expect(nextOf(finished("Ana"), list)).toBeNull();
   });
 });

@@ -4,6 +4,7 @@ import type {
   AlarmView,
   EventView,
   LiveMessage,
+  MissionSummary,
   MissionView,
   OwnShipView,
   Place,
@@ -213,4 +214,17 @@ function sampled(
 /** Seconds since a vehicle was last heard, counted on since the service said so; null: never. */
 export function ageSeconds(vehicle: VehicleView, vehiclesAt: number, now: number): number | null {
   return vehicle.age_s === null ? null : vehicle.age_s + Math.max(0, now - vehiclesAt) / 1000;
+}
+
+/** What follows the shown mission and has begun, or is about to: where that one was flown to its end, not ended by a person. */
+export function nextOf(
+  { mission, events }: Pick<LiveView, "mission" | "events">,
+  list: readonly Pick<MissionSummary, "id" | "after" | "state">[],
+): string | null {
+  const ended = events.findLast(({ kind, data }) => kind === "state" && data.state === "finished");
+  if (mission?.state !== "finished" || ended?.data.actor !== "service") return null;
+  const next = list.find(
+    ({ after, state }) => after === mission.id && (state === "ready" || state === "running"),
+  );
+  return next?.id ?? null;
 }

@@ -3,12 +3,12 @@
 import { effect, type Signal, signal, untracked } from "@preact/signals";
 import { api, liveUrl, ServiceError } from "../api/client";
 import { LiveSocket } from "../api/socket";
-import type { ActionView, MissionAction, NewMission } from "../api/types";
+import type { ActionView, MissionAction, MissionView, NewMission } from "../api/types";
 import { siteOf } from "../map/marks/site";
 import { withTiles } from "../map/picture/seafloor";
 import { type Key, say } from "../words/say";
 import { identify, me, signedOut, whyNotCommand } from "./access";
-import { EMPTY_VIEW, reduce, withEvents, withMission } from "./live";
+import { EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
 import {
   abortDialogOpen,
   abortOne,
@@ -55,6 +55,14 @@ export function startSession(): void {
     now.value = Date.now();
   }, 500);
   void refreshForever();
+  let watched = "";
+  effect(() => {
+    const shown = mission.value;
+    if (shown?.state === "running") watched = shown.ending ? "" : shown.id;
+    const next = nextOf(view.value, missions.value ?? []);
+    // Whoever watches goes on with the vehicles: what stops them is there.
+    if (next && shown?.id === watched) untracked(() => selectMission(next));
+  });
   effect(() => {
     const id = selectedId.value;
     return id && me.value && !signedOut.value ? followMission(id) : clear();
@@ -391,12 +399,25 @@ export async function send<T>(what: string, answer: Promise<T>, inDialog = false
   }
 }
 
-export async function createMission(mission: NewMission): Promise<string> {
-  const created = await api.create(mission);
+/** Creates missions that follow each other, all or none, and shows the first; returns their ids. */
+export async function createMissions(described: readonly NewMission[]): Promise<string[]> {
+  const ids: string[] = [];
+  try {
+    for (const mission of described) {
+      const created: MissionView = await api.create({ ...mission, after: ids.at(-1) ?? null });
+      ids.push(created.id);
+    }
+  } catch (error) {
+    await Promise.allSettled(ids.map(api.deleteMission));
+    throw error;
+  }
   await refresh();
-  selectMission(created.id);
-  return created.id;
+  selectMission(ids[0] as string);
+  return ids;
 }
+
+export const createMission = async (mission: NewMission): Promise<string> =>
+  (await createMissions([mission]))[0] as string;
 
 /** Replaces what a mission is to do that has not started; it stays where it is in the list. */
 export async function describeMission(id: string, mission: NewMission): Promise<void> {

@@ -24,7 +24,7 @@ import type { PlaceMark } from "../map/marks/marks";
 import type { Site } from "../map/marks/site";
 import { certaintyFor } from "../map/picture/certainty";
 import { NORTH_WEST_DEG } from "../map/picture/hillshade";
-import { fittingRange, type Range } from "../map/picture/layers";
+import { fittingRange, type Range } from "../map/picture/layerColours";
 import { type DepthPalette, vehicleColour } from "../map/picture/palette";
 import type { SeaFloor } from "../map/picture/seafloor";
 import type { CoordinateFormat } from "./format";
@@ -208,13 +208,14 @@ export const measured = signal<readonly LngLat[] | null>(null);
 
 /** A mission being described: its area and zones on the map, and what is being drawn. */
 export interface DraftShapes {
-  area: PolygonGeometry | null;
+  /** One, or several blocks. */
+  areas: readonly PolygonGeometry[];
   keepOut: readonly PolygonGeometry[];
   /** Places of a search, and where vehicles come home to. */
   marks: readonly PlaceMark[];
 }
-/** What the mission that is being described would begin with; `old` while something else is described by now. */
-export const planned = signal<{ plan: PlanView; old: boolean } | null>(null);
+/** What the mission that is being described would begin with, block by block; `old` while something else is described by now. */
+export const planned = signal<{ plans: readonly PlanView[]; old: boolean } | null>(null);
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);

@@ -15,7 +15,7 @@ import {
   selectedId,
   serviceFault,
 } from "../state/store";
-import { capital, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
+import { capital, hasEnded, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { say, sayWith } from "../words/say";
 import { panelWidth } from "./chart/room";
 import { NewMissionForm } from "./form/NewMissionForm";
@@ -75,6 +75,7 @@ function MissionList() {
                 {capital(lengthWords(m.progress))} · {measuredWords(m.progress)}
               </small>
               <small>{dayAndTime(new Date(m.created_at))}</small>
+              <Follows of={m} />
             </a>
             {m.id === selectedId.value ? <Actions of={m} /> : null}
           </li>
@@ -82,6 +83,13 @@ function MissionList() {
       </ul>
     </>
   );
+}
+
+/** The mission that another one waits for. */
+function Follows({ of: { after, state } }: { of: MissionSummary }) {
+  const before = missions.value?.find(({ id }) => id === after);
+  if (!before || state !== "ready" || hasEnded(before)) return null;
+  return <small data-testid="follows">{say("blocks.after", { name: before.name })}</small>;
 }
 
 /** What can be done with the mission that is shown: begin another one like it, or delete it while it holds nothing. */

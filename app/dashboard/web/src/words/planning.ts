@@ -1,6 +1,26 @@
 /** Describing a mission. */
 
 export const PLANNING = {
+  "blocks.blocks": { en: "Blocks", pt: "Blocos" },
+  "blocks.block": { en: "Block {i}", pt: "Bloco {i}" },
+  "blocks.another": { en: "+ Another block", pt: "+ Outro bloco" },
+  "blocks.flownInThisOrder": {
+    en: "One mission for each, flown in this order by the same vehicles: each begins by itself when the one before was flown to its end. The fields above describe the one that is marked.",
+    pt: "Uma missão por bloco, por esta ordem e com os mesmos veículos: cada uma começa sozinha quando a anterior foi percorrida até ao fim. Os campos acima descrevem o bloco marcado.",
+  },
+  "blocks.describe": { en: "{i}: describe {name}", pt: "{i}: descrever {name}" },
+  "blocks.nameOf": { en: "Name of block {i}", pt: "Nome do bloco {i}" },
+  "blocks.ha": { en: "{area} ha", pt: "{area} ha" },
+  "blocks.notDrawn": { en: "no area yet", pt: "ainda sem área" },
+  "blocks.earlier": { en: "Fly {name} earlier", pt: "Percorrer {name} mais cedo" },
+  "blocks.remove": { en: "Remove {name}", pt: "Remover {name}" },
+  "blocks.takeThemAll": { en: "All {all} as blocks", pt: "As {all} como blocos" },
+  "blocks.inAll": { en: "In all", pt: "No total" },
+  "blocks.after": { en: "Begins by itself after {name}", pt: "Começa sozinha depois de {name}" },
+  "blocks.doesNotFollow": {
+    en: "{name}, which follows, does not begin by itself then: start it when its vehicles are fit.",
+    pt: "{name}, que se segue, não começa então sozinha: inicie-a quando os veículos estiverem prontos.",
+  },
   "area.area": { en: "Area", pt: "Área" },
   "area.drawCorners": { en: "Draw corners", pt: "Desenhar cantos" },
   "area.drawRectangle": { en: "Draw rectangle", pt: "Desenhar retângulo" },

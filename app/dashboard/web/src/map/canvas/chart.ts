@@ -16,6 +16,7 @@ import type { SwathLine } from "../marks/swath";
 import type { TargetMark } from "../marks/targets";
 import type { PictureResult } from "../picture/picture.worker";
 import { coasts, showsCoast } from "./coast";
+import { imageOf, paintStill, type StillContent } from "./fixedMarks";
 import { type Box, type Label, placed, type Side } from "./labels";
 import {
   type LivelyContent,
@@ -26,11 +27,10 @@ import {
   type Sketch,
   WORDS_FONT,
   WORDS_HEIGHT_PX,
-} from "./lively";
+} from "./movingMarks";
 import { type Look, PAPER } from "./paper";
 import { moved, type Projection } from "./projection";
 import { Sheets } from "./sheets";
-import { imageOf, paintStill, type StillContent } from "./still";
 import type { Pixel } from "./strokes";
 
 setWorkerUrl(workerUrl);
@@ -241,10 +241,10 @@ export class Chart {
     this.#lay({ area, keepOut });
   }
 
-  /** A mission that is being described; its area is what is to be seen meanwhile. */
-  setDraft(area: PolygonGeometry | null, keepOut: readonly PolygonGeometry[]): void {
-    this.#draftBounds = boundsOf(area?.coordinates[0] ?? []);
-    this.#show({ draft: { area, keepOut } });
+  /** A mission that is being described; its areas are what is to be seen meanwhile. */
+  setDraft(areas: readonly PolygonGeometry[], keepOut: readonly PolygonGeometry[]): void {
+    this.#draftBounds = boundsOf(areas.flatMap(({ coordinates }) => coordinates[0] ?? []));
+    this.#show({ draft: { areas, keepOut } });
   }
 
   /** What that mission would begin with. */

@@ -31,7 +31,7 @@ export interface Circle {
 /** A place with a name; with a radius, what is about it. */
 export interface PlaceMark {
   words: string;
-  sign: "goal" | "entry" | "transmitter" | "home" | "position" | "own";
+  sign: "goal" | "entry" | "transmitter" | "home" | "position" | "own" | "block";
   at: LngLat;
   radius_m: number;
   /** Which way it points, degrees from north. */

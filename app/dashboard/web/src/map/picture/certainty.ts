@@ -1,6 +1,6 @@
 /** How strongly the map shows what it does not know for sure. Pure. */
 
-import type { Range } from "./layers";
+import type { Range } from "./layerColours";
 import { PRIOR, SOUNDED } from "./seafloor";
 
 /** Deviations of a guess: up to `full_m` it is drawn like a measurement, from `none_m` on nothing is drawn. */

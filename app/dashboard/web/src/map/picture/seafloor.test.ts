@@ -3,7 +3,7 @@ import type { LayerView, LngLat } from "../../api/types";
 import { contours } from "./contours";
 import { drawnShares } from "./drawings";
 import { LANDMARKS } from "./landmarks";
-import { fittingRange, shareOutside } from "./layers";
+import { fittingRange, shareOutside } from "./layerColours";
 import { roundRange } from "./palette";
 import { differenceOf, placeIn, readCell, type SeaFloor, UNKNOWN, valueAt, withTiles } from "./seafloor";
 

@@ -23,9 +23,10 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { LngLat, Place } from "../../api/types";
 import { type Certainty, isMeasured } from "../picture/certainty";
-import type { Range } from "../picture/layers";
+import type { Range } from "../picture/layerColours";
 import { colourAt, type Palette } from "../picture/palette";
 import { cellOf, gridPlace, type SeaFloor, valueAt } from "../picture/seafloor";
+import { Pace, shuffled } from "./pace";
 
 export interface SceneVehicle {
   name: string;
@@ -45,6 +46,13 @@ export interface ScenePoints {
 }
 
 const POINT_PX = 4;
+/** So long after its last turn the view is still; a pointer that holds it may only have stopped. */
+const STILL_MS = 300;
+const HELD_STILL_MS = 1500;
+/** What changes all the time is made anew at most so often, and not while the view is turned. */
+const ANEW_MS = 1000;
+/** While it is turned on a slow machine there are at least this many pixels for one on the screen. */
+const COARSEST = 0.5;
 
 function isDrawn(map: SeaFloor, row: number, col: number, { none_m }: Certainty): boolean {
   return (
@@ -66,10 +74,18 @@ export class SeaFloorScene {
   #placed = false;
   #floorShown = true;
   #frame = 0;
+  readonly #pace = new Pace();
+  #turning = false;
+  #held = false;
+  #stillness: ReturnType<typeof setTimeout> | undefined;
+  /** Newer than what is shown. */
+  #newFloor: (() => void) | null = null;
+  #newFleet: (() => void) | null = null;
+  #madeAt_ms = -ANEW_MS;
+  #making: ReturnType<typeof setTimeout> | undefined;
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true });
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.#world.add(this.#fleet);
     this.#scene.add(this.#world, new AmbientLight(0xffffff, 1.5));
     const sun = new DirectionalLight(0xffffff, 2.2);
@@ -77,12 +93,16 @@ export class SeaFloorScene {
     this.#scene.add(sun);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.maxPolarAngle = Math.PI * 0.49;
-    this.#controls.addEventListener("change", this.#draw);
+    this.#controls.addEventListener("start", this.#hold);
+    this.#controls.addEventListener("end", this.#release);
+    this.#controls.addEventListener("change", this.#turned);
     this.#controls.listenToKeyEvents(canvas);
   }
 
   close(): void {
     cancelAnimationFrame(this.#frame);
+    clearTimeout(this.#stillness);
+    clearTimeout(this.#making);
     this.#controls.dispose();
     this.#forget(this.#mesh);
     this.#clearFleet();
@@ -109,19 +129,44 @@ export class SeaFloorScene {
   }
 
   /** Where the map knows too little to be drawn from above there is nothing here either. */
-  setSeaFloor(map: SeaFloor, palette: Palette, { low, high }: Range, certainty: Certainty): void {
+  setSeaFloor(map: SeaFloor, palette: Palette, range: Range, certainty: Certainty): void {
     this.#map = map;
+    this.#newFloor = () => this.#makeFloor(map, palette, range, certainty);
+    if (!this.#placed) this.lookFromSouth();
+    this.#makeAnew();
+  }
+
+  /** Makes what is newer than what is shown, at once or when there is time for it. */
+  #makeAnew = (): void => {
+    clearTimeout(this.#making);
+    if (this.#turning) return;
+    const wait_ms = this.#madeAt_ms + ANEW_MS - performance.now();
+    if (wait_ms > 0) {
+      this.#making = setTimeout(this.#makeAnew, wait_ms);
+      return;
+    }
+    const floor = this.#floorShown ? this.#newFloor : null;
+    if (!floor && !this.#newFleet) return;
+    if (floor) this.#newFloor = null;
+    floor?.();
+    this.#newFleet?.();
+    this.#newFleet = null;
+    this.#madeAt_ms = performance.now();
+    this.#draw();
+  };
+
+  #makeFloor(map: SeaFloor, palette: Palette, { low, high }: Range, certainty: Certainty): void {
     const { rows, cols, cell_m } = map;
     const places = new Float32Array(rows * cols * 3);
     const colours = new Float32Array(rows * cols * 3);
     const known = new Uint8Array(rows * cols);
+    const shade = new Color();
     for (let row = 0; row < rows; row++) {
       for (let col = 0; col < cols; col++) {
         const at = row * cols + col;
         const depth = valueAt(map, "depth", row, col);
         known[at] = depth !== null && isDrawn(map, row, col, certainty) ? 1 : 0;
         places.set([(col + 0.5 - cols / 2) * cell_m, -(depth ?? 0), (rows / 2 - row - 0.5) * cell_m], at * 3);
-        const shade = new Color();
         const [r, g, b] = colourAt(palette, depth ?? 0, low, high);
         shade.setRGB(r / 255, g / 255, b / 255, "srgb");
         colours.set([shade.r, shade.g, shade.b], at * 3);
@@ -148,8 +193,6 @@ export class SeaFloorScene {
     this.#mesh = new Mesh(geometry, new MeshLambertMaterial({ vertexColors: true, side: DoubleSide }));
     this.#mesh.visible = this.#floorShown;
     this.#world.add(this.#mesh);
-    if (!this.#placed) this.lookFromSouth();
-    this.#draw();
   }
 
   /** The view it begins with: from the south, half from above. */
@@ -169,6 +212,11 @@ export class SeaFloorScene {
   }
 
   setVehicles(vehicles: readonly SceneVehicle[]): void {
+    this.#newFleet = () => this.#makeFleet(vehicles);
+    this.#makeAnew();
+  }
+
+  #makeFleet(vehicles: readonly SceneVehicle[]): void {
     const map = this.#map;
     this.#clearFleet();
     if (!map) return;
@@ -196,7 +244,6 @@ export class SeaFloorScene {
         new Line(up, new LineBasicMaterial({ color: vehicle.colour, transparent: true, opacity: 0.5 })),
       );
     }
-    this.#draw();
   }
 
   /** Soundings as points, each with its colour (red, green, blue; 0 to 1); null: none. */
@@ -213,6 +260,8 @@ export class SeaFloorScene {
       const geometry = new BufferGeometry();
       geometry.setAttribute("position", new BufferAttribute(places, 3));
       geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * points.lng.length), 3));
+      // Whatever share of them is drawn lies all over.
+      geometry.setIndex(new BufferAttribute(shuffled(points.lng.length), 1));
       this.#points = new Points(
         geometry,
         new PointsMaterial({ size: POINT_PX, sizeAttenuation: false, vertexColors: true }),
@@ -254,6 +303,7 @@ export class SeaFloorScene {
   setFloorShown(shown: boolean): void {
     this.#floorShown = shown;
     if (this.#mesh) this.#mesh.visible = shown;
+    this.#makeAnew();
     this.#draw();
   }
 
@@ -289,9 +339,56 @@ export class SeaFloorScene {
     mesh.material.dispose();
   }
 
+  #hold = (): void => {
+    this.#held = true;
+  };
+
+  #release = (): void => {
+    this.#held = false;
+    if (this.#turning) this.#awaitStillness();
+  };
+
+  /** Turned, or moved, or looked at from nearer. */
+  #turned = (): void => {
+    if (!this.#turning) this.#pace.begin();
+    this.#turning = true;
+    this.#draw();
+  };
+
+  /** Counted from the last picture: on a slow machine the next turn is only seen after it. */
+  #awaitStillness(): void {
+    clearTimeout(this.#stillness);
+    this.#stillness = setTimeout(this.#still, this.#held ? HELD_STILL_MS : STILL_MS);
+  }
+
+  #still = (): void => {
+    this.#turning = false;
+    this.#makeAnew();
+    this.#draw();
+  };
+
   /** Drawn only when something changed. */
   #draw = (): void => {
     cancelAnimationFrame(this.#frame);
-    this.#frame = requestAnimationFrame(() => this.#renderer.render(this.#scene, this.#camera));
+    this.#frame = requestAnimationFrame(this.#render);
   };
+
+  #render = (at_ms: number): void => {
+    const detail = this.#turning ? this.#pace.detail : 1;
+    const ratio = Math.min(devicePixelRatio, 2) * Math.max(COARSEST, Math.sqrt(detail));
+    if (ratio !== this.#renderer.getPixelRatio()) this.#renderer.setPixelRatio(ratio);
+    if (this.#points) {
+      const { geometry } = this.#points;
+      const all = geometry.getAttribute("position").count;
+      geometry.setDrawRange(0, Math.ceil(detail * all));
+      this.canvas.dataset.points = String(geometry.drawRange.count);
+    }
+    this.#renderer.render(this.#scene, this.#camera);
+    if (this.#turning) requestAnimationFrame((next_ms) => this.#shown(next_ms - at_ms));
+  };
+
+  #shown(took_ms: number): void {
+    this.#pace.drawn(took_ms);
+    if (this.#turning) this.#awaitStillness();
+  }
 }

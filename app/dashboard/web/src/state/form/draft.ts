@@ -35,6 +35,13 @@ export type AreaSource = "typed" | "drawn";
 /** What one vehicle has of its own, as typed; `recovery_point` as "latitude, longitude". */
 export type Own = Partial<Record<VehicleField | "recovery_point", string>> & { sensor?: Sensor };
 
+/** An area of several that are flown one after the other. */
+export interface Block {
+  /** Empty: it is called by its place in the order. */
+  name: string;
+  ring: readonly LngLat[];
+}
+
 /** As typed. */
 export interface Draft extends Texts {
   name: string;
@@ -53,6 +60,10 @@ export interface Draft extends Texts {
   source: AreaSource;
   ring: readonly LngLat[];
   keepOut: readonly (readonly LngLat[])[];
+  /** The other areas, in their order; `turn` is the place among all of the one that the form's fields describe. */
+  blocks: readonly Block[];
+  turn: number;
+  block_name: string;
   latitude: string;
   longitude: string;
   east_m: string;
@@ -123,6 +134,9 @@ export function emptyDraft(middle: LngLat): Draft {
     source: "typed",
     ring: [],
     keepOut: [],
+    blocks: [],
+    turn: 0,
+    block_name: "",
     latitude: "",
     longitude: "",
     tide_source: "",
@@ -140,7 +154,7 @@ export function emptyDraft(middle: LngLat): Draft {
 /** A draft of a mission like one that there is, its vehicles as they are described there. */
 export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
   const ring = ringOf(spec.area as NewMission["area"]);
-  const { tide, steps: _, ...base } = spec;
+  const { tide, steps: _, after: _after, ...base } = spec;
   const { search } = base;
   const places = search && {
     goal: typedPlace(search.goal as LngLat),
@@ -290,10 +304,12 @@ export function faultsOf(described: Draft): Faults {
     faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
   }
   note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
+  const cell_m = faults.cell_m ? 0 : Number(draft.cell_m);
   if (draft.source === "drawn") {
-    const fault = areaFault(draft.ring, faults.cell_m ? 0 : Number(draft.cell_m));
+    const fault = areaFault(draft.ring, cell_m);
     if (fault) faults.ring = draft.ring.length === 0 ? say("draft.drawTheAreaOrReadIt") : fault;
   }
+  for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
   draft.keepOut.forEach((zone, i) => {
     const fault = areaFault(zone, 0);
     if (fault) faults.keepOut = say("draft.keepOutZone", { i: i + 1, fault: fault.toLowerCase() });
@@ -366,7 +382,13 @@ export function cornersOf(draft: Draft): LngLat[] {
   return area ? ringOf(area) : [];
 }
 
-/** What to send for a draft without faults. */
+/** All areas in their order. */
+export function allBlocks(draft: Draft): Block[] {
+  const mine = { name: draft.block_name, ring: cornersOf(draft) };
+  return [...draft.blocks.slice(0, draft.turn), mine, ...draft.blocks.slice(draft.turn)];
+}
+
+/** What to send for a draft without faults; of several blocks for the one that its fields describe. */
 export function toMission(described: Draft): NewMission {
   const draft = resolved(described);
   const area = areaOf(draft);

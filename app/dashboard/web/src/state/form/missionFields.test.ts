@@ -131,9 +131,9 @@ it.each([
   // Corners, digits.
   ["ui/form/NewMissionForm.tsx", ["1", "2"]],
   // Corners, digits, hundredths.
-  ["ui/form/AskedFields.tsx", ["1", "2", "100"]],
+  ["ui/form/SurveyFields.tsx", ["1", "2", "100"]],
   ["ui/form/ExpertFields.tsx", []],
-  ["ui/form/Beginnings.tsx", []],
+  ["ui/form/MissionTemplates.tsx", []],
   // The first of a list.
   ["ui/form/VehicleFields.tsx", ["1"]],
   ["ui/form/SearchFields.tsx", ["1"]],

@@ -1,9 +1,10 @@
 /** A mission's description as one file, and as a template for others. Pure. */
 
 import SPEC from "../../api/mission.json";
-import type { MissionView, NewMission } from "../../api/types";
+import type { MissionView, NewMission, PolygonGeometry } from "../../api/types";
+import { polygonOf, ringOf } from "../../map/area";
 import { say } from "../../words/say";
-import { copyOf, type Draft } from "./draft";
+import { type Block, copyOf, type Draft } from "./draft";
 
 const FORMAT = "bathyfleet mission";
 
@@ -12,12 +13,25 @@ interface MissionFile {
   format: typeof FORMAT;
   mission: NewMission;
   tide_table?: string;
+  /** Where there are several areas: all of them in their order. */
+  blocks?: readonly { name: string; area: PolygonGeometry }[];
 }
 
-export function missionFile(described: NewMission & { steps?: unknown }, tide_table = ""): string {
-  // As shown by the service it has its steps, which follow from its budget; sites are known to this service alone.
-  const { steps: _, site: _site, ...mission } = described;
-  const file: MissionFile = { format: FORMAT, mission, ...(tide_table ? { tide_table } : {}) };
+export function missionFile(
+  described: NewMission & { steps?: unknown },
+  tide_table = "",
+  blocks: readonly Block[] = [],
+): string {
+  // As shown by the service it has its steps, which follow from its budget; sites and missions are known to it alone.
+  const { steps: _, site: _site, after: _after, ...mission } = described;
+  const file: MissionFile = {
+    format: FORMAT,
+    mission,
+    ...(tide_table ? { tide_table } : {}),
+    ...(blocks.length > 1
+      ? { blocks: blocks.map(({ name, ring }) => ({ name, area: polygonOf(ring) })) }
+      : {}),
+  };
   return `${JSON.stringify(file, null, 2)}\n`;
 }
 
@@ -39,8 +53,12 @@ export function draftIn(fileName: string, text: string): Draft {
   if (!mission?.name || !Array.isArray(ring) || ring.length < 4) {
     throw new Error(say("missionFile.holdsNoMissionItNeedsA", { fileName }));
   }
-  const draft = draftOf(mission);
-  return content.tide_table ? { ...draft, tide_table: content.tide_table } : draft;
+  const [first, ...blocks] = (content.blocks ?? []).map(({ name, area }) => ({ name, ring: ringOf(area) }));
+  return {
+    ...draftOf(mission),
+    ...(content.tide_table ? { tide_table: content.tide_table } : {}),
+    ...(first ? { ring: first.ring, block_name: first.name, blocks } : {}),
+  };
 }
 
 /** The draft that a description gives, whose defaults are not said. */
@@ -65,6 +83,7 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
 export function withTemplate(template: NewMission, draft: Draft): Draft {
   const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
     draft;
+  const { blocks, turn, block_name } = draft;
   const { own, ...settings } = draftOf(template);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
   return {
@@ -72,6 +91,7 @@ export function withTemplate(template: NewMission, draft: Draft): Draft {
     own: Object.fromEntries(placeless),
     obstacles: [],
     ...{ name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery },
+    ...{ blocks, turn, block_name },
   };
 }
 

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { type Answer, LatestAsker } from "./planning";
+import { type Answer, LatestAsker, plansOf } from "./planning";
 
 interface Asked {
   of: string;
@@ -68,5 +68,23 @@ describe("a plan", () => {
     asked[1]?.answer("late");
     await vi.advanceTimersByTimeAsync(0);
     expect(shown).toEqual([]);
+  });
+});
+
+describe("plans of several missions", () => {
+  it("are asked for in their order, each with the one before, and only of what changed", async () => {
+    const asked: string[] = [];
+    const plans = plansOf(
+      async (mission: string) => {
+        asked.push(mission);
+        return mission.toUpperCase();
+      },
+      (before: string | undefined, mission) => `${before ?? ""}${mission}`,
+    );
+    const { signal } = new AbortController();
+    expect(await plans('["a","b"]', signal)).toEqual(["A", "AB"]);
+    expect(await plans('["a","c"]', signal)).toEqual(["A", "AC"]);
+    expect(await plans('["b"]', signal)).toEqual(["B"]);
+    expect(asked).toEqual(["a", "Ab", "Ac", "b"]);
   });
 });

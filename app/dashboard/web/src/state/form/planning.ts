@@ -7,6 +7,29 @@ const LONGEST_WAIT_MS = 450;
 /** What is asked for is let finish for so long although something newer is wanted: else a drag would show nothing. */
 const PATIENCE_MS = 700;
 
+/**
+ * Asks for the plans of several missions, one after the other, each as it follows from the plan before; what did not
+ * change since is not asked for again.
+ */
+export function plansOf<Mission, Plan>(
+  ask: (mission: Mission, gone: AbortSignal) => Promise<Plan>,
+  following: (before: Plan | undefined, mission: Mission) => Mission,
+): (of: string, gone: AbortSignal) => Promise<Plan[]> {
+  let known = new Map<string, Plan>();
+  return async (of, gone) => {
+    const found = new Map<string, Plan>();
+    for (const one of JSON.parse(of) as Mission[]) {
+      const mission = following([...found.values()].at(-1), one);
+      const key = JSON.stringify(mission);
+      const plan: Plan = known.get(key) ?? (await ask(mission, gone));
+      known.set(key, plan);
+      found.set(key, plan);
+    }
+    known = found;
+    return [...found.values()];
+  };
+}
+
 export type Answer<T> = { found: T; of: string } | { error: unknown; of: string };
 
 /** Asks for one thing at a time, always for what was wanted last; gives up what takes long and is out of date. */

@@ -12,7 +12,7 @@ import {
   rangeFault,
   shareOutside,
   symbolOf,
-} from "../../map/picture/layers";
+} from "../../map/picture/layerColours";
 import { colourAt, DEPTH_PALETTES, type Palette, type Rgb } from "../../map/picture/palette";
 import type { SeaFloor } from "../../map/picture/seafloor";
 import { fixed, pointed } from "../../state/format";

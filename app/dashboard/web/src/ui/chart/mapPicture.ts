@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 import type { Chart } from "../../map/canvas/chart";
 import { PAPER } from "../../map/canvas/paper";
 import { drawingOf, drawnBy } from "../../map/picture/drawings";
-import { paletteOf, symbolOf } from "../../map/picture/layers";
+import { paletteOf, symbolOf } from "../../map/picture/layerColours";
 import { colourAt, type Rgb } from "../../map/picture/palette";
 import { drawSheet, fitted, type SheetLegend, type SheetVehicle, sheetFor } from "../../map/print/mapSheet";
 import { pdfOf } from "../../map/print/pdf";
@@ -22,7 +22,7 @@ import {
 } from "../../state/store";
 import { missionWords } from "../../state/words";
 import { named, say } from "../../words/say";
-import { look } from "./follow";
+import { look } from "./mapUpdates";
 import { overlaid } from "./room";
 
 /** The map that is on the page, once it is. */

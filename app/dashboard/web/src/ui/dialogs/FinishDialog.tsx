@@ -3,7 +3,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import SPEC from "../../api/mission.json";
 import { act, actionWords } from "../../state/session";
-import { finishOpen, mission } from "../../state/store";
+import { finishOpen, mission, missions } from "../../state/store";
 import { canReturn, capital, lengthWords } from "../../state/words";
 import { say } from "../../words/say";
 import { sets } from "../parts/Controls";
@@ -14,6 +14,7 @@ export function FinishDialog() {
   const present = mission.value;
   const open = finishOpen.value;
   const home = present !== null && canReturn(present, present.vehicles);
+  const next = missions.value?.find(({ after, state }) => after === present?.id && state === "ready");
   const first = useSignal(true);
   useEffect(() => {
     const usual = mission.peek()?.spec.recovery?.on_finish ?? SPEC["recovery.on_finish"].default;
@@ -67,6 +68,9 @@ export function FinishDialog() {
               it2: home ? "" : say("finish.theVehiclesAreStoppedWhere"),
             })}
           </p>
+          {next ? (
+            <p data-testid="does-not-follow">{say("blocks.doesNotFollow", { name: next.name })}</p>
+          ) : null}
           {home ? (
             <fieldset class="how" aria-label={say("finish.whatTheVehiclesDo")}>
               {choice(

@@ -1,10 +1,11 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
-import type { NewMission, PlanView } from "../../api/types";
+import type { PlanView } from "../../api/types";
 import { vehicleColour } from "../../map/picture/palette";
+import { comingFrom } from "../../state/form/blocks";
 import type { Estimate, Share } from "../../state/form/draft";
-import { LatestAsker } from "../../state/form/planning";
+import { LatestAsker, plansOf } from "../../state/form/planning";
 import { distance, duration, percent } from "../../state/format";
 import { said } from "../../state/session";
 import { fleet, planned } from "../../state/store";
@@ -12,29 +13,28 @@ import { say } from "../../words/say";
 import { WholeSurvey } from "./WholeSurvey";
 
 const PERCENT = 100;
+/** By so much a way that is cut off may be longer than it says. */
+const ROUNDING_M = 0.5;
 const shareOf = (part: number, whole: number) => (part / whole) * PERCENT;
 
-/** Keeps the plan on the map in step with what is described, null while that is no mission; returns what is wrong. */
+/** Keeps the plan on the map in step with the blocks that are described, null while one is no mission; returns what is wrong. */
 export function usePlan(described: string | null): string {
   const fault = useSignal("");
-  const asker = useRef<LatestAsker<PlanView> | null>(null);
-  asker.current ??= new LatestAsker<PlanView>(
-    (of, gone) => api.plan(JSON.parse(of) as NewMission, gone),
-    (answer, current) => {
-      if ("found" in answer) {
-        planned.value = { plan: answer.found, old: !current };
-        fault.value = "";
-      } else if (current) {
-        planned.value = null;
-        fault.value = reasonOf(answer.error);
-      }
-    },
-  );
+  const asker = useRef<LatestAsker<PlanView[]> | null>(null);
+  asker.current ??= new LatestAsker<PlanView[]>(plansOf(api.plan, comingFrom), (answer, current) => {
+    if ("found" in answer) {
+      planned.value = { plans: answer.found, old: !current };
+      fault.value = "";
+    } else if (current) {
+      planned.value = null;
+      fault.value = reasonOf(answer.error);
+    }
+  });
   useEffect(() => {
     asker.current?.want(described);
     fault.value = "";
-    const { plan } = planned.peek() ?? {};
-    planned.value = plan && described !== null ? { plan, old: true } : null;
+    const { plans } = planned.peek() ?? {};
+    planned.value = plans && described !== null ? { plans, old: true } : null;
   }, [described]);
   useEffect(
     () => () => {
@@ -54,15 +54,63 @@ function reasonOf(error: unknown): string {
 
 type Vehicle = PlanView["vehicles"][number];
 
+interface PlannedProps {
+  of: Estimate;
+  /** Of the blocks, in their order. */
+  names: readonly string[];
+  /** Which of them is told of in detail. */
+  turn: number;
+  fault: string;
+}
+
+/** Each block with its time and length, in which the way over into it counts, and the sum. */
+function InBlocks({ plans, names }: { plans: readonly PlanView[]; names: readonly string[] }) {
+  const sum = (of: (plan: PlanView) => number) => plans.reduce((all, plan) => all + of(plan), 0);
+  const whole = {
+    low: sum((plan) => plan.duration_s_range.low),
+    high: sum((plan) => plan.duration_s_range.high),
+  };
+  return (
+    <table class="shares in-blocks" data-testid="in-blocks">
+      <thead>
+        <tr>
+          <th scope="col">{say("blocks.blocks")}</th>
+          <th scope="col">{say("asked.time")}</th>
+          <th scope="col">{say("asked.length")}</th>
+        </tr>
+      </thead>
+      <tbody>
+        {plans.map((plan, i) => (
+          <tr key={names[i]} data-testid={`in-block-${i + 1}`}>
+            <th scope="row">{names[i]}</th>
+            <td>{between(plan.duration_s_range)}</td>
+            <td>{distance(plan.distance_m)}</td>
+          </tr>
+        ))}
+      </tbody>
+      <tfoot>
+        <tr data-testid="in-blocks-all">
+          <th scope="row">{say("blocks.inAll")}</th>
+          <td>{between(whole)}</td>
+          <td>{distance(sum((plan) => plan.distance_m))}</td>
+        </tr>
+      </tfoot>
+    </table>
+  );
+}
+
 /** What each vehicle does by the plan, or at most while there is none, beside the energy that it has. */
-export function Planned({ of: { shares }, fault }: { of: Estimate; fault: string }) {
-  const { plan, old } = planned.value ?? { plan: null, old: false };
+export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
+  const { plans, old } = planned.value ?? { plans: [], old: false };
+  const plan = plans[turn] ?? null;
   const state = plan === null ? "none" : old ? "old" : "new";
   return (
     <div class="planned" data-testid="planned" data-plan={state}>
+      {names.length > 1 && plans.length === names.length ? <InBlocks plans={plans} names={names} /> : null}
       {plan ? (
         <p>
           <b data-testid="planned-whole">
+            {names.length > 1 ? `${names[turn]} · ` : ""}
             {say("planned.planned", {
               length: distance(plan.distance_m),
               time: between(plan.duration_s_range),
@@ -131,9 +179,9 @@ function Rows({ share, colour, plan }: { share: Share; colour: string; plan: Veh
       <tr>
         <td>{plan ? between(plan.duration_s_range) : duration(share.seconds)}</td>
         <td>
-          {plan
+          {plan && plan.distance_m < share.metres + ROUNDING_M
             ? say("planned.ofAtMost", { planned: distance(plan.distance_m), most: distance(share.metres) })
-            : distance(share.metres)}
+            : distance(plan?.distance_m ?? share.metres)}
         </td>
         <td>{homeOf(plan)}</td>
         <td>{words}</td>

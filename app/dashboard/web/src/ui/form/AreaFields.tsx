@@ -3,9 +3,18 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../../api/types";
 import { areasIn, sizeOf } from "../../map/area";
+import { withAreas } from "../../state/form/blocks";
 import { centred, cornersOf } from "../../state/form/draft";
 import { distance, fixed } from "../../state/format";
-import { type Drawing, drawing, drawingReady, editing, editingReady, mapCentre } from "../../state/store";
+import {
+  type Drawing,
+  drawing,
+  drawingReady,
+  editedMission,
+  editing,
+  editingReady,
+  mapCentre,
+} from "../../state/store";
 import { say } from "../../words/say";
 import { Button, FileButton } from "../parts/Controls";
 import { Fault, Text, useForm } from "./Fields";
@@ -109,6 +118,17 @@ export function AreaFields() {
               {say("area.takeTheOneOfHa", { areaM2: fixed(sizeOf(ring).area_m2 / 1e4, 2) })}
             </Button>
           ))}
+          {draft.kind === "survey" && !editedMission.peek() ? (
+            <Button
+              id="areas-as-blocks"
+              onClick={() => {
+                set(withAreas(draft, others.value));
+                others.value = [];
+              }}
+            >
+              {say("blocks.takeThemAll", { all: others.value.length + 1 })}
+            </Button>
+          ) : null}
         </div>
       ) : null}
       {draft.source === "typed" ? (

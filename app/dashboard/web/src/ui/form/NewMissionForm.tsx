@@ -2,11 +2,14 @@ import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
+import type { LngLat } from "../../api/types";
 import { polygonOf } from "../../map/area";
+import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
 import { recoveryMarks } from "../../map/marks/recovery";
+import { blockTitle, toMissions } from "../../state/form/blocks";
 import {
-  areaOf,
+  allBlocks,
   copyOf,
   type Draft,
   emptyDraft,
@@ -18,7 +21,7 @@ import {
   vehicleNames,
 } from "../../state/form/draft";
 import { placeOf } from "../../state/place";
-import { createMission, describeMission, said } from "../../state/session";
+import { createMissions, describeMission, said } from "../../state/session";
 import {
   copied,
   describing,
@@ -31,12 +34,13 @@ import {
 import { say } from "../../words/say";
 import { Button, FileButton, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
-import { AskedFields } from "./AskedFields";
-import { Beginnings, Keeping } from "./Beginnings";
+import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
 import { Form, type FormState, Part, PlaceField, Text, useForm } from "./Fields";
+import { Keeping, MissionTemplates } from "./MissionTemplates";
 import { SearchFields } from "./SearchFields";
 import { SiteFields } from "./SiteFields";
+import { SurveyFields } from "./SurveyFields";
 import { VehicleFields } from "./VehicleFields";
 
 export function NewMissionForm() {
@@ -55,7 +59,9 @@ export function NewMissionForm() {
 
   useSignalEffect(() => {
     draftShapes.value = {
-      area: areaOf(draft.value),
+      areas: allBlocks(draft.value)
+        .filter(({ ring }) => ring.length > 2)
+        .map(({ ring }) => polygonOf(ring)),
       keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
       marks: draftMarks(draft.value),
     };
@@ -98,14 +104,12 @@ export function NewMissionForm() {
     if (Object.keys(faults.value).length > 0) return;
     sending.value = true;
     try {
-      const described = toMission(draft.value);
-      if (edited) await describeMission(edited.id, described);
-      const id = edited?.id ?? (await createMission(described));
+      // What it follows stays as it is.
+      if (edited) await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
+      const ids = edited ? [edited.id] : await createMissions(toMissions(draft.value));
       if (draft.value.tide_table) {
-        await api.setTide(id, {
-          table: draft.value.tide_table,
-          source: draft.value.tide_source || say("mission.tideTable"),
-        });
+        const source = draft.value.tide_source || say("mission.tideTable");
+        for (const id of ids) await api.setTide(id, { table: draft.value.tide_table, source });
       }
       close();
     } catch (error) {
@@ -144,12 +148,13 @@ export function NewMissionForm() {
         {edited ? (
           <p class="hint">{say("mission.itKeepsItsNumber")}</p>
         ) : (
-          <Beginnings draft={draft.value} onBegin={begin} />
+          <MissionTemplates draft={draft.value} onBegin={begin} />
         )}
         <Text field="name" label={say("mission.name")} placeholder={say("mission.leixEsQuay")} />
         <Kind />
-        {draft.value.kind === "survey" ? <AskedFields /> : null}
+        {draft.value.kind === "survey" ? <SurveyFields /> : null}
         <AreaFields />
+        {draft.value.kind === "survey" && !edited ? <BlockFields /> : null}
         {draft.value.kind === "survey" ? <SiteFields /> : null}
         {draft.value.kind === "search" ? <SearchFields /> : null}
         <VehicleFields />
@@ -231,7 +236,7 @@ function draftMarks(draft: Draft): PlaceMark[] {
     recovery_point: placeOf(draft.own[name]?.recovery_point ?? ""),
   }));
   const homes = recoveryMarks({ recovery: point && { point, radius_m }, vehicles }, radius_m);
-  if (draft.kind !== "search") return homes;
+  if (draft.kind !== "search") return [...homes, ...blockMarks(draft)];
   return [
     ...homes,
     ...(goal
@@ -246,6 +251,18 @@ function draftMarks(draft: Draft): PlaceMark[] {
       : []),
     ...(entry ? [{ words: say("mission.entry"), sign: "entry" as const, at: entry, radius_m: 0 }] : []),
   ];
+}
+
+/** The names of several blocks, each in its middle. */
+function blockMarks(draft: Draft): PlaceMark[] {
+  if (draft.blocks.length === 0) return [];
+  return allBlocks(draft).flatMap((block, i) => {
+    const bounds = boundsOf(block.ring);
+    if (!bounds) return [];
+    const [west, south, east, north] = bounds;
+    const at: LngLat = [(west + east) / 2, (south + north) / 2];
+    return [{ words: blockTitle(block, i), sign: "block" as const, at, radius_m: 0 }];
+  });
 }
 
 /** Where vehicles come home to, and what sends them there. */

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { LayerView } from "../../api/types";
-import { classShares, rangeFault } from "./layers";
+import { classShares, rangeFault } from "./layerColours";
 import { type SeaFloor, UNKNOWN } from "./seafloor";
 
 describe("the ends of a colour range", () => {

@@ -6,7 +6,7 @@ import SPEC from "../../api/mission.json";
 import type { LngLat, MissionView, Place, PolygonGeometry, WaypointView } from "../../api/types";
 import { ringOf } from "../../map/area";
 import type { Chart, Pin } from "../../map/canvas/chart";
-import type { PlanLines } from "../../map/canvas/lively";
+import type { PlanLines } from "../../map/canvas/movingMarks";
 import type { Look } from "../../map/canvas/paper";
 import { outliersOf, placeOf } from "../../map/marks/crossings";
 import type { PlaceMark, Route, Track } from "../../map/marks/marks";
@@ -18,7 +18,7 @@ import { ringsOf, type SwathLine, swathEnds, swathOpacity } from "../../map/mark
 import { targetMarks } from "../../map/marks/targets";
 import { contourInterval } from "../../map/picture/contours";
 import { drawnBy } from "../../map/picture/drawings";
-import { paletteOf } from "../../map/picture/layers";
+import { paletteOf } from "../../map/picture/layerColours";
 import { Painter } from "../../map/picture/painter";
 import { lookupTable, vehicleColour } from "../../map/picture/palette";
 import { gridPlace, type SeaFloor } from "../../map/picture/seafloor";
@@ -193,11 +193,15 @@ export function follow(chart: Chart): () => void {
 
 /** The lines of the plan of what is being described, each cut where its vehicle has to turn back. */
 function planLines(): PlanLines {
-  const { plan, old } = planned.value ?? { plan: null, old: false };
-  const ways = (plan?.vehicles ?? []).map((v, i) => {
-    const [way, beyond] = cutAt(v.way, v.turn_back_m);
-    return { colour: vehicleColour(i), way, beyond, home: v.way_home ?? [] };
-  });
+  const { plans, old } = planned.value ?? { plans: [], old: false };
+  const ways = plans.flatMap(({ vehicles }, block) =>
+    vehicles.map((v, i) => {
+      const [way, beyond] = cutAt(v.way, v.turn_back_m);
+      // Before the next block nobody goes home.
+      const home = block === plans.length - 1 ? (v.way_home ?? []) : [];
+      return { colour: vehicleColour(i), way, beyond, home };
+    }),
+  );
   return { old, ways };
 }
 
@@ -230,14 +234,14 @@ function followDraft(chart: Chart): () => void {
   let shown = "";
   let typing: ReturnType<typeof setTimeout> | undefined;
   const stop = effect(() => {
-    const area = draftShapes.value?.area ?? null;
-    chart.setDraft(area, draftShapes.value?.keepOut ?? []);
-    const corners = JSON.stringify(area?.coordinates ?? "");
+    const areas = draftShapes.value?.areas ?? [];
+    chart.setDraft(areas, draftShapes.value?.keepOut ?? []);
+    const corners = JSON.stringify(areas.map(({ coordinates }) => coordinates));
     if (corners === shown) return;
     shown = corners;
     clearTimeout(typing);
     // What is drawn or dragged on the map is in sight already.
-    if (area && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
+    if (areas.length > 0 && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
   });
   return () => {
     clearTimeout(typing);
@@ -249,7 +253,7 @@ function followDraft(chart: Chart): () => void {
 function followTools<T>(
   signal: Signal<T | null>,
   ready: Signal<boolean>,
-  begin: (tools: typeof import("../../map/canvas/draw"), wanted: T) => Promise<() => void>,
+  begin: (tools: typeof import("../../map/canvas/areaEditor"), wanted: T) => Promise<() => void>,
 ): () => void {
   return effect(() => {
     const wanted = signal.value;
@@ -257,7 +261,7 @@ function followTools<T>(
     if (!wanted) return;
     let ended = false;
     let end = () => {};
-    void import("../../map/canvas/draw").then(async (tools) => {
+    void import("../../map/canvas/areaEditor").then(async (tools) => {
       if (ended) return;
       end = await begin(tools, wanted);
       if (ended) end();

@@ -31,7 +31,7 @@ export interface PlanLines {
 }
 
 export interface LivelyContent {
-  draft: { area: PolygonGeometry | null; keepOut: readonly PolygonGeometry[] };
+  draft: { areas: readonly PolygonGeometry[]; keepOut: readonly PolygonGeometry[] };
   plan: PlanLines;
   ranges: readonly Circle[];
   tails: readonly Track[];
@@ -60,7 +60,7 @@ export const WORDS_HEIGHT_PX = 15;
 export const WORDS_FONT = "12px sans-serif";
 
 export const NOTHING: LivelyContent = {
-  draft: { area: null, keepOut: [] },
+  draft: { areas: [], keepOut: [] },
   plan: { old: false, ways: [] },
   ranges: [],
   tails: [],
@@ -102,7 +102,7 @@ export function paintLively(
     sketch,
   } = content;
   context.lineJoin = context.lineCap = "round";
-  for (const ring of draft.area?.coordinates ?? []) {
+  for (const ring of draft.areas.flatMap(({ coordinates }) => coordinates)) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2.5, dash: [5, 5] });
   }
   for (const zone of draft.keepOut) {
@@ -248,6 +248,8 @@ const SIGNS: Record<PlaceMark["sign"], readonly (readonly [number, number])[]> =
     const away = i % 2 === 0 ? 9 : 4;
     return [away * Math.sin((i * Math.PI) / 5), -away * Math.cos((i * Math.PI) / 5)] as const;
   }),
+  // Its name stands for it.
+  block: [],
   entry: [
     [-6, 7],
     [-6, -7],

@@ -1,8 +1,10 @@
-import "./AskedFields.css";
+import "./SurveyFields.css";
 import { api } from "../../api/client";
 import SPEC from "../../api/mission.json";
 import { sizeOf } from "../../map/area";
+import { blockTitle, toMissions } from "../../state/form/blocks";
 import {
+  allBlocks,
   canPlan,
   cornersOf,
   estimate,
@@ -22,7 +24,7 @@ import { Choice } from "../parts/Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
 
 /** What the survey is to give: how sure, how complete, how long it may take; and what follows from that. */
-export function AskedFields() {
+export function SurveyFields() {
   return (
     <fieldset class="asked">
       <legend>{say("asked.whatIsAsked")}</legend>
@@ -142,8 +144,8 @@ function Expected() {
   const found = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
   const whole =
     found !== null && Object.keys(faultsOf({ ...draft, name: draft.name || "forecast" })).length === 0;
-  const described = whole ? JSON.stringify(toMission({ ...draft, name: "forecast" })) : null;
-  const fault = usePlan(described);
+  const mine = whole ? JSON.stringify(toMission({ ...draft, name: "forecast" })) : null;
+  const fault = usePlan(whole ? JSON.stringify(toMissions({ ...draft, name: "forecast" })) : null);
   if (!found) return null;
   return (
     <>
@@ -158,10 +160,10 @@ function Expected() {
               : say("asked.upToFromTheRecoveryPoint", { farthestM: distance(found.farthest_m) }),
         })}
       </p>
-      <Planned of={found} fault={fault} />
-      {described ? (
+      <Planned of={found} names={allBlocks(draft).map(blockTitle)} turn={draft.turn} fault={fault} />
+      {mine ? (
         <Forecast
-          of={described}
+          of={mine}
           ask={(gone) => api.forecastOf(toMission({ ...draft, name: draft.name || "forecast" }), gone)}
         />
       ) : null}

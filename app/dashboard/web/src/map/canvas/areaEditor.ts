@@ -5,7 +5,7 @@ import type { TerraDraw } from "terra-draw";
 import type { TerraDrawMapLibreGLAdapter } from "terra-draw-maplibre-gl-adapter";
 import type { LngLat } from "../../api/types";
 import type { Chart } from "./chart";
-import type { Sketch } from "./lively";
+import type { Sketch } from "./movingMarks";
 
 type Changes = Parameters<TerraDrawMapLibreGLAdapter<MapLibreMap>["render"]>[0];
 type Modes = ConstructorParameters<typeof TerraDraw>[0]["modes"];

@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
 import type { NewMission } from "../../api/types";
 import { kept } from "../../kept";
-import { type Draft, faultsOf, toMission } from "../../state/form/draft";
+import { allBlocks, type Draft, faultsOf, toMission } from "../../state/form/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
 import { type Key, say } from "../../words/say";
 import { Button, Choice, FileButton, same, Trouble } from "../parts/Controls";
@@ -17,7 +17,7 @@ const BUILT_IN: Readonly<Partial<Record<Key, Partial<Draft>>>> = {
 };
 
 /** What a new mission begins with: a template, or a file. */
-export function Beginnings({ draft, onBegin }: { draft: Draft; onBegin: (draft: Draft) => void }) {
+export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (draft: Draft) => void }) {
   const fault = useSignal("");
   const read = (name: string, text: string) => {
     try {
@@ -68,7 +68,9 @@ export function Keeping({ draft }: { draft: Draft }) {
         id="export-draft"
         disabled={!whole}
         title={why}
-        onClick={() => saveText(fileNameOf(draft.name), missionFile(described(), draft.tide_table))}
+        onClick={() =>
+          saveText(fileNameOf(draft.name), missionFile(described(), draft.tide_table, allBlocks(draft)))
+        }
       >
         {say("beginnings.export")}
       </Button>
