@@ -13,10 +13,8 @@ import json
 import logging
 import math
 import statistics
-import tempfile
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -44,9 +42,6 @@ WITHIN_REACH_S, OUT_OF_REACH_S = (240.0, 1200.0), (10.0, 180.0)
 
 LONGEST_S = 4 * 3600.0
 """A mission that is not over after so long of its vehicles' time has failed."""
-
-START_S = 1.7e9
-"""Unix time at which missions begin."""
 
 STILL_MPS = 0.06
 """Up to this current the water is still."""
@@ -112,44 +107,18 @@ def fly_mission(
     spec: "MissionSpec", sea: "SimulationSettings", late: "VehicleSpec | None", seed: int, time_scale: float
 ) -> dict[str, Any]:
     """Fly a mission to its end, in a simulated time of its own; of an odd seed links are lost."""
-    from app.missions import clock
-    from simulator.event_loop import BEGIN_S, SimulatedTimeLoop
+    from app.commands.simulated_service import served
 
-    with asyncio.Runner(loop_factory=SimulatedTimeLoop) as runner:
-        loop = runner.get_loop()
-        with clock.told_by(lambda: START_S + loop.time() - BEGIN_S):
-            found = runner.run(_served(spec, sea, late, seed, time_scale))
+    async def work(service: "MissionService") -> dict[str, Any]:
+        return await _flown(service, spec, late, seed, time_scale)
+
+    found = served(sea, time_scale, work)
     told = {
         "seed": seed,
         "current_mps": round(math.hypot(*sea.current_mps), 2),
         "consumption_factor": sea.consumption_factor,
     } | found
     return told | {"wrong": wrong_with(told)}
-
-
-async def _served(
-    spec: "MissionSpec", sea: "SimulationSettings", late: "VehicleSpec | None", seed: int, time_scale: float
-) -> dict[str, Any]:
-    """Fly a mission with a service of its own."""
-    from app.missions.service import MissionService
-    from app.missions.settings import ImcSettings, ServiceSettings
-    from app.storage.database import Database
-    from app.storage.upkeep.prepare import prepare_database
-
-    with tempfile.TemporaryDirectory() as folder:
-        url = f"sqlite+aiosqlite:///{Path(folder) / 'mission.db'}"
-        await prepare_database(url, may_upgrade=True)
-        database = Database(url)
-        settings = ServiceSettings(
-            database_url=url, imc=ImcSettings(enabled=False), time_scale=time_scale, simulation=sea
-        )
-        service = MissionService(settings, database)
-        await service.startup()
-        try:
-            return await _flown(service, spec, late, seed, time_scale)
-        finally:
-            await service.shutdown()
-            await database.close()
 
 
 async def _flown(

@@ -1,6 +1,6 @@
 """What a Dask cluster of two workers carries: ``python -m benchmarks.service.cluster [--maps 4 --soundings 200000]``.
 
-The same heavy work twice: thorough maps of many soundings, and forecasts over five floors each, as the service gives
+The same heavy work twice: thorough maps of many soundings, and forecasts over all floors each, as the service gives
 them away. First this process does it, on one core; then two workers, each on one core of its own, behind a scheduler.
 Results have to be the same. Told are seconds by the clock, and seconds of the processor of each process: on a machine
 where other programs run, and where scheduler, service and workers share two cores, the clock says little. A worker
@@ -32,7 +32,7 @@ from app.compute.settings import ComputeSettings
 from app.missions.fleet.interface import LinkCapabilities
 from app.missions.forecast.request import starts_of
 from app.missions.forecast.simulate import floors_under, fly_over
-from app.missions.forecast.swarm import Flown
+from app.missions.forecast.swarm import Flown, SoFar
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.work_processes import WorkProcesses
 from app.missions.spec.mission import MissionSpec
@@ -87,15 +87,14 @@ async def maps(tables: Sequence[FloatArray], side_m: float, compute: Compute | N
 
 
 async def forecasts(specs: Sequence[MissionSpec], compute: Compute | None) -> list[Flown]:
-    none = np.zeros((0, 4))
     team = Team(lambda _kind: LinkCapabilities())
     flights: list[Awaitable[Flown]] = []
     for spec in specs:
         members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
         starts, _ = starts_of(spec, members)
-        for floor in floors_under(spec, members, none):
+        for floor in floors_under(spec, members, SoFar()):
             run = compute.run if compute is not None else _here
-            flights.append(run(fly_over, floor, spec, members, starts, none, 1, NO_END_S))
+            flights.append(run(fly_over, floor, spec, members, starts, SoFar(), NO_END_S))
     return list(await asyncio.gather(*flights))
 
 
@@ -195,7 +194,7 @@ def main() -> None:
     parser.add_argument("--maps", type=int, default=4, help="how many")
     parser.add_argument("--soundings", type=int, default=200_000, help="of each map")
     parser.add_argument("--side", type=float, default=1000.0, help="of each map's area, metres")
-    parser.add_argument("--forecasts", type=int, default=2, help="how many, over five floors each")
+    parser.add_argument("--forecasts", type=int, default=2, help="how many, over all floors each")
     parser.add_argument("--steps", type=int, default=40, help="of each mission that is forecast")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:

@@ -16,16 +16,19 @@ from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
 from app.missions.flight.decisions.decision import make_constraints
-from app.missions.forecast.ranges import ForecastRange
-from app.missions.forecast.simulate import Forecast, floors_under, fly_over, forecast
+from app.missions.forecast.floor import forecast_cell_m, thinned
+from app.missions.forecast.ranges import DEVIATION_SD, WAY_SD, ForecastRange, range_of, with_unforeseen
+from app.missions.forecast.simulate import SOUNDINGS_A_CELL, Forecast, floors_under, fly_over, forecast
+from app.missions.forecast.swarm import SoFar
 from app.missions.forecast.swath_flight import sweeps
-from app.missions.forecast.whole_survey import WholeSurveyView, range_of, whole_view, whole_way
+from app.missions.forecast.whole_survey import WholeSurveyView, whole_view, whole_way
 from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_spec
 from app.missions.running.team_changes import refuse_ended
 from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.team import Member, Team
 from app.missions.views.base import View
+from app.storage.queries import missions as mission_queries
 from app.storage.queries import soundings as sounding_queries
 
 NO_FORECAST = "what a search will find cannot be forecast: it depends on what stands there"
@@ -107,12 +110,14 @@ class Forecaster:
             raise ConflictError(NO_FORECAST, "see its time window, search.window_s")
         async with live.database.reading() as session:
             prior = await sounding_queries.imported_arrays(session, live.id)
-        team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in live.team]
+            step = await mission_queries.last_step(session, live.id)
+        sounded = await asyncio.to_thread(sounded_so_far, live)
+        flying = live.team.surveying or list(live.team)
+        team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in flying]
         return await self.make(
             live.spec,
             members=team,
-            prior=prior,
-            first_step=live.header.step + 1,
+            so_far=SoFar(live.header.step + 1, prior, sounded, b"" if step is None else step.memory),
             floor_depth_m=floor_depth_m,
         )
 
@@ -121,8 +126,7 @@ class Forecaster:
         spec: MissionSpec,
         *,
         members: list[Member] | None = None,
-        prior: FloatArray | None = None,
-        first_step: int = 1,
+        so_far: SoFar = SoFar(),  # noqa: B008 - frozen
         floor_depth_m: float | None = None,
     ) -> ForecastView:
         """Return a forecast; ends soon after whoever waits for it is cancelled.
@@ -131,8 +135,8 @@ class Forecaster:
         ----------
         members
             The vehicles as they are; None: those of the description, not yet in the water.
-        prior
-            Imported soundings, shape (n, 4).
+        so_far
+            What was done of the mission.
 
         Raises
         ------
@@ -140,21 +144,17 @@ class Forecaster:
             When the mission has no vehicle.
         """
         ours = members or described_team(self._hub, spec)
-        known = np.zeros((0, 4)) if prior is None else prior
         starts, where = await asyncio.to_thread(starts_of, spec, ours)
         if self._compute.elsewhere:
-            floors = await asyncio.to_thread(lambda: list(floors_under(spec, ours, known, floor_depth_m)))
+            floors = await asyncio.to_thread(lambda: list(floors_under(spec, ours, so_far, floor_depth_m)))
             flights = await asyncio.gather(
-                *(
-                    self._compute.run(fly_over, floor, spec, ours, starts, known, first_step, BUDGET_S)
-                    for floor in floors
-                )
+                *(self._compute.run(fly_over, floor, spec, ours, starts, so_far, BUDGET_S) for floor in floors)
             )
             found = Forecast(list(flights), floors)
         else:
-            found = await self._here(spec, ours, starts, known, floor_depth_m, first_step)
+            found = await self._here(spec, ours, starts, so_far, floor_depth_m)
         return _view(
-            spec, found, where, spec.steps - first_step + 1, await asyncio.to_thread(_whole, spec, ours, found)
+            spec, found, where, spec.steps - so_far.first_step + 1, await asyncio.to_thread(_whole, spec, ours, found)
         )
 
     async def _here(
@@ -162,9 +162,8 @@ class Forecaster:
         spec: MissionSpec,
         members: list[Member],
         starts_m: FloatArray,
-        prior: FloatArray,
+        so_far: SoFar,
         floor_depth_m: float | None,
-        first_step: int,
     ) -> Forecast:
         # The time that a forecast may take is for steps, not for compiling.
         await self._compilation.search()
@@ -174,9 +173,8 @@ class Forecaster:
             spec,
             members,
             starts_m,
-            prior,
+            so_far,
             floor_depth_m=floor_depth_m,
-            first_step=first_step,
             budget_s=BUDGET_S,
             patience_s=PATIENCE_S,
             stop=lambda: gone.is_set() or self._closing.is_set(),
@@ -186,6 +184,19 @@ class Forecaster:
                 return await asyncio.get_running_loop().run_in_executor(self._executor, work)
         finally:
             gone.set()
+
+
+def sounded_so_far(live: LiveMission) -> FloatArray:
+    """Return what a mission has sounded itself, (n, 4), as densely as it is flown ahead.
+
+    Of what swath sonars saw it is one sounding in each cell.
+    """
+    rows = np.concatenate([live.builder.soundings, *live.builder.arrivals.noted()])
+    built = live.builder.newest
+    if not live.builder.swath.beams or built is None:
+        return thinned(rows, forecast_cell_m(live.spec) / SOUNDINGS_A_CELL)
+    seen = built.map.sounded & np.isfinite(built.map.depth_m) & np.isfinite(built.map.sd_m)
+    return np.column_stack([built.map.grid.centres_m[seen.ravel()], built.map.depth_m[seen], built.map.sd_m[seen]])
 
 
 def described_team(hub: FleetHub, spec: MissionSpec) -> list[Member]:
@@ -259,9 +270,7 @@ def _view(
         else "Flown over one floor only, for want of time: on a rougher one it will be worse.",
         where,
         f"Turning circles and straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and "
-        "none is lost."
-        if sweeps(spec)
-        else f"Straight legs at {spec.speed_mps:g} m/s without current; nobody waits for a link, and none is lost.",
+        "none is lost.",
     ]
     assumptions += _said_of_whole(spec, found)
     if spec.surface_policy is not None:
@@ -275,10 +284,13 @@ def _view(
             "after as many."
         )
 
-    sds = [flight.mean_sd_m for flight in flights if flight.mean_sd_m is not None]
-    durations = [flight.duration_s for flight in flights]
+    sds = with_unforeseen([f.mean_sd_m for f in flights if f.mean_sd_m is not None], DEVIATION_SD)
+    durations = with_unforeseen([flight.duration_s for flight in flights], WAY_SD)
     coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
-    ways = {name: [flight.distances_m[name] for flight in flights] for name in flights[0].distances_m}
+    ways = {
+        name: with_unforeseen([flight.distances_m[name] for flight in flights], WAY_SD)
+        for name in flights[0].distances_m
+    }
     return ForecastView(
         duration_s=_median(durations),
         duration_s_range=range_of(durations),

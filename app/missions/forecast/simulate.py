@@ -1,8 +1,8 @@
 """What is to be expected of a mission: its own planner, decisions and map, flown ahead over floors that are guessed.
 
 How rough the sea floor is decides what comes of a survey, and nobody knows it before. So the mission is flown over
-several floors. No vehicle, no network and no clock of the vehicles takes part: legs are straight, and a map is made
-twelve times.
+several floors. No vehicle and no network takes part: vehicles steer in their turning circles, and fewer maps
+are made than at sea.
 """
 
 import math
@@ -13,19 +13,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints, make_planner
+from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
 from app.missions.flight.own_legs import LEAST_WAY_M
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
-from app.missions.forecast.swarm import Flown, StepFlown, Swarm
+from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm, planner_of, poses_apart
 from app.missions.forecast.swath_flight import sweep_over, sweeps
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec, Sensor
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
 
-MAPS = 12
-LEARN_AT = (1, 4, 12)
-"""Maps before which the model is learned anew; in between it is kept."""
+MORE = 1.3
+"""A map is made whenever so many times as many steps are flown as for the last one: at sea each step has a new one, and
+the first ones say the most."""
+LEARN_EVERY = 4
+"""Before so many maps the model is learned anew, as before the last one."""
+
+SOUNDINGS_HZ = 5.0
+"""How often single beams sound."""
+SOUNDINGS_A_CELL = 8.0
+"""More soundings on the way along a cell are not taken: they are as good as one."""
 
 LEAST_SD_M = 0.01
 BEAMS_RAD = {
@@ -53,10 +60,9 @@ def forecast(
     spec: MissionSpec,
     members: list[Member],
     starts_m: FloatArray,
-    prior: FloatArray,
+    so_far: SoFar,
     *,
     floor_depth_m: float | None = None,
-    first_step: int = 1,
     budget_s: float,
     patience_s: float = math.inf,
     stop: Callable[[], bool] = lambda: False,
@@ -67,12 +73,10 @@ def forecast(
     ----------
     members, starts_m
         The vehicles and where they begin, (vehicles, 2): east, north.
-    prior
-        Imported soundings, shape (n, 4): east, north, depth, deviation.
+    so_far
+        What was done of it.
     floor_depth_m
-        How deep the floor is where nothing was imported; None: a guess.
-    first_step
-        The first step that is still to be flown.
+        How deep the floor is where nothing was sounded or imported; None: a guess.
     budget_s
         How long it may work on each floor, seconds of the processor: a busy machine makes it late, not shorter. What is
         left of the mission then is drawn out.
@@ -84,19 +88,19 @@ def forecast(
     begun = time.monotonic()
     flights: list[Flown] = []
     floors: list[Floor] = []
-    for floor in floors_under(spec, members, prior, floor_depth_m):
+    for floor in floors_under(spec, members, so_far, floor_depth_m):
         if flights and (stop() or time.monotonic() - begun > patience_s):
             break
         floors.append(floor)
-        flights.append(fly_over(floor, spec, members, starts_m, prior, first_step, budget_s, stop))
+        flights.append(fly_over(floor, spec, members, starts_m, so_far, budget_s, stop))
     return Forecast(flights, floors)
 
 
 def floors_under(
-    spec: MissionSpec, members: list[Member], prior: FloatArray, floor_depth_m: float | None = None
+    spec: MissionSpec, members: list[Member], so_far: SoFar, floor_depth_m: float | None = None
 ) -> Iterator[Floor]:
     """Return the floors that a mission is flown ahead over, one after the other; see :func:`forecast`."""
-    return floors_of(spec, prior, max(member.cruise_depth_m(spec.limits) for member in members), floor_depth_m)
+    return floors_of(spec, so_far.rows, max(member.cruise_depth_m(spec.limits) for member in members), floor_depth_m)
 
 
 def fly_over(
@@ -104,31 +108,31 @@ def fly_over(
     spec: MissionSpec,
     members: list[Member],
     starts_m: FloatArray,
-    prior: FloatArray,
-    first_step: int,
+    so_far: SoFar,
     budget_s: float,
     stop: Callable[[], bool] = lambda: False,
 ) -> Flown:
     """Fly a mission ahead over one floor; see :func:`forecast`."""
     if sweeps(spec):
-        return sweep_over(floor, spec, members, starts_m, prior, first_step, budget_s, stop)
+        return sweep_over(floor, spec, members, starts_m, so_far, budget_s, stop)
     until = time.thread_time() + budget_s
     builder = MapBuilder(
         spec.local_area(), forecast_cell_m(spec), spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth
     )
-    builder.arrivals.replace(np.zeros((0, 4)), prior)
+    builder.arrivals.replace(so_far.soundings, so_far.prior)
     builder.build()
-    steps = max(spec.steps - first_step + 1, 0)
-    every = max(1, steps // MAPS)
-    distance, seconds, left_m, flown = np.zeros(len(members)), 0.0, 0.0, 0
-    for leg in fly(spec, members, starts_m, builder, floor.terrain, first_step=first_step):
+    steps = max(spec.steps - so_far.first_step + 1, 0)
+    distance, seconds, left_m, flown, mapped, maps = np.zeros(len(members)), 0.0, 0.0, 0, so_far.first_step - 1, 0
+    for leg in fly(spec, members, starts_m, builder, floor.terrain, so_far):
         distance, seconds, left_m, flown = leg.distance_m, leg.seconds, leg.left_m, flown + 1
-        if flown % every == 0:
+        if leg.step >= MORE * mapped:
             builder.build()
-            if flown // every in LEARN_AT:
+            mapped, maps = leg.step, maps + 1
+            if maps % LEARN_EVERY == 0:
                 builder.learn(always=True)
         if stop() or time.thread_time() > until:
             break
+    builder.learn(always=True)
     builder.build()
     whole = 1.0 + left_m / distance.sum() if distance.sum() > 0.0 else 1.0
     newest = builder.newest
@@ -148,57 +152,53 @@ def fly(
     starts_m: FloatArray,
     builder: MapBuilder,
     terrain: Terrain,
+    so_far: SoFar = SoFar(),  # noqa: B008 - frozen
     *,
-    first_step: int = 1,
     spacing_m: float | None = None,
 ) -> Iterator[StepFlown]:
     """Fly a mission's steps by its own planner and decisions; soundings go to ``builder``, whose maps are the caller's.
 
-    ``spacing_m`` is the way between soundings; None: a cell of the terrain.
+    ``spacing_m`` is the way between soundings; None: as sonars sound, or closer than the terrain's cells are.
     """
-    constraints, planner = make_constraints(spec), make_planner(spec)
+    constraints, planner = make_constraints(spec), planner_of(spec, so_far)
     rng = np.random.default_rng([spec.seed, 1])
-    swarm = Swarm(spec, members, starts_m, first_step)
+    swarm = Swarm(spec, members, starts_m, so_far.first_step)
     apart = planner.decides_apart and np.isinf(constraints.com_range_m)
-    told = first_step - 1
+
+    def sound(i: int, poses: FloatArray) -> None:
+        apart_m = spacing_m or max(spec.speed_of(members[i].spec) / SOUNDINGS_HZ, terrain.cell_m / SOUNDINGS_A_CELL)
+        builder.add(_sounded(members[i].spec.sensor, poses, terrain, spec.sounding_noise, rng, apart_m))
+
+    for i in range(len(members)):
+        for end in swarm.legs_ahead(i):
+            sound(i, swarm.fly(i, end, ahead=True))
+    told = so_far.first_step - 1
     while (due := swarm.due(apart=apart)).any():
         number = int(swarm.legs[due].max()) + 1
         known = Knowledge(builder.belief(), builder.sounded_at_m()[0])
         decision = decide(number, spec, constraints, planner, swarm.places(due), known)
         target = {leg.vehicle: leg.target_m for leg in decision.legs}
-        for i in np.flatnonzero(due):
-            member = members[i]
-            way = swarm.here[i].copy(), target.get(member.name, swarm.here[i])
-            builder.add(_sounded(member.spec.sensor, *way, terrain, spec.sounding_noise, rng, spacing_m))
-            swarm.fly(int(i), way[1])
+        for i in map(int, np.flatnonzero(due)):
+            sound(i, swarm.fly(i, target.get(members[i].name, swarm.here[i])))
         if number > told:
             told = number
             yield swarm.flown(number)
 
 
 def _sounded(
-    sensor: Sensor,
-    start: FloatArray,
-    end: FloatArray,
-    floor: Terrain,
-    noise: float,
-    rng: np.random.Generator,
-    spacing_m: float | None,
+    sensor: Sensor, poses: FloatArray, floor: Terrain, noise: float, rng: np.random.Generator, apart_m: float
 ) -> FloatArray:
-    """Return what is sounded on a leg, shape (n, 4): east, north, depth, deviation."""
-    way = end[:2] - start[:2]
-    length = float(np.linalg.norm(way))
-    count = max(1, int(np.ceil(length / (spacing_m or floor.cell_m))))
-    along = start + np.linspace(1 / count, 1, count)[:, None] * (end - start)
-    across = np.array([way[1], -way[0]]) / length if length > 0 else np.zeros(2)
+    """Return what is sounded from poses (n, 4), shape (m, 4): east, north, depth, deviation."""
+    at = poses_apart(poses, apart_m)
+    across = np.column_stack([np.cos(at[:, 2]), -np.sin(at[:, 2])])
     found = []
     for angle in BEAMS_RAD[sensor]:
-        under = floor.depth_at(along[:, 0], along[:, 1])
-        reach = np.tan(angle) * np.maximum(under - along[:, 2], 0.0)
-        place = along[:, :2] + reach[:, None] * across
+        under = floor.depth_at(at[:, 0], at[:, 1])
+        reach = np.tan(angle) * np.maximum(under - at[:, 3], 0.0)
+        place = at[:, :2] + reach[:, None] * across
         depth = floor.depth_at(place[:, 0], place[:, 1])
-        sd = np.maximum(noise * (depth - along[:, 2]) / np.cos(angle), LEAST_SD_M)
-        found.append(np.column_stack([place, depth + rng.normal(size=count) * np.nan_to_num(sd), sd]))
+        sd = np.maximum(noise * (depth - at[:, 3]) / np.cos(angle), LEAST_SD_M)
+        found.append(np.column_stack([place, depth + rng.normal(size=len(at)) * np.nan_to_num(sd), sd]))
     rows = np.concatenate(found)
     used: FloatArray = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0)]
     return used

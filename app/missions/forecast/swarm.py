@@ -1,16 +1,61 @@
-"""Vehicles that are flown ahead, without a body: where they are, how far they have come, what came of it."""
+"""Vehicles that are flown ahead: where they are, how far they have come, what came of it."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
-from app.missions.flight.decisions.decision import Place, planned_way_m, turn_radius_m
+from app.exploration.planner.base import PlannerBase
+from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m, turn_radius_m
 from app.missions.flight.legs.commit import STILL_M
 from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
+
+LEAST_RADIUS_M = 0.5
+
+STEP_M = 1.0
+"""A vehicle's way is made of pieces that are at most so long,"""
+STEPS_OF_RADIUS = 4.0
+"""and of so many on its turning circle's radius."""
+
+PASSED_WITHIN_M = 8.0
+"""Who passes the end of its leg at most this far to the side has come there, as at sea."""
+
+REACTS_S, LEAST_ARRIVAL_M = 0.25, 0.5
+"""So long after it has arrived a vehicle turns to its next leg; it arrives within so many metres all the same."""
+
+STILL_S = 1.0
+"""So long takes a leg that ends where it begins: its vehicle is there at once."""
+
+MOST_CIRCLES = 2.0
+"""After so many whole circles more than a leg is long a vehicle gives its end up."""
+
+
+@dataclass(frozen=True)
+class SoFar:
+    """What was done of a mission that is flown ahead from there.
+
+    Attributes
+    ----------
+    first_step
+        The first step that is still to be decided.
+    prior, soundings : (n, 4)
+        What was imported, and what the mission sounded itself: east, north, depth, deviation.
+    memory
+        What its planner had in mind; empty: nothing.
+    """
+
+    first_step: int = 1
+    prior: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    soundings: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    memory: bytes = b""
+
+    @property
+    def rows(self) -> FloatArray:
+        """All soundings, (n, 4)."""
+        return np.concatenate([self.prior, self.soundings])
 
 
 @dataclass(frozen=True)
@@ -64,7 +109,7 @@ class Flown:
 
 @dataclass(frozen=True)
 class StepFlown:
-    """How far vehicles have come after a step: metres each, (vehicles,), and the vehicles' seconds."""
+    """How far vehicles have come when the last of them ends a step: metres each, (vehicles,), and their seconds."""
 
     step: int
     distance_m: FloatArray
@@ -76,27 +121,32 @@ class StepFlown:
 
 
 class Swarm:
-    """Vehicles without a body: straight legs at their speed, and a while for every turn.
+    """Vehicles that steer for the ends of their legs in their turning circles, at their speed and in still water.
 
     Attributes
     ----------
     here : (n, 3)
         Where their last legs end.
     heading_rad, clock_s, distance_m, left_m : (n,)
-        Their course then (NaN: none yet), when that is, and how far they have come and may still go.
+        The course of those legs (NaN: none yet), when they are flown, and how far they have come and may still go.
     legs : (n,)
         How many they had.
     """
 
-    def __init__(self, spec: MissionSpec, members: list[Member], starts_m: FloatArray, first_step: int) -> None:
+    def __init__(self, spec: MissionSpec, members: list[Member], starts_m: FloatArray, first_step: int = 1) -> None:
         self._spec, self._members = spec, members
         self._speed_mps = np.array([spec.speed_of(member.spec) for member in members])
-        self._radius_m = np.array([turn_radius_m(spec, member.spec) for member in members])
+        self._radius_m = np.array([max(turn_radius_m(spec, member.spec), LEAST_RADIUS_M) for member in members])
         n = len(members)
         self.here = np.column_stack([starts_m, np.zeros(n)])
-        self.heading_rad = np.full(n, np.nan)
+        self.heading_rad = np.array([np.nan if m.report is None else m.report.heading_rad for m in members])
+        self._poses = [
+            (float(start[0]), float(start[1]), float(heading))
+            for start, heading in zip(starts_m, self.heading_rad, strict=True)
+        ]
         self.clock_s, self.distance_m = np.zeros(n), np.zeros(n)
         self.legs = np.full(n, first_step - 1)
+        self._held = np.zeros(n, dtype=bool)
         if spec.budget.steps is not None:
             self.left_m = np.full(n, max(spec.steps - first_step + 1, 0) * spec.limits.max_step_m)
         else:
@@ -105,14 +155,23 @@ class Swarm:
     def flown(self, step: int) -> StepFlown:
         """Return how far they have come after a step."""
         left_m, seconds = float(self.left_m.sum()), float(self.clock_s.max())
-        return StepFlown(step, self.distance_m.copy(), seconds, left_m, self.here[:, :2].copy())
+        return StepFlown(step, self.circled_m(self.clock_s), seconds, left_m, self.here[:, :2].copy())
+
+    def circled_m(self, ended_s: FloatArray) -> FloatArray:
+        """Return how far each comes, (vehicles,), that goes on in circles from when it ended until the last one has."""
+        way_m: FloatArray = self.distance_m + (ended_s.max() - ended_s) * self._speed_mps
+        return way_m
 
     def due(self, *, apart: bool) -> BoolArray:
         """Return who gets the next leg, (n,): all together, or who ends its last one first, with those right after."""
         able = self.left_m > LEAST_WAY_M
         if not apart or not able.any():
             return able
-        soon_s = self.clock_s[able].min() + HARDLY_BEGUN * self._spec.limits.max_step_m / self._speed_mps
+        first = int(np.argmin(np.where(able, self.clock_s, np.inf)))
+        if self._held[first]:
+            # Who held because of others goes on alone: together they would hold for ever.
+            return np.asarray(np.arange(len(able)) == first)
+        soon_s = self.clock_s[first] + HARDLY_BEGUN * self._spec.limits.max_step_m / self._speed_mps
         return np.asarray(able & (self.clock_s <= soon_s))
 
     def places(self, due: BoolArray) -> list[Place]:
@@ -131,33 +190,90 @@ class Swarm:
             for i, member in enumerate(self._members)
         ]
 
-    def radius_m(self, i: int) -> float:
-        """Return the radius of one vehicle's turning circle."""
-        return float(self._radius_m[i])
+    def legs_ahead(self, i: int) -> list[FloatArray]:
+        """Return the ends, (3,) each, of the legs that one vehicle has already."""
+        member = self._members[i]
+        depth_m = member.cruise_depth_m(self._spec.limits)
+        return [np.append(end, depth_m) for end in member.legs_ahead_m()]
 
-    def flew(self, i: int, end: FloatArray, heading_rad: float, way_m: float) -> None:
-        """Note that one vehicle came to the end of its leg, (3,), by a way of its own; the leg counts, not the way."""
-        leg_m = float(np.hypot(*(end[:2] - self.here[i, :2])))
-        counts_m = self._spec.limits.max_step_m if self._spec.budget.steps is not None else leg_m
-        self.left_m[i] = max(self.left_m[i] - counts_m, 0.0)
-        self.legs[i] += 1
-        self.heading_rad[i] = heading_rad
+    def fly(self, i: int, end: FloatArray, *, ahead: bool = False) -> FloatArray:
+        """Let one vehicle fly to where its leg ends, (3,); return its poses, (n, 4): east, north, heading, depth.
+
+        ``ahead``: the leg was its already, and no longer counts.
+        """
+        leg = end[:2] - self.here[i, :2]
+        leg_m = math.hypot(*leg)
+        still = self._held[i] = leg_m <= STILL_M
+        poses, way_m = np.zeros((0, 3)), 0.0
+        if not still:
+            self.heading_rad[i] = math.atan2(*leg)
+            arrival_m = max(self._spec.arrival_radius_m - REACTS_S * float(self._speed_mps[i]), LEAST_ARRIVAL_M)
+            poses, way_m = steered(self._poses[i], (float(end[0]), float(end[1])), float(self._radius_m[i]), arrival_m)
+        if len(poses):
+            self._poses[i] = (float(poses[-1, 0]), float(poses[-1, 1]), float(poses[-1, 2]))
+        if not ahead:
+            counts_m = self._spec.limits.max_step_m if self._spec.budget.steps is not None or still else leg_m
+            self.left_m[i] = max(self.left_m[i] - counts_m, 0.0)
+            self.legs[i] += 1
         self.distance_m[i] += way_m
-        self.clock_s[i] += way_m / self._speed_mps[i]
+        self.clock_s[i] += STILL_S if still else way_m / self._speed_mps[i]
         self.here[i] = end
+        return np.column_stack([poses, np.full(len(poses), end[2])])
 
-    def fly(self, i: int, end: FloatArray) -> None:
-        """Bring one vehicle to the end of its leg, (3,)."""
-        east, north = end[:2] - self.here[i, :2]
-        leg_m, step_m = float(np.linalg.norm(end - self.here[i])), self._spec.limits.max_step_m
-        if math.hypot(east, north) > 0.0:
-            course = math.atan2(east, north)
-            turn = 0.0 if np.isnan(self.heading_rad[i]) else abs(math.remainder(course - self.heading_rad[i], math.tau))
-            self.heading_rad[i] = course
-            self.clock_s[i] += turn * self._radius_m[i] / self._speed_mps[i]
-        counts_m = step_m if self._spec.budget.steps is not None or leg_m <= STILL_M else leg_m
-        self.left_m[i] = max(self.left_m[i] - counts_m, 0.0)
-        self.legs[i] += 1
-        self.distance_m[i] += leg_m
-        self.clock_s[i] += (counts_m if leg_m <= STILL_M else leg_m) / self._speed_mps[i]
-        self.here[i] = end
+
+def planner_of(spec: MissionSpec, so_far: SoFar) -> PlannerBase:
+    """Return a mission's planner with what it had in mind, as far as it can read that."""
+    planner = make_planner(spec)
+    if so_far.memory:
+        try:
+            planner.restore(so_far.memory)
+        except ValueError:
+            return make_planner(spec)
+    return planner
+
+
+def steered(
+    pose: tuple[float, float, float], end: tuple[float, float], radius_m: float, arrival_m: float
+) -> tuple[FloatArray, float]:
+    """Return the poses (n, 3) of a vehicle that steers for a place until it is there, and how long its way is.
+
+    Parameters
+    ----------
+    pose
+        East, north, heading; of one without a heading (NaN) any will do.
+    end
+        East, north.
+    arrival_m
+        It is there within so many metres, or when it has passed the place close by, as seen from where it set out.
+    """
+    east, north, heading = pose
+    to_east, to_north = end[0] - east, end[1] - north
+    away_m = math.hypot(to_east, to_north)
+    if math.isnan(heading):
+        heading = math.atan2(to_east, to_north)
+    step_m = min(STEP_M, radius_m / STEPS_OF_RADIUS)
+    most_m = away_m + MOST_CIRCLES * math.tau * radius_m
+    poses = [(east, north, heading)]
+    way_m, along_m = 0.0, 0.0
+    off_east, off_north, off_m = to_east, to_north, away_m
+    while off_m > arrival_m and not (along_m >= away_m and off_m <= PASSED_WITHIN_M) and way_m < most_m:
+        piece_m = min(step_m, max(off_m - arrival_m, 0.01))
+        turn = math.remainder(math.atan2(off_east, off_north) - heading, math.tau)
+        heading += max(-piece_m / radius_m, min(turn, piece_m / radius_m))
+        east += piece_m * math.sin(heading)
+        north += piece_m * math.cos(heading)
+        way_m += piece_m
+        poses.append((east, north, heading))
+        off_east, off_north = end[0] - east, end[1] - north
+        off_m = math.hypot(off_east, off_north)
+        along_m = ((east - pose[0]) * to_east + (north - pose[1]) * to_north) / away_m
+    return np.array(poses), way_m
+
+
+def poses_apart(poses: FloatArray, apart_m: float) -> FloatArray:
+    """Return the poses (m, k) along a way (n, k), east and north first, that lie so far apart; the last is there."""
+    if len(poses) < 2:
+        return poses
+    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+    at_m = np.arange(way_m[-1], 0.0, -apart_m)[::-1]
+    return np.column_stack([np.interp(at_m, way_m, column) for column in poses.T])

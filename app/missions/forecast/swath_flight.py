@@ -1,33 +1,32 @@
 """A survey with swath sonars flown ahead: its own planner, turning circles, and pings over a floor that is guessed.
 
 Lines follow from what was sounded on the lines before, so what a survey takes depends on how deep its floor is, and how
-rough. A vehicle turns in its circle until it heads for the end of its leg, sounds all the way, and the next leg is
-decided a little before it is there, as at sea.
+rough. A vehicle sounds all the way, its turns too, and the next leg is decided a little before it is at the end of its
+leg, as at sea.
 """
 
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
-from app.exploration.motion.dubins import TURN, Way, poses_along
+from app.estimation.uncertainty import BeamGeometry, Uncertainty, uncertainty
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
     make_constraints,
-    make_planner,
     swath_sonar,
     swath_task,
 )
 from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M
 from app.missions.forecast.floor import Floor
-from app.missions.forecast.swarm import Flown, Swarm, WholeSurvey
+from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
@@ -42,15 +41,15 @@ CELLS_OF_HALF = 5.0
 SHOALER = 0.1
 """Share of a floor that is shoaler than that."""
 
-BEAMS_A_CELL, REACHES = 2.0, 3
+BEAMS_A_CELL, REACHES = 4.0, 3
 """Beams and pings lie so close together, and where a beam meets the bottom is found in so many steps."""
 
-LEAST_SD_M = 0.01
-IDLE_S = 20.0
+LEAST_SD_M, LEAST_AVERAGED_M = 0.01, 0.001
+IDLE_S = 10.0
 """A vehicle without a line is looked at again after so long: others may have missed something."""
 
-MOST_IDLE = 3
-"""Who was so often in a row without a line, with all that was sounded known, is done."""
+MOST_IDLE = 2
+"""Who was so often in a row without a line, while nobody flew one, is done."""
 
 
 def sweeps(spec: MissionSpec) -> bool:
@@ -81,6 +80,12 @@ class Craft:
     sonar: SwathSonar | None
     corners_m: list[FloatArray]
     clock_s: list[float]
+    position_sd_m: float
+    """What it says of how well it knows its place; NaN: it does not say."""
+    spacing_m: float
+    """How far its pings are apart that are flown ahead,"""
+    share: float
+    """and which share of those at sea they are."""
     unseen: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
     """Poses (n, 4): east, north, heading and depth."""
     idle: int = 0
@@ -92,10 +97,8 @@ class SwathFlight:
     Parameters
     ----------
     starts_m : (vehicles, 2)
-    prior
-        Imported soundings, shape (n, 4).
-    first_step
-        The first one that is still to be flown.
+    so_far
+        What was done of it; of its own soundings one in each cell that is ensonified.
     """
 
     def __init__(
@@ -104,23 +107,33 @@ class SwathFlight:
         spec: MissionSpec,
         members: list[Member],
         starts_m: FloatArray,
-        prior: FloatArray,
-        first_step: int,
+        so_far: SoFar,
     ) -> None:
         self._terrain, self._spec, self._members = floor.terrain, spec, members
         cell_m = swath_cell_m(spec, members, floor.terrain)
         self.builder = MapBuilder(spec.local_area(), cell_m, spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth)
-        self.builder.arrivals.replace(np.zeros((0, 4)), prior)
+        self.builder.arrivals.replace(np.zeros((0, 4)), so_far.prior)
+        if len(so_far.soundings):
+            east, north, depth, sd = so_far.soundings.T
+            self.builder.swath.add_placed(east, north, depth, Uncertainty(sd, np.zeros_like(sd), np.zeros_like(sd)))
         self.builder.build()
         self._cell_m = cell_m
-        self._constraints, self._planner = make_constraints(spec), make_planner(spec)
-        self.swarm = Swarm(spec, members, starts_m, first_step)
+        self._constraints, self._planner = make_constraints(spec), planner_of(spec, so_far)
+        self.swarm = Swarm(spec, members, starts_m, so_far.first_step)
         self._crafts = [
-            Craft(swath_sonar(member.spec), [start], [0.0])
-            for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
+            self._craft(member, start) for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)
         ]
         self._rng = np.random.default_rng([spec.seed, 1])
         self._specs = [member.spec for member in members]
+        for i in range(len(members)):
+            for end in self.swarm.legs_ahead(i):
+                self._fly_to(i, end, ahead=True)
+
+    def _craft(self, member: Member, start_m: FloatArray) -> Craft:
+        sonar = swath_sonar(member.spec)
+        apart_m = self._spec.speed_of(member.spec) / sonar.rate_hz if sonar else math.inf
+        spacing_m = max(apart_m, self._cell_m / BEAMS_A_CELL)
+        return Craft(sonar, [start_m], [0.0], position_sd_m(member), spacing_m, apart_m / spacing_m)
 
     @property
     def ways_m(self) -> list[FloatArray]:
@@ -131,6 +144,11 @@ class SwathFlight:
     def clocks_s(self) -> list[FloatArray]:
         """When each was there, (k,) seconds each."""
         return [np.array(craft.clock_s) for craft in self._crafts]
+
+    @property
+    def circled_m(self) -> FloatArray:
+        """How far each has come, (vehicles,), if it goes on in circles until the last one is done, as at sea."""
+        return self.swarm.circled_m(np.array([clock_s[-1] for clock_s in self.clocks_s]))
 
     def fly(self, over: Callable[[], bool]) -> bool:
         """Fly until nobody has way left or anything to do; return whether that was so before ``over`` was."""
@@ -169,25 +187,18 @@ class SwathFlight:
             craft.idle += 1
             swarm.clock_s[i] += IDLE_S
             return
-        craft.idle = 0
+        for other in self._crafts:
+            other.idle = 0
         self._fly_to(i, legs[0].target_m)
 
-    def _fly_to(self, i: int, end: FloatArray) -> None:
+    def _fly_to(self, i: int, end: FloatArray, *, ahead: bool = False) -> None:
         swarm, craft = self.swarm, self._crafts[i]
-        speed_mps = self._spec.speed_of(self._members[i].spec)
-        radius_m = max(swarm.radius_m(i), 0.5)
-        pose = np.array([*swarm.here[i, :2], swarm.heading_rad[i]])
-        way = turn_and_on(pose, end[:2], radius_m)
-        if math.isnan(pose[2]):
-            pose[2] = math.atan2(*(end[:2] - pose[:2]))
-        spacing_m = max(speed_mps / craft.sonar.rate_hz if craft.sonar else 0.0, self._cell_m / BEAMS_A_CELL)
-        at = np.append(np.arange(spacing_m, way.length_m, spacing_m), way.length_m)
-        poses = poses_along(pose, way, radius_m, at)
-        flown = np.column_stack([poses, np.full(len(poses), end[2])])
-        late = max(1, math.ceil(LEAD_S * speed_mps / spacing_m))
-        craft.unseen = flown[-late:]
-        self._ping(craft, flown[:-late])
-        swarm.flew(i, end, float(poses[-1, 2]), way.length_m)
+        self._take_in(craft)
+        flown = swarm.fly(i, end, ahead=ahead)
+        pinged = poses_apart(flown, craft.spacing_m) if craft.sonar else flown[:0]
+        late = max(1, math.ceil(LEAD_S * self._spec.speed_of(self._members[i].spec) / craft.spacing_m))
+        craft.unseen = pinged[-late:]
+        self._ping(craft, pinged[:-late])
         craft.corners_m.append(np.array(end[:2]))
         craft.clock_s.append(float(swarm.clock_s[i]))
 
@@ -203,45 +214,30 @@ class SwathFlight:
         """Sound from poses (n, 4) and take that in."""
         if craft.sonar is None or not len(poses):
             return
-        east, north, depth, sd = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
-        sd = np.maximum(self._spec.sounding_noise * sd, LEAST_SD_M)
-        self.builder.swath.add_placed(east, north, depth + sd * self._rng.standard_normal(len(sd)), sd)
+        east, north, depth, slant_m, down_m = swath_of(craft.sonar, poses, self._terrain, self._cell_m / BEAMS_A_CELL)
+        spec, noise_m = self._spec, np.maximum(self._spec.sounding_noise * slant_m, LEAST_SD_M)
+        went = BeamGeometry(np.arccos(np.clip(down_m / slant_m, 0.0, 1.0)), down_m, np.zeros_like(down_m))
+        sd = uncertainty(went, spec.uncertainty, np.full_like(down_m, craft.position_sd_m))
+        # Each beam stands for those beside it that are left out, whose errors average.
+        averaged = math.sqrt(min(craft.share * len(depth) / (len(poses) * craft.sonar.beams), 1.0))
+        depth = depth + averaged * noise_m * self._rng.standard_normal(len(depth))
+        self.builder.swath.add_placed(
+            east, north, depth, replace(sd, scattered_sd_m=np.maximum(averaged * sd.scattered_sd_m, LEAST_AVERAGED_M))
+        )
 
 
-def turn_and_on(pose: FloatArray, place_m: FloatArray, radius_m: float) -> Way:
-    """Return the shortest way from a pose (3,) to a place (2,): along a turning circle, then straight.
-
-    A pose without a heading (NaN) may begin in any.
-    """
-    away = place_m - pose[:2]
-    if math.isnan(pose[2]):
-        return Way("LSL", np.array([0.0, float(np.hypot(*away)), 0.0]))
-    best: Way | None = None
-    for word in ("LSL", "RSR"):
-        side = TURN[word[0]]
-        to_middle = side * radius_m * np.array([math.cos(pose[2]), -math.sin(pose[2])])
-        off = away - to_middle
-        off_m = float(np.hypot(*off))
-        if off_m < radius_m:
-            continue  # inside of this circle: the other one leads there
-        straight_m = math.sqrt(max(off_m**2 - radius_m**2, 0.0))
-        # Where the tangent from the place leaves the circle it heads for the place.
-        leaves_rad = math.atan2(off[0], off[1]) + side * math.asin(min(radius_m / off_m, 1.0))
-        turn_rad = (side * (leaves_rad - pose[2])) % math.tau
-        if turn_rad > math.tau - 1e-6:
-            turn_rad = 0.0
-        way = Way(word, np.array([radius_m * turn_rad, straight_m, 0.0]))
-        if best is None or way.length_m < best.length_m:
-            best = way
-    if best is None:
-        raise ValueError(f"no turn of {radius_m} m leads from {pose} to {place_m}")
-    return best
+def position_sd_m(member: Member) -> float:
+    """Return what a vehicle says of how well it knows its place; NaN: it does not say."""
+    if member.report is not None and member.report.position_sd_m is not None:
+        return member.report.position_sd_m
+    # Simulated ones do, before anyone has launched them.
+    return 0.0 if member.capabilities.simulated else math.nan
 
 
 def swath_of(
     sonar: SwathSonar, poses: FloatArray, terrain: Terrain, apart_m: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return what pings from poses (n, 4) meet, (m,) each: east, north, depth, and how long the way there is.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what pings from poses (n, 4) meet, (m,) each: east, north, depth, how long the way there is, and how deep.
 
     ``apart_m`` is how close beams lie on a flat bottom; closer ones are left out.
     """
@@ -258,7 +254,7 @@ def swath_of(
         down_m = np.maximum(depth - poses[:, 3, None], 0.0)
     slant_m = down_m * np.hypot(1.0, slope)
     met = np.isfinite(depth) & (depth > 0.0) & (slant_m <= sonar.range_m) & (down_m > 0.0)
-    return places[..., 0][met], places[..., 1][met], depth[met], slant_m[met]
+    return places[..., 0][met], places[..., 1][met], depth[met], slant_m[met], down_m[met]
 
 
 def sweep_over(
@@ -266,8 +262,7 @@ def sweep_over(
     spec: MissionSpec,
     members: list[Member],
     starts_m: FloatArray,
-    prior: FloatArray,
-    first_step: int,
+    so_far: SoFar,
     budget_s: float,
     stop: Callable[[], bool] = lambda: False,
 ) -> Flown:
@@ -280,10 +275,10 @@ def sweep_over(
     def over() -> bool:
         return stop() or time.thread_time() > until
 
-    flight = SwathFlight(floor, spec, members, starts_m, prior, first_step)
+    flight = SwathFlight(floor, spec, members, starts_m, so_far)
     swarm, builder = flight.swarm, flight.builder
     ended = flight.fly(over)
-    steps = max(spec.steps - first_step + 1, 0)
+    steps = max(spec.steps - so_far.first_step + 1, 0)
     newest = builder.newest
     done_pct = builder.coverage_pct()
     left_m = swarm.left_m.copy()
@@ -294,11 +289,13 @@ def sweep_over(
         whole = min(1.0 + float(left_m.sum()) / max(goes, 1.0), 100.0 / max(done_pct, 1.0))
     flown = Flown(
         duration_s=max(float(clock[-1]) for clock in flight.clocks_s) * whole,
-        distances_m={member.name: float(swarm.distance_m[i]) * whole for i, member in enumerate(members)},
+        distances_m={
+            member.name: float(way_m) * whole for member, way_m in zip(members, flight.circled_m, strict=True)
+        },
         coverage_pct=done_pct if ended else min(done_pct * whole, 100.0),
         remaining_pct=builder.remaining_pct() if ended else max(100.0 - done_pct * whole, 0.0),
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
-        steps=steps if ended else max(int(swarm.legs.max()) - first_step + 1, 0),
+        steps=steps if ended else max(int(swarm.legs.max()) - so_far.first_step + 1, 0),
     )
     swarm.left_m[:] = math.inf
     all_seen = ended and flight.fly(over)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.missions.forecast.ranges import HIGH, LOW, ForecastRange
+from app.missions.forecast.ranges import ForecastRange, range_of
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
@@ -169,9 +169,3 @@ def whole_view(flights: list[dict[str, WholeWay]], *, within_budget: bool) -> Wh
         vehicles=vehicles,
         within_budget=within_budget,
     )
-
-
-def range_of(values: list[float]) -> ForecastRange:
-    """Return from where to where figures of several floors go."""
-    low, high = (float(x) for x in np.quantile(values, [LOW, HIGH]))
-    return ForecastRange(low=low, high=high)

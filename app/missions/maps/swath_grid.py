@@ -68,21 +68,12 @@ class SwathGrid:
         if beams is None:
             return
         at = beams.footprints
-        with self._lock:
-            self._density.add(
-                at.east_m,
-                at.north_m,
-                at.depth_m,
-                beams.uncertainty.scattered_sd_m,
-                beams.uncertainty.shared_sd_m,
-                beams.uncertainty.horizontal_sd_m,
-            )
-            self.beams += len(at)
+        self.add_placed(at.east_m, at.north_m, at.depth_m, beams.uncertainty)
 
-    def add_placed(self, east_m: FloatArray, north_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray) -> None:
+    def add_placed(self, east_m: FloatArray, north_m: FloatArray, depth_m: FloatArray, sd: Uncertainty) -> None:
         """Take in beams, (n,) each, whose place on the bottom is known."""
         with self._lock:
-            self._density.add(east_m, north_m, depth_m, sd_m)
+            self._density.add(east_m, north_m, depth_m, sd.scattered_sd_m, sd.shared_sd_m, sd.horizontal_sd_m)
             self.beams += len(depth_m)
 
     def begin_anew(self) -> None:

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 
 from app.estimation.swath import SwathSonar
-from app.exploration.motion.dubins import poses_along
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.request import _view, _whole, starts_of
 from app.missions.forecast.simulate import Forecast, fly_over
-from app.missions.forecast.swarm import Flown
-from app.missions.forecast.swath_flight import swath_of, sweeps, turn_and_on
+from app.missions.forecast.swarm import Flown, SoFar, steered
+from app.missions.forecast.swath_flight import swath_of, sweeps
 from app.missions.forecast.whole_survey import batteries
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.service import MissionService
@@ -41,7 +40,7 @@ def level(depth_m: float, side_m: float) -> Floor:
 def flown(spec: MissionSpec, floor: Floor, prior: np.ndarray = NONE, budget_s: float = AMPLE_S) -> Flown:
     team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
-    return fly_over(floor, spec, members, starts_of(spec, members)[0], prior, 1, budget_s)
+    return fly_over(floor, spec, members, starts_of(spec, members)[0], SoFar(prior=prior), budget_s)
 
 
 async def test_a_forecast_flies_a_survey_with_swath_sonars_and_tells_what_all_of_it_takes(
@@ -156,24 +155,26 @@ def test_a_battery_lasts_for_the_way_out_its_part_of_the_way_and_the_way_back(
 def test_a_vehicle_turns_in_its_circle_and_comes_where_it_is_sent(
     heading: float, east: float, north: float, radius: float
 ) -> None:
-    pose, place = np.array([3.0, -2.0, heading]), np.array([3.0 + east, -2.0 + north])
-    way = turn_and_on(pose, place, radius)
-    end = poses_along(pose, way, radius, np.array([way.length_m]))[0]
-    np.testing.assert_allclose(end[:2], place, atol=1e-3)
-    assert way.length_m >= math.hypot(east, north) - 1e-3
-    assert way.length_m <= math.hypot(east, north) + 2.0 * math.pi * radius + 2.0 * radius
+    end = 3.0 + east, -2.0 + north
+    poses, way_m = steered((3.0, -2.0, heading), end, radius, 1.0)
+    assert math.hypot(poses[-1, 0] - end[0], poses[-1, 1] - end[1]) <= max(8.0, 2.0 * radius)
+    pieces_m = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    assert way_m == pytest.approx(pieces_m.sum())
+    assert (np.abs(np.diff(poses[:, 2])) <= pieces_m / radius + 1e-6).all()
+    assert math.hypot(east, north) - 9.0 <= way_m <= math.hypot(east, north) + 4.0 * math.pi * radius + 1.0
 
 
 def test_beams_meet_the_floor_as_far_aside_as_the_sonar_reaches() -> None:
     sonar = SwathSonar(math.radians(120.0), 256, 5.0, 100.0)
     poses = np.array([[100.0, 100.0, 0.0, 2.0]])
     flat = Terrain(np.full((60, 60), 12.0), 5.0)
-    east, north, depth, slant = swath_of(sonar, poses, flat, 1.0)
+    east, north, depth, slant, down = swath_of(sonar, poses, flat, 1.0)
     np.testing.assert_allclose(depth, 12.0)
     np.testing.assert_allclose(north, 100.0)
     assert east.min() == pytest.approx(100.0 - 10.0 * math.tan(math.radians(60.0)))
     assert east.max() == pytest.approx(100.0 + 10.0 * math.tan(math.radians(60.0)))
     assert slant.max() == pytest.approx(20.0)
+    np.testing.assert_allclose(down, 10.0)
     short = SwathSonar(math.radians(120.0), 256, 5.0, 15.0)
     assert np.abs(swath_of(short, poses, flat, 1.0)[0] - 100.0).max() <= math.sqrt(15.0**2 - 10.0**2) + 1e-6
 
