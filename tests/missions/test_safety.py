@@ -14,7 +14,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
 from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
-from app.missions.safety import free_space, travel_depth, waypoint_check
+from app.missions.safety import free_space, tide_and_bottom, travel_depth, waypoint_check
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
 from tests.support.missions.specs import make_spec, rectangle
 
@@ -368,4 +368,4 @@ def test_where_there_is_no_room_for_a_circle_none_is_given(
     ("water_level_m", "below_m"), [(0.0, 10.0), (-1.5, 8.5), (2.0, 10.0)], ids=["datum", "low water", "high water"]
 )
 def test_depths_below_the_surface_are_on_the_safe_side(water_level_m: float, below_m: float) -> None:
-    assert travel_depth.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)
+    assert tide_and_bottom.below_surface_m(np.array([10.0]), water_level_m) == pytest.approx(below_m)

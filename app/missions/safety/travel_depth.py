@@ -1,4 +1,4 @@
-"""How deep vehicles travel: what the bottom, as it may be, and the water's level leave them."""
+"""How deep vehicles travel: what the bottom, as it may be, leaves them."""
 
 import math
 from collections.abc import Sequence
@@ -18,8 +18,6 @@ CLIMB = 0.1
 WAY_SPACING_M = 5.0
 DEPTH_TOLERANCE_M = 0.25
 """A vehicle that keeps its layer may be this much deeper than asked."""
-UNCERTAINTY_FACTOR = 2.0
-"""The bottom is taken to be this many standard deviations shallower than estimated."""
 
 
 def travel_depth_m(
@@ -125,20 +123,3 @@ def bottom_on_way(way: FloatArray, bottom: Bottom) -> FloatArray:
     depths = bottom.at(places)
     known = np.isfinite(depths)
     return np.column_stack([places[known], depths[known]])
-
-
-def below_surface_m(depth_m: FloatArray, water_level_m: float) -> FloatArray:
-    """Return depths below the datum as depths below the water's surface now, on the safe side.
-
-    Vehicles count their depth from the surface. Water below the datum leaves them less room; the room that water above
-    it would give is not used, for it goes again.
-
-    Parameters
-    ----------
-    depth_m
-        Below the datum, positive down.
-    water_level_m
-        How high the water stands above the datum: :meth:`.Corrections.water_level_m`, which
-        knows of tide tables and datum offsets.
-    """
-    return depth_m + min(water_level_m, 0.0)

@@ -23,6 +23,7 @@ from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions.flight.decisions.zone_clearance import room_around
 from app.missions.safety import free_space, travel_depth, waypoint_check
+from app.missions.safety.tide_and_bottom import BottomNow
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec import mission
 from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec
@@ -258,7 +259,8 @@ def decide(
     if not team:
         return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
 
-    floor = _Floor.of(knowledge)
+    belief = knowledge.belief
+    floor = BottomNow.of(belief.xy_m, belief.depth_m, belief.sd_m, knowledge.water_level_m)
     origin = np.array([[*p.en_m, p.travel_depth_m(p.en_m, p.en_m, floor.cautious, constraints)] for p in team])
     up, fixes = surfacing(team, spec.surface_policy)
     for i, place in enumerate(team):
@@ -351,24 +353,6 @@ def from_outside(place_m: FloatArray, area: Polygon, spec: MissionSpec) -> bool:
     return free_space.distance_outside_m(area, place_m) > NEARBY_OUTSIDE_M + spec.limits.border_margin_m
 
 
-@dataclass(frozen=True)
-class _Floor:
-    """The sea floor below the surface as it is now."""
-
-    likely: Bottom
-    """As the map estimates it."""
-    cautious: Bottom
-    """Two deviations shallower."""
-
-    @classmethod
-    def of(cls, knowledge: Knowledge) -> "_Floor":
-        """Return the sea floor that a map tells of, at this level of the water."""
-        belief = knowledge.belief
-        depth_m = travel_depth.below_surface_m(belief.depth_m, knowledge.water_level_m)
-        shallow_m = np.where(np.isfinite(belief.sd_m), depth_m - travel_depth.UNCERTAINTY_FACTOR * belief.sd_m, np.nan)
-        return cls(Bottom.from_landmarks(belief.xy_m, depth_m), Bottom.from_landmarks(belief.xy_m, shallow_m))
-
-
 def _situation(
     step: int,
     spec: MissionSpec,
@@ -400,7 +384,7 @@ def _situation(
 
 
 def _flyable(
-    place: Place, origin: FloatArray, proposed: FloatArray, rises: bool, floor: _Floor, constraints: Constraints
+    place: Place, origin: FloatArray, proposed: FloatArray, rises: bool, floor: BottomNow, constraints: Constraints
 ) -> FloatArray:
     """Return where a vehicle is sent instead of a proposed position (3,): in its depth, its step, and its way left."""
     target = proposed.copy()

@@ -20,6 +20,7 @@ from app.missions.live.mission import RISES, LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.safety import free_space, travel_depth
+from app.missions.safety.tide_and_bottom import FallingTide
 from app.missions.spec.mission import Guidance, MissionSpec
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
@@ -64,21 +65,16 @@ class LegCommit:
         self._live = live
         self._constraints = constraints
         self._leads = leads
-        self._bottom, self._below_datum_m = Bottom.unknown(), 0.0
+        self._tide = FallingTide(lambda: live.gate.corrections.water_level_m(now().timestamp()))
 
     @property
     def bottom(self) -> Bottom:
         """The pessimistic sea floor of the last decision; less deep by what the water has fallen since."""
-        fallen_m = self._water_below_datum_m() - self._below_datum_m
-        return replace(self._bottom, depth_m=self._bottom.depth_m - fallen_m) if fallen_m > 0.0 else self._bottom
+        return self._tide.bottom
 
     def take_bottom(self, bottom: Bottom) -> None:
         """Go by another sea floor, below the surface as it is now."""
-        self._bottom, self._below_datum_m = bottom, self._water_below_datum_m()
-
-    def _water_below_datum_m(self) -> float:
-        level_m = self._live.gate.corrections.water_level_m(now().timestamp())
-        return -float(travel_depth.below_surface_m(np.zeros(1), level_m)[0])
+        self._tide.take(bottom)
 
     async def commit(self, decision: Decision, numbers: dict[str, int]) -> None:
         """Make a decision durable, its legs and the planner's memory together; then the vehicles have these legs ahead.
