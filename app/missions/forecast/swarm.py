@@ -139,7 +139,9 @@ class Swarm:
         self._radius_m = np.array([max(turn_radius_m(spec, member.spec), LEAST_RADIUS_M) for member in members])
         n = len(members)
         self.here = np.column_stack([starts_m, np.zeros(n)])
-        self.heading_rad = np.array([np.nan if m.report is None else m.report.heading_rad for m in members])
+        # Not everyone tells where it heads.
+        headings = [None if m.report is None else m.report.heading_rad for m in members]
+        self.heading_rad = np.array([np.nan if heading is None else heading for heading in headings])
         self._poses = [
             (float(start[0]), float(start[1]), float(heading))
             for start, heading in zip(starts_m, self.heading_rad, strict=True)

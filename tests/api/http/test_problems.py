@@ -58,7 +58,7 @@ def assert_problem(answer: httpx.Response, status: int, kind: str) -> dict[str, 
         ({"name": ""}, "name", "at least 1 character"),
         ({"name": None}, "name", "text in quotes"),
         ({"seed": -1}, "seed", "a number ≥ 0"),
-        ({"colour": "red"}, "colour", "one of accuracy_m, area"),
+        ({"colour": "red"}, "colour", "one of accuracy_m, after, area"),
     ],
 )
 async def test_a_wrong_value_is_named_with_what_would_be_right(

@@ -2,13 +2,14 @@
 
 import asyncio
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from app.missions.errors import ConflictError, InvalidRequestError
-from app.missions.fleet.interface import Position
+from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
@@ -194,6 +195,14 @@ def test_a_forecast_on_the_way_goes_on_from_what_was_sounded() -> None:
     assert anew.coverage_pct < 100.0
     floors = list(floors_of(spec, sounded, 4.0, None))
     assert max(float(np.abs(floor.terrain.z_m[5:10, 5:10] - 10.0).max()) for floor in floors) < 0.5
+
+
+def test_vehicles_that_do_not_tell_where_they_head_are_foretold() -> None:
+    spec = lines()
+    report = VehicleReport("a", 0.0, Position(41.185, -8.705, 0.0))
+    members = [replace(member, report=report) for member in team_of(spec)]
+    starts, _ = request.starts_of(spec, members)
+    assert fly_over(level(10.0), spec, members, starts, SoFar(), 60.0).duration_s > 0.0
 
 
 def test_legs_that_vehicles_have_already_are_flown_first_and_cost_no_budget() -> None:

@@ -1,6 +1,6 @@
 import "./ProfilePane.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { useLayoutEffect } from "preact/hooks";
 import { api } from "../../api/client";
 import type { LngLat, ProfileView } from "../../api/types";
 import {
@@ -163,7 +163,8 @@ function LineField({ line }: { line: readonly LngLat[] }) {
   const shown = lineTyped(line);
   // What is being typed stays, whatever else of the page is drawn meanwhile.
   const text = useSignal(shown);
-  useEffect(() => {
+  // At once: later it would take away what was typed first.
+  useLayoutEffect(() => {
     text.value = shown;
     wrong.value = false;
   }, [shown]);
