@@ -28,7 +28,7 @@ from app.api import logs
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.metrics import PACKETS_DROPPED
-from app.missions.operations.history import events_after, soundings_of
+from app.missions.operations.history import events_after
 from app.missions.operations.imports.log_import import import_log
 from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
@@ -43,6 +43,7 @@ from imc_bridge import BridgeSettings, NodeState, Sounding, StateReport
 from imc_bridge.logs import VehicleLog
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
+from tests.support.missions.stored_soundings import soundings_of
 
 ORIGIN = (41.185, -8.705)
 SIDE_M = 120.0

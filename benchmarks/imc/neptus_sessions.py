@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from app.missions.operations.history import soundings_of
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.views.measurements.soundings import Verdict
 from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import IMC, make_parser, write_section
 from simulator.floors.terrain import Terrain
 from simulator.floors.terrain_files import load_terrain
+from tests.support.missions.stored_soundings import soundings_of
 from tests.support.neptus.gateway import SESSION, Gateway
 from tests.support.neptus.panel import DVL, FORWARD, Auv, RealPanel
 from tests.support.ports import free_ports

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from app.missions.maps.builder import make_grid
-from app.missions.operations.history import soundings_of
 from app.missions.states import MissionState
 from app.missions.views.measurements.soundings import Verdict
 from imc_bridge.neptus import SessionRefusedError
 from tests.support.missions.harbour import act
+from tests.support.missions.stored_soundings import soundings_of
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
 from tests.support.neptus.panel import ALTIMETER, DVL, FORWARD, NEAR_M, Auv, RealPanel
 from tests.support.waiting import until

@@ -31,7 +31,7 @@ from app.missions.errors import (
 from app.missions.fleet.interface import LinkState, WaypointStatus
 from app.missions.live.watchers import feed
 from app.missions.maps.products import PRODUCTS
-from app.missions.operations.history import events_after, soundings_of, telemetry_of
+from app.missions.operations.history import events_after, telemetry_of
 from app.missions.operations.maps.mission_maps import export, newest_map
 from app.missions.operations.measurements import measure
 from app.missions.operations.polling import waypoint
@@ -58,6 +58,7 @@ from tests.support.missions.harbour import (
     view_of,
 )
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
+from tests.support.missions.stored_soundings import soundings_of
 from tests.support.waiting import until
 
 S = MissionState

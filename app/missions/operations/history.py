@@ -1,7 +1,5 @@
 """What a mission did: its steps, its log, and what its vehicles told and measured; where it is long, page by page."""
 
-from collections.abc import Sequence
-
 from app.missions.errors import TargetNotFoundError
 from app.missions.live.journals.journal import event_view
 from app.missions.live.mission import LiveMission
@@ -9,10 +7,8 @@ from app.missions.views.measurements.soundings import Verdict
 from app.missions.views.mission import EventView, Level, StepView, WaypointView
 from app.missions.views.targets import TargetRangePage, TargetRangeView
 from app.missions.views.telemetry import TelemetryView, telemetry_view
-from app.storage.models import SoundingRow
 from app.storage.queries import events as event_queries
 from app.storage.queries import missions as mission_queries
-from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import target_ranges as range_queries
 from app.storage.queries import telemetry as telemetry_queries
 
@@ -61,13 +57,6 @@ async def telemetry_of(live: LiveMission, points: int) -> TelemetryView:
     async with live.database.reading() as session:
         rows = await telemetry_queries.samples(session, live.id, points)
     return telemetry_view(rows)
-
-
-async def soundings_of(live: LiveMission) -> Sequence[SoundingRow]:
-    """Return every sounding, rejected ones included, in the order they came."""
-    await live.journal.flush()
-    async with live.database.reading() as session:
-        return await sounding_queries.all_soundings(session, live.id)
 
 
 async def target_ranges_page(

@@ -153,12 +153,6 @@ async def extent(session: AsyncSession, mission_id: str, verdict: str) -> Extent
     return Extent(first_s, last_s, worst_m if stated == number else None) if number else None
 
 
-async def all_soundings(session: AsyncSession, mission_id: str) -> Sequence[SoundingRow]:
-    """Return every sounding, rejected ones included, in the order they came."""
-    query = select(SoundingRow).where(SoundingRow.mission_id == mission_id).order_by(SoundingRow.id)
-    return (await session.scalars(query)).all()
-
-
 def columns_query(mission_id: str, names: Sequence[str]) -> Select[*tuple[Any, ...]]:
     """Return the query of some columns, numbers and texts, of every sounding, in the order they came."""
     columns = [getattr(SoundingRow, name) for name in names]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from app.missions.operations.history import events_after, soundings_of
+from app.missions.operations.history import events_after
 from app.missions.operations.imports.log_import import import_log
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec, VehicleSpec
@@ -16,6 +16,7 @@ from imc_bridge import NodeState, Sounding
 from imc_bridge.logs import VehicleLog
 from tests.support.imc.sea import open_sea
 from tests.support.missions.harbour import Harbour, act, view_of
+from tests.support.missions.stored_soundings import soundings_of
 from tests.support.waiting import until
 
 SPEED = 20.0

@@ -37,7 +37,7 @@ async def test_a_sounding_is_known_by_vehicle_time_and_beam(database: Database) 
         assert await sounding_queries.insert_new(session, [sounding("m2")]) == {("a", 1.0, 0)}
         assert await sounding_queries.insert_new(session, []) == set()
     async with database.reading() as session:
-        rows = await sounding_queries.all_soundings(session, "m1")
+        rows = await sounding_queries.soundings_after(session, "m1", 0, 100)
     assert [(r.vehicle, r.time_s, r.beam) for r in rows] == [
         ("a", 1.0, 0),
         ("a", 1.0, 1),

@@ -17,11 +17,11 @@ import pytest
 
 from app.api.accounts.tokens import Role, TokenStore
 from app.missions.fleet.links.neptus import GATHER_S, gateway_settings
-from app.missions.operations.history import soundings_of
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.settings import NeptusSettings
 from app.missions.states import MissionState
 from tests.support.missions.harbour import act, view_of
+from tests.support.missions.stored_soundings import soundings_of
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
 from tests.support.waiting import until
 
