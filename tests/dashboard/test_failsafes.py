@@ -175,6 +175,11 @@ def view(scene: Scene, mission: str) -> dict[str, Any]:
     return found
 
 
+def depth_m(scene: Scene, vehicle: str) -> float:
+    [depth] = [v["depth_m"] for v in view(scene, scene.mission)["vehicles"] if v["name"] == vehicle]
+    return float(depth)
+
+
 def come_close(scene: Scene) -> None:
     there = POSTING["its_neighbour"]
     scene.tell("separation_lost", (there[0] - 1.0, there[1]))
@@ -183,6 +188,8 @@ def come_close(scene: Scene) -> None:
 
 def a_ship_comes(scene: Scene) -> None:
     scene.tell("traffic", depth_m=0.0)
+    # Told of while the vehicle is below, she comes close where it comes up; the alarm keeps these words.
+    scene.wait(lambda: depth_m(scene, "traffic") == 0.0, "the vehicle is up")
     lon, lat = lon_lat(*POSTING["traffic"])
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for _ in range(3):

@@ -240,8 +240,11 @@ function followDraft(chart: Chart): () => void {
     if (corners === shown) return;
     shown = corners;
     clearTimeout(typing);
-    // What is drawn or dragged on the map is in sight already.
-    if (areas.length > 0 && !drawing.peek()) typing = setTimeout(() => chart.goToDraft(overlaid), TYPED_MS);
+    const goTo = () => {
+      // What is drawn or dragged on the map is in sight already, and the map stays where corners are clicked.
+      if (!drawing.peek()) chart.goToDraft(overlaid);
+    };
+    if (areas.length > 0 && !drawing.peek()) typing = setTimeout(goTo, TYPED_MS);
   });
   return () => {
     clearTimeout(typing);
