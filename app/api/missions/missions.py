@@ -16,7 +16,8 @@ from app.missions.operations import history
 from app.missions.preflight.survey import preflight
 from app.missions.running.homecoming import call_home, hold
 from app.missions.running.mission_views import action_view, mission_view
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import Action
 from app.missions.views.mission import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 from app.missions.views.telemetry import TelemetryView

@@ -12,8 +12,8 @@ from app.missions.operations.corrections import adjustment, recorrection
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
 from app.missions.operations.maps.mission_maps import newest_map
-from app.missions.spec.mission import SoundSpeed
 from app.missions.spec.systematic_errors import SystematicErrors
+from app.missions.spec.water import SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
 from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection
 from app.missions.views.measurements.systematic_errors import SystematicErrorsView

@@ -14,7 +14,8 @@ from app.missions.live.mission import RISES, LiveMission, StoredMission, builder
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import ENDED
 from app.missions.targets.filters import warm_up as tracking_warm_up
 from app.missions.team import Withdrawal

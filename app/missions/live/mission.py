@@ -63,8 +63,9 @@ from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.failsafes import Response
-from app.missions.spec.mission import MissionSpec, VehicleSpec
-from app.missions.spec.mission import Sensor as SensorName
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import Sensor as SensorName
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views

@@ -27,7 +27,7 @@ from app.missions.fleet.links.imc import ImcFleetLink
 from app.missions.fleet.links.rest import RestFleetLink, horizontal_distance_m
 from app.missions.fleet.links.sim import Launch, SimFleetLink
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor
+from app.missions.spec.vehicle import Sensor
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState

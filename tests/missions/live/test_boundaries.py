@@ -12,7 +12,7 @@ from app.missions.preflight.survey import preflight
 from app.missions.safety.free_space import WAITING_CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor, VehicleKind
+from app.missions.spec.vehicle import Sensor, VehicleKind
 from app.missions.views.mission import CheckStatus, EventView, Level
 from simulator.equipment import Equipment
 from simulator.floors.seafloors import generate

@@ -10,7 +10,7 @@ from app.missions.fleet.interface import Position, VehicleReport, WaypointOrder,
 from app.missions.live.ships import RELEASE, ShipsAbout
 from app.missions.settings import AisSettings
 from app.missions.spec.failsafes import Response
-from app.missions.spec.mission import VehicleSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import CommittedLeg, Member, Team, Withdrawal
 from app.missions.traffic.sentences import ShipParticulars, ShipPosition
 from app.missions.traffic.watch import Traffic

@@ -11,7 +11,8 @@ from app.mapping.s44 import Order
 from app.missions.report import charts, sections
 from app.missions.report.texts import NONE, Language, Texts, catalogue, placeholders
 from app.missions.spec.failsafes import Failsafe, Response
-from app.missions.spec.mission import MissionKind, Sensor, VehicleKind
+from app.missions.spec.mission import MissionKind
+from app.missions.spec.vehicle import Sensor, VehicleKind
 from app.missions.states import MissionState
 
 GROUPS: dict[str, Iterable[str]] = {

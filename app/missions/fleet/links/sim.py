@@ -36,9 +36,9 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor
-from app.missions.spec.sonar import SwathSonarSpec
+from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.targets import TargetSpec
+from app.missions.spec.vehicle import Sensor
 from simulator.equipment import Equipment
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
