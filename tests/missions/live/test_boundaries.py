@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from app.missions.alarm_kinds import AlarmKind
-from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.flight.decisions.decision import make_constraints
 from app.missions.live.boundaries import Boundaries
 from app.missions.operations.history import events_after

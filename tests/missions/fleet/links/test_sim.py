@@ -21,7 +21,8 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.sim import FORSAKEN_S, Launch, SimFleetLink
+from app.missions.fleet.links.sim import FORSAKEN_S, SimFleetLink
+from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleSpec
