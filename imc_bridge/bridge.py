@@ -29,6 +29,7 @@ from imc_bridge.network.drops import DropMeter
 from imc_bridge.network.transport import Address, Transport
 from imc_bridge.nodes.node import Node
 from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.status import status_of
 from imc_bridge.receiver import Hearing
 from imc_bridge.sender import Speaker
 from imc_bridge.settings import BridgeSettings
@@ -328,7 +329,7 @@ class Bridge:
 
     async def _stop(self, node: Node, timeout_s: float) -> StopResult:
         vehicle, control = node.name, self._crew.of(node)
-        if node.status(self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
+        if status_of(node, self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
             # It is out of reach, and is stopped when its packets arrive again.
             timeout_s = min(timeout_s, SILENT_STOP_WALL_S)
         control.begin_stop(self._now())
@@ -337,7 +338,7 @@ class Bridge:
             waited = self._clock() - begun
             if waited >= timeout_s:
                 control.give_up_stop(self._now())
-                reason = node.status(self._now()).reason
+                reason = status_of(node, self._now()).reason
                 return StopResult(
                     vehicle,
                     False,
