@@ -25,7 +25,8 @@ from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
-from app.missions.live.mission import Ending, LiveMission
+from app.missions.live.header import Ending
+from app.missions.live.mission import LiveMission
 from app.missions.operations.corrections.recorrection import check_level_is_known
 from app.missions.operations.imports.imports import Imports
 from app.missions.operations.imports.reading import Reader

@@ -9,8 +9,9 @@ from app.mapping.water.tides import parse_tid
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flown import Flown
-from app.missions.live.journals.journal import Counts
-from app.missions.live.mission import RISES, LiveMission, StoredMission, builder_of
+from app.missions.live.header import StoredMission
+from app.missions.live.journals.journal import RISES, Counts
+from app.missions.live.mission import LiveMission, builder_of
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment

@@ -16,7 +16,8 @@ from app.missions import metrics
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decisions.decision import Decision, Leg, turn_radius_m
-from app.missions.live.mission import RISES, LiveMission
+from app.missions.live.journals.journal import RISES
+from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.safety import free_space, travel_depth
