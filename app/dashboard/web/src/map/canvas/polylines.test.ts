@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
+import { labelPlaces, type Pixel, simplified } from "./polylines";
 import { moved, Projection } from "./projection";
-import { labelPlaces, type Pixel, simplified } from "./strokes";
 
 const thin = (points: Pixel[], tolerance = 0.4) =>
   simplified(points.length, (i) => points[i] as Pixel, tolerance);

@@ -15,7 +15,7 @@ import {
   rangeWords,
   sonarWords,
   vehicleState,
-} from "./words";
+} from "./stateNames";
 
 describe("numbers", () => {
   it.each([

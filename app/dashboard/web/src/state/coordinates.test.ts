@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { placeOf, typedPlace } from "./place";
+import { placeOf, typedPlace } from "./coordinates";
 
 it.each([
   ["41.1852, -8.7046", 1e-12],

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Pace, shuffled } from "./pace";
+import { Pace, shuffled } from "./levelOfDetail";
 
 describe("what is drawn while it is turned", () => {
   it("is everything where pictures come quickly", () => {

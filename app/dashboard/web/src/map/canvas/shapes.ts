@@ -1,8 +1,8 @@
 /** Lines and rings of places on a sheet. */
 
 import type { LngLat, Place } from "../../api/types";
+import { simplified } from "./polylines";
 import type { Projection } from "./projection";
-import { simplified } from "./strokes";
 
 export interface Stroke {
   colour: string;

@@ -1,9 +1,9 @@
 /** How much room the map has: what lies over it, and how wide the operator made the panels. */
 
 import { computed, effect, signal } from "@preact/signals";
-import { kept } from "../../kept";
 import type { Padding } from "../../map/canvas/chart";
 import type { Box } from "../../map/canvas/labels";
+import { kept } from "../../persistentSignal";
 import { mission, now, panelOpen, stripHeight, tab } from "../../state/store";
 
 /** What lies over the map, in its pixels. */

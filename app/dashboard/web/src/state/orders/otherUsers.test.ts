@@ -29,7 +29,7 @@ const EVENTS = [
 
 describe("what others command", () => {
   it("is the last that somebody else did since the page looks", async () => {
-    const { commandOfOthers } = await import("./others");
+    const { commandOfOthers } = await import("./otherUsers");
     expect(commandOfOthers(EVENTS, 3, "Rui")?.id).toBe(7);
     expect(commandOfOthers(EVENTS, 3, "Ana")?.id).toBe(5);
     expect(commandOfOthers(EVENTS, 5, "Ana")).toBeUndefined();
@@ -37,7 +37,7 @@ describe("what others command", () => {
   });
 
   it("is told with who did it", async () => {
-    const { commandWords } = await import("./others");
+    const { commandWords } = await import("./otherUsers");
     expect(EVENTS.filter(({ data }) => data.actor).map(commandWords)).toEqual([
       "Ana set the mission running",
       "Rui paused the mission",
