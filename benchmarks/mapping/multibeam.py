@@ -16,7 +16,7 @@ from pathlib import Path
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.types import MapExtent, ReadOptions
 from app.mapping.types import Grid
-from app.missions.operations.imports.reading import Reader
+from app.missions.operations.imports.reader_process import Reader
 from app.missions.operations.imports.uploads import open_upload
 from benchmarks.common.report import LOAD, make_parser, write_section
 from tests.support.multibeam import line, write_gsf, write_kmall

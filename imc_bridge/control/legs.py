@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from imc_bridge.control.acoustics import SoundPath, SoundReport
 from imc_bridge.control.control import Control, Phase
+from imc_bridge.control.distances import Place, distance_m
 from imc_bridge.control.orders import Order
-from imc_bridge.control.places import Place, distance_m
 from imc_bridge.control.plans import (
     NEARNESS_S,
     OPERATION_START,

@@ -31,7 +31,7 @@ class Arrival:
     stale: tuple[Address, ...] = ()
 
 
-class Roster:
+class NodeRegistry:
     """The nodes of the network.
 
     Parameters

@@ -1,8 +1,8 @@
 import httpx
 import pytest
 
-from bathyfleet.client.patience import LONGEST_S, Attempts
 from bathyfleet.client.problems import BusyError, ConflictError, UnreachableError
+from bathyfleet.client.retry import LONGEST_S, Attempts
 
 LOST = httpx.ReadError("lost")
 

@@ -1,4 +1,4 @@
-"""Who is told of alarms in tests: real servers of HTTP, mail and MQTT; and a desk to tell them."""
+"""Who is told of alarms in tests: real servers of HTTP, mail and MQTT; and a dispatcher to tell them."""
 
 import http.server
 import json
@@ -21,7 +21,7 @@ from aiosmtpd.smtp import AuthResult, LoginPassword
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarm_settings import AlarmSettings
-from app.missions.alarms.desk import AlarmDesk
+from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.alarms.raised import make_alarm
 from app.missions.views.alarms import AlarmReport
 from app.storage.database import Database
@@ -191,9 +191,9 @@ def told_by(*hooks: Hook, **changes: Any) -> AlarmSettings:
 
 @dataclass
 class Watch:
-    """A desk that looks when it is told to, on a clock that is moved by hand."""
+    """A dispatcher that looks when it is told to, on a clock that is moved by hand."""
 
-    desk: AlarmDesk
+    dispatcher: AlarmDispatcher
     database: Database
     clock: Clock
     number: int
@@ -203,7 +203,7 @@ class Watch:
         row = make_alarm(kind, "m1", f"{vehicle} is lost: silent", self.clock(), vehicle=vehicle)
         async with self.database.writing() as session:
             session.add(row)
-        self.desk.stored(row)
+        self.dispatcher.stored(row)
         return row
 
     async def end(self, row: AlarmRow) -> None:
@@ -213,26 +213,26 @@ class Watch:
 
     async def look(self) -> None:
         """Look, wait for what was sent, and write down what came of it."""
-        await self.desk.look()
+        await self.dispatcher.look()
         await self.sent()
-        await self.desk.look()
+        await self.dispatcher.look()
 
     async def sent(self) -> None:
         """Wait until nothing is being sent."""
-        await until(lambda: not self.desk.sending, "everything was sent")
+        await until(lambda: not self.dispatcher.sending, "everything was sent")
 
     async def report(self, row: AlarmRow) -> AlarmReport:
-        return await self.desk.alarm(row.id)
+        return await self.dispatcher.alarm(row.id)
 
 
 async def open_watch(database: Database, settings: AlarmSettings, clock: Clock) -> Watch:
-    """Return a desk of one more process on a database with mission m1."""
+    """Return a dispatcher of one more process on a database with mission m1."""
     async with database.writing() as session:
         process = ProcessRow(url="http://127.0.0.1:1", secret="e" * 64, certificate=None, began_at=clock())
         session.add(process)
         await session.flush()
         number = process.id
-    return Watch(AlarmDesk(settings, database, lambda: number, now=clock), database, clock, number)
+    return Watch(AlarmDispatcher(settings, database, lambda: number, now=clock), database, clock, number)
 
 
 async def with_mission(database: Database) -> None:
@@ -242,9 +242,9 @@ async def with_mission(database: Database) -> None:
 
 
 async def end_of_process(watch: Watch) -> None:
-    """End a desk and bury its process, as a process that ends or is killed is buried."""
+    """End a dispatcher and bury its process, as a process that ends or is killed is buried."""
     from app.storage.processes import processes
 
-    await watch.desk.close()
+    await watch.dispatcher.close()
     async with watch.database.writing() as session:
         await processes.bury(session, [watch.number])

@@ -18,7 +18,7 @@ from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.base import settle
 
 
-class Trier(ABC):
+class MoveOracle(ABC):
     """Stands where a planner stands. The switches of the objective follow what the team really achieved."""
 
     def __init__(self, world: World, rng: np.random.Generator, terms: Terms = "full") -> None:
@@ -56,7 +56,7 @@ class Trier(ABC):
         return world.evaluate(positions, landmarks, before, self._progress, weights)
 
 
-class GradientTrier(Trier):
+class GradientOracle(MoveOracle):
     """SPSA or FDSA as the papers fly them: every perturbed configuration is really tried.
 
     A perturbed configuration that breaks a constraint is not flown; the team stays instead.

@@ -15,9 +15,9 @@ from affine import Affine
 from netCDF4 import Dataset
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.readers.endings import ENC, GSF, KMALL, NETCDF, PACKED, S102, TEXT
+from app.mapping.readers.file_extensions import ENC, GSF, KMALL, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.files import read_file
-from app.mapping.readers.placing import place_reference, place_soundings
+from app.mapping.readers.georeferencing import place_reference, place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid

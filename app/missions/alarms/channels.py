@@ -39,7 +39,7 @@ def signature(secret: SecretStr, message_id: str, at: datetime, body: bytes) -> 
     }
 
 
-class Ways:
+class Channels:
     """Everything that can be told by, as the settings have it."""
 
     def __init__(self, settings: AlarmSettings) -> None:

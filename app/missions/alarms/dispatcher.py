@@ -1,4 +1,4 @@
-"""The desk where alarms arrive, go out and are acknowledged: one in each process, together one for all of them."""
+"""Where alarms arrive, go out and are acknowledged: one in each process, together one for all of them."""
 
 import asyncio
 import random
@@ -15,9 +15,9 @@ from app.missions import clock, metrics
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.missions.alarm_settings import AlarmSettings
 from app.missions.alarms import outbox
+from app.missions.alarms.channels import Channels, DeliveryError
 from app.missions.alarms.outbox import Attempt
 from app.missions.alarms.raised import AlarmBoard, alarm_view, make_alarm
-from app.missions.alarms.ways import DeliveryError, Ways
 from app.missions.errors import AlarmNotFoundError, InvalidRequestError
 from app.missions.views.alarms import AlarmReport, AlarmState, DeliveryState, DeliveryView, Notice
 from app.storage.concurrency.uncancellable import to_the_end
@@ -41,7 +41,7 @@ CLOSING_S = 2.0
 log = structlog.get_logger(__name__)
 
 
-class AlarmDesk:
+class AlarmDispatcher:
     """Tells whoever is to be told, and keeps who acknowledged.
 
     Parameters
@@ -68,7 +68,7 @@ class AlarmDesk:
         self._process = process
         self._now = now
         self._chance = chance or random.Random()  # noqa: S311 - nothing secret
-        self._ways = Ways(settings)
+        self._channels = Channels(settings)
         self._boards: WeakValueDictionary[str, AlarmBoard] = WeakValueDictionary()
         self._names: dict[str, str] = {}
         self._unstored: dict[str, tuple[AlarmRow, datetime]] = {}
@@ -194,7 +194,7 @@ class AlarmDesk:
     # What goes out
 
     def start(self) -> None:
-        """Keep the desk from now on."""
+        """Keep at it from now on."""
         self._keepers = [
             asyncio.create_task(self._keep(self.look, self._news), name="alarms"),
             asyncio.create_task(self._keep(self.look_unstored, self._unstored_news), name="alarms not stored"),
@@ -210,7 +210,7 @@ class AlarmDesk:
             with suppress(SQLAlchemyError, OSError, TimeoutError):
                 async with asyncio.timeout(CLOSING_S):
                     await to_the_end(self._write([]))
-        await self._ways.close()
+        await self._channels.close()
 
     async def _keep(self, look: Callable[[], Awaitable[None]], news: asyncio.Event) -> None:
         while True:
@@ -309,7 +309,7 @@ class AlarmDesk:
         """Send once, and note what came of it."""
         message = attempt.message
         try:
-            await self._ways.send(attempt.recipient, message, self._now())
+            await self._channels.send(attempt.recipient, message, self._now())
         except DeliveryError as error:
             values = self._again(attempt, str(error))
             log.warning("alarm not delivered", recipient=attempt.recipient, alarm=message.alarm.id, why=str(error))

@@ -23,7 +23,7 @@ EARTH_M = 6_371_000.0
 
 @dataclass(slots=True)
 class Ship:
-    """One ship as it was heard last; ``heard_s`` by the clock that the roster is given."""
+    """One ship as it was heard last; ``heard_s`` by the clock that the list is given."""
 
     position: ShipPosition
     particulars: ShipParticulars
@@ -50,7 +50,7 @@ class Ship:
         return 2 * (self.distance_m > NEAR_M) + (not self.known), self.distance_m
 
 
-class Roster:
+class ShipList:
     """Ships by their MMSI.
 
     Parameters

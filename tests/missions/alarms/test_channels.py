@@ -44,7 +44,7 @@ async def test_an_email_goes_by_starttls_with_a_login(keep_watch: Keep, tmp_path
         await watch.look()
         [delivery] = (await watch.report(alarm)).deliveries
         assert (delivery.state, delivery.error) == (DeliveryState.DELIVERED, "")
-        await watch.desk.acknowledge(alarm.id, "Ana")
+        await watch.dispatcher.acknowledge(alarm.id, "Ana")
         await watch.look()
     first, second = box.mails
     assert box.encrypted == [True, True]

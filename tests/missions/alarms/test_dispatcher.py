@@ -10,7 +10,7 @@ from standardwebhooks import Webhook
 
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.missions.alarm_settings import AlarmSettings
-from app.missions.alarms import ways
+from app.missions.alarms import channels
 from app.missions.alarms.raised import copy_of, make_alarm
 from app.missions.errors import AlarmNotFoundError, InvalidRequestError
 from app.missions.views.alarms import AlarmState, DeliveryState
@@ -71,10 +71,10 @@ async def test_who_does_not_answer_holds_up_nobody_else(keep_watch: Keep, monkey
         silent.release.clear()
         watch = await keep_watch(told_by(silent, well, routes=[{"to": ["a", "b"]}]))
         one, other = await watch.raise_alarm(), await watch.raise_alarm(AlarmKind.LEAK)
-        await watch.desk.look()
+        await watch.dispatcher.look()
         await until(lambda: len(well.requests) == 1, "the other one is told")
-        await until(lambda: watch.desk.sending == {"a"}, "only the silent one is waited for")
-        await watch.desk.look()
+        await until(lambda: watch.dispatcher.sending == {"a"}, "only the silent one is waited for")
+        await watch.dispatcher.look()
         await until(lambda: len(well.requests) == 2, "the other one is told of the second alarm")
         silent.release.set()
         await watch.sent()
@@ -82,7 +82,7 @@ async def test_who_does_not_answer_holds_up_nobody_else(keep_watch: Keep, monkey
         for alarm in (one, other):
             assert {d.state for d in (await watch.report(alarm)).deliveries} == {DeliveryState.DELIVERED}
         assert len(silent.requests) == 2
-    monkeypatch.setattr(ways, "PATIENCE_S", 0.05)
+    monkeypatch.setattr(channels, "PATIENCE_S", 0.05)
     with hook() as silent:
         silent.release.clear()
         third = await keep_watch(told_by(silent))
@@ -106,7 +106,7 @@ async def test_an_alarm_that_nobody_acknowledges_goes_up_step_by_step(keep_watch
         await watch.look()
         assert (len(bridge.requests), len(captain.requests), len(shore.requests)) == (1, 1, 0)
         assert captain.said[0]["type"] == "alarm.escalated"
-        report = await watch.desk.acknowledge(alarm.id, "Ana")
+        report = await watch.dispatcher.acknowledge(alarm.id, "Ana")
         assert (report.state, report.acknowledged_by) == (AlarmState.ACKNOWLEDGED, "Ana")
         clock.advance(1000)
         await watch.look()
@@ -129,7 +129,7 @@ async def test_whoever_was_told_hears_that_it_is_over_and_nobody_else_is_called(
         await watch.look()
         clock.advance(600)
         await watch.look()
-        report = await watch.desk.acknowledge(alarm.id, "Ana")
+        report = await watch.dispatcher.acknowledge(alarm.id, "Ana")
         await watch.look()
     assert report.ended_at == BEGAN + timedelta(seconds=60)
     assert [said["type"] for said in bridge.said] == ["alarm.raised", "alarm.ended", "alarm.acknowledged"]
@@ -151,7 +151,7 @@ async def test_who_was_not_told_yet_is_not_told_of_what_is_taken(keep_watch: Kee
     with hook() as program:
         watch = await keep_watch(told_by(program))
         alarm = await watch.raise_alarm()
-        await watch.desk.acknowledge(alarm.id, "Ana")
+        await watch.dispatcher.acknowledge(alarm.id, "Ana")
         await watch.look()
         assert (await watch.report(alarm)).deliveries == []
     assert program.requests == []
@@ -160,13 +160,13 @@ async def test_who_was_not_told_yet_is_not_told_of_what_is_taken(keep_watch: Kee
 async def test_the_first_who_acknowledges_stays_and_unknown_alarms_are_refused(keep_watch: Keep, clock: Clock) -> None:
     watch = await keep_watch(AlarmSettings())
     alarm = await watch.raise_alarm()
-    first = await watch.desk.acknowledge(alarm.id, "Ana")
+    first = await watch.dispatcher.acknowledge(alarm.id, "Ana")
     clock.advance(5)
-    assert await watch.desk.acknowledge(alarm.id, "Ben") == first
+    assert await watch.dispatcher.acknowledge(alarm.id, "Ben") == first
     with pytest.raises(AlarmNotFoundError, match="there is no alarm 'b2'"):
-        await watch.desk.acknowledge("b2", "Ana")
-    assert [a.id for a in await watch.desk.alarms(AlarmState.ACKNOWLEDGED, "m1")] == [alarm.id]
-    assert await watch.desk.alarms(AlarmState.OPEN) == []
+        await watch.dispatcher.acknowledge("b2", "Ana")
+    assert [a.id for a in await watch.dispatcher.alarms(AlarmState.ACKNOWLEDGED, "m1")] == [alarm.id]
+    assert await watch.dispatcher.alarms(AlarmState.OPEN) == []
 
 
 async def test_a_restart_between_alarm_and_delivery_loses_nothing(keep_watch_on_either: Keep, clock: Clock) -> None:
@@ -180,7 +180,7 @@ async def test_a_restart_between_alarm_and_delivery_loses_nothing(keep_watch_on_
         # Killed while it was telling: whether it arrived nobody knows, so it is told again, under the same id.
         program.release.clear()
         second = await after.raise_alarm(AlarmKind.LEAK)
-        await after.desk.look()
+        await after.dispatcher.look()
         await until(lambda: len(program.requests) == 2, "it is being told")
         await end_of_process(after)
         program.release.set()
@@ -217,7 +217,7 @@ async def test_the_same_again_is_shown_but_not_told_again_for_a_while(keep_watch
         later = await watch.raise_alarm()
         await watch.look()
         assert len((await watch.report(later)).deliveries) == 1
-        assert len(await watch.desk.alarms(AlarmState.OPEN)) == 4
+        assert len(await watch.dispatcher.alarms(AlarmState.OPEN)) == 4
 
 
 async def test_a_delivery_that_fails_for_too_long_is_given_up(keep_watch: Keep, clock: Clock) -> None:
@@ -239,20 +239,20 @@ async def test_what_cannot_be_stored_goes_out_from_memory_and_is_stored_as_told(
     with hook() as program:
         watch = await keep_watch_on_either(told_by(program))
         row = make_alarm(AlarmKind.DATABASE_UNWRITABLE, "m1", "nothing can be written down", clock())
-        watch.desk.noted(row)
-        await watch.desk.look_unstored()
-        assert not watch.desk.sending, "it may still be stored in a moment"
+        watch.dispatcher.noted(row)
+        await watch.dispatcher.look_unstored()
+        assert not watch.dispatcher.sending, "it may still be stored in a moment"
         clock.advance(2)
-        await watch.desk.look_unstored()
+        await watch.dispatcher.look_unstored()
         await watch.sent()
         assert len(program.requests) == 1
-        assert [a.id for a in await watch.desk.alarms(AlarmState.OPEN)] == [row.id]
+        assert [a.id for a in await watch.dispatcher.alarms(AlarmState.OPEN)] == [row.id]
         # The database is well again: the journal stores the alarm, and meanwhile it is acknowledged.
         stored = copy_of(row)
-        await watch.desk.acknowledge(row.id, "Ana")
+        await watch.dispatcher.acknowledge(row.id, "Ana")
         async with watch.database.writing() as session:
             session.add(stored)
-        watch.desk.stored(stored)
+        watch.dispatcher.stored(stored)
         await watch.look()
         report = await watch.report(row)
     assert report.acknowledged_by == "Ana"
@@ -266,13 +266,13 @@ async def test_what_cannot_be_stored_goes_out_from_memory_and_is_stored_as_told(
 async def test_a_test_goes_where_the_routes_say_or_to_one(keep_watch: Keep) -> None:
     with hook() as bridge, hook() as shore:
         watch = await keep_watch(told_by(bridge, shore, routes=[{"to": ["a"], "severity": "major"}]))
-        assert (await watch.desk.test("Ana", AlarmSeverity.MINOR)).deliveries == []
-        report = await watch.desk.test("Ana", AlarmSeverity.CRITICAL)
+        assert (await watch.dispatcher.test("Ana", AlarmSeverity.MINOR)).deliveries == []
+        report = await watch.dispatcher.test("Ana", AlarmSeverity.CRITICAL)
         assert [d.recipient for d in report.deliveries] == ["a"]
-        assert [d.recipient for d in (await watch.desk.test("Ana", AlarmSeverity.MINOR, "b")).deliveries] == ["b"]
+        assert [d.recipient for d in (await watch.dispatcher.test("Ana", AlarmSeverity.MINOR, "b")).deliveries] == ["b"]
         await watch.look()
         with pytest.raises(InvalidRequestError, match="there is no recipient 'nobody'"):
-            await watch.desk.test("Ana", AlarmSeverity.MINOR, "nobody")
+            await watch.dispatcher.test("Ana", AlarmSeverity.MINOR, "nobody")
     assert (len(bridge.requests), len(shore.requests)) == (1, 1)
     assert bridge.said[0]["data"]["kind"] == "test"
 

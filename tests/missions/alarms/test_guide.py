@@ -10,7 +10,7 @@ from pydantic import SecretStr
 
 from app.missions.alarm_kinds import alarms_text
 from app.missions.alarm_settings import AlarmSettings
-from app.missions.alarms.ways import signature
+from app.missions.alarms.channels import signature
 from tests.support.alarms import SECRET
 from tests.support.paths import PROJECT
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.mapping.types import Soundings
-from app.missions.maps.table import SoundingTable
+from app.missions.maps.sounding_table import SoundingTable
 
 
 @given(st.lists(st.integers(0, 40), max_size=12), st.integers(0, 50))

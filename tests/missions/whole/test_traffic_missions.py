@@ -42,7 +42,7 @@ async def ship_at(service: MissionService, place: Callable[[], tuple[float, floa
 
     telling = asyncio.create_task(tell())
     try:
-        await until(lambda: service.traffic.roster.get(MMSI), "the ship is heard")
+        await until(lambda: service.traffic.ship_list.get(MMSI), "the ship is heard")
         yield
     finally:
         telling.cancel()
