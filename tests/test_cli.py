@@ -21,11 +21,11 @@ import rasterio
 from app.cli import main
 from app.mapping.coordinates.georeference import LocalFrame
 from tests.support import commands
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.commands import serving
 from tests.support.imc import log_writer as writer
-from tests.support.multibeam import line, write_gsf, write_kmall
+from tests.support.mapping.multibeam import line, write_gsf, write_kmall
 from tests.support.paths import PROJECT
-from tests.support.rest import mission_spec, soundings
 
 
 @dataclass

@@ -11,9 +11,9 @@ import pytest
 from app.arrays import FloatArray
 from app.estimation.adjustment import warm_up
 from app.settings import Settings
+from tests.support.api.rest import mission_spec
+from tests.support.mapping.tracks import flown, lawnmower
 from tests.support.missions.specs import lon_lat, rectangle
-from tests.support.rest import mission_spec
-from tests.support.tracks import flown, lawnmower
 
 SIDE_M = 60.0
 START_S = 1_795_225_140.0

@@ -14,8 +14,8 @@ import pytest
 
 from app.missions.errors import FileTooLargeError, ImportUnavailableError, InvalidRequestError
 from app.missions.operations.imports import reader_process, uploads
+from tests.support.api.rest import make_client, mission_spec, prior_text, running
 from tests.support.faults.leading_out import grids, told
-from tests.support.rest import make_client, mission_spec, prior_text, running
 
 GRID: dict[str, Any] = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
 

@@ -12,9 +12,9 @@ import pytest
 
 from app.mapping.quality.crossovers import warm_up
 from app.settings import Settings
+from tests.support.api.rest import mission_spec, soundings
+from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 from tests.support.missions.specs import FRAME, rectangle
-from tests.support.rest import mission_spec, soundings
-from tests.support.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 
 SIDE_M, CELL_M = 60.0, 2.0
 OFF_M = 0.3

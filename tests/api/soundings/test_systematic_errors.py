@@ -10,8 +10,8 @@ import pytest
 
 from app.mapping.quality.crossovers import warm_up
 from app.settings import Settings
-from tests.support.rest import make_client, running
-from tests.support.tracks import DEPTH_M, flown, lawnmower, measured, pinged
+from tests.support.api.rest import make_client, running
+from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 
 from .test_crossovers import START_S, new_mission, post
 

@@ -17,7 +17,7 @@ from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.readers.warm_up import SMALL_CELL, SMALL_CELL_AT
 from app.mapping.s44 import NORMAL_95
 from app.mapping.types import Grid
-from tests.support.enc import Cell
+from tests.support.mapping.enc import Cell
 
 LAT, LON = 41.18, -8.70
 FRAME = LocalFrame(LAT, LON)

@@ -11,7 +11,7 @@ import pytest
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarm_settings import AlarmSettings
 from app.missions.views.alarms import DeliveryState
-from tests.support.alarms import PASSWORD, Watch, broker, mail_server, make_certificate
+from tests.support.missions.alarms import PASSWORD, Watch, broker, mail_server, make_certificate
 
 pytestmark = pytest.mark.filterwarnings("ignore:Session.login_data is deprecated")
 

@@ -14,7 +14,7 @@ from app.missions.alarms import channels
 from app.missions.alarms.raised import copy_of, make_alarm
 from app.missions.errors import AlarmNotFoundError, InvalidRequestError
 from app.missions.views.alarms import AlarmState, DeliveryState
-from tests.support.alarms import BEGAN, SECRET, Clock, Watch, end_of_process, hook, told_by
+from tests.support.missions.alarms import BEGAN, SECRET, Clock, Watch, end_of_process, hook, told_by
 from tests.support.waiting import until
 
 Keep = Callable[[AlarmSettings], Awaitable[Watch]]

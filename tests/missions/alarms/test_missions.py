@@ -18,7 +18,7 @@ from app.missions.views.alarms import AlarmState
 from app.missions.views.messages import AlarmMessage, SnapshotMessage
 from app.storage import database as storage
 from app.storage.models import AlarmRow
-from tests.support.alarms import hook, told_by
+from tests.support.missions.alarms import hook, told_by
 from tests.support.missions.harbour import Harbour, Rover, act
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until

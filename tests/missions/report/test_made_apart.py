@@ -20,9 +20,9 @@ from app.missions.report.texts import Language
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from tests.support.children import new_children
+from tests.support.mapping.tracks import flown, lawnmower, pinged
 from tests.support.missions.harbour import Harbour
 from tests.support.missions.specs import make_spec
-from tests.support.tracks import flown, lawnmower, pinged
 from tests.support.waiting import until
 
 FILES = ("tif", "s102", "geojson", "crossovers.csv")

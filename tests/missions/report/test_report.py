@@ -28,9 +28,9 @@ from app.missions.report.sections.maps import MOST_HOLIDAYS
 from app.missions.report.texts import Language, Texts
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
+from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.harbour import Harbour, act, sim_spec
 from tests.support.missions.specs import make_spec
-from tests.support.tracks import flown, lawnmower, measured
 from tests.support.waiting import until
 
 JAPANESE = "港湾測量 — порт \u202egnp.exe"

@@ -14,7 +14,7 @@ from app.missions.traffic.sources import Lines, UdpSource
 from app.missions.traffic.watch import MOST_PER_TICK, MOST_WAITING, Traffic
 from app.missions.views.traffic import traffic_findings
 from imc_bridge.doctor.diagnosis import Severity
-from tests.support.ais import CLASS_A, RECORDED, STATIC, named, position
+from tests.support.missions.ais import CLASS_A, RECORDED, STATIC, named, position
 from tests.support.waiting import until
 
 

@@ -18,8 +18,8 @@ from app.missions.settings import ServiceSettings
 from app.missions.spec.water import SoundSpeed
 from app.missions.views.measurements.soundings import LogImportView
 from app.storage.database import Database
+from tests.support.mapping.multibeam import floor, line, write_gsf, write_kmall
 from tests.support.missions.specs import FRAME, make_spec
-from tests.support.multibeam import floor, line, write_gsf, write_kmall
 
 MIDDLE = LocalFrame(*(float(value) for value in FRAME.to_geographic(15.0, 15.0)))
 """Of a mission's area, 30 m wide."""

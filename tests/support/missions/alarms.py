@@ -27,8 +27,8 @@ from app.missions.views.alarms import AlarmReport
 from app.storage.database import Database
 from app.storage.models import AlarmRow, ProcessRow
 from app.storage.queries import alarms as alarm_queries
-from tests.support import rows
 from tests.support.ports import free_ports
+from tests.support.storage import rows
 from tests.support.waiting import until
 
 SECRET = "whsec_C2FVsBQIhrscChlQIMV+b5sSYspob7oD"  # noqa: S105 - the example of Standard Webhooks

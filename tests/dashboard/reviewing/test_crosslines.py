@@ -8,8 +8,8 @@ from playwright.sync_api import expect
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, colours_in_the_middle, picture, show
+from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 from tests.support.missions.specs import rectangle
-from tests.support.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

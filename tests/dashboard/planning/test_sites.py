@@ -3,10 +3,10 @@
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id
 from tests.support.missions.specs import rectangle
-from tests.support.rest import mission_spec, soundings
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 

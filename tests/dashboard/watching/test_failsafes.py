@@ -25,12 +25,12 @@ from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.equipment import Equipment
 from simulator.floors.seafloors import generate
 from simulator.vehicles.battery import BatterySpec
-from tests.support.ais import nmea, position
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, show
 from tests.support.imc.afloat import Afloat, afloat
 from tests.support.imc.sea import Peer
+from tests.support.missions.ais import nmea, position
 from tests.support.missions.specs import LAT, LON, lon_lat, rectangle
 from tests.support.ports import free_ports
 
