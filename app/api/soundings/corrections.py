@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import problems
+from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.schemas import API
 from app.api.state import Service
@@ -25,7 +25,7 @@ router = APIRouter(
     responses=problems("unauthenticated", "forbidden"),
 )
 
-_CHANGE = problems("malformed-body", "mission-not-found", "body-too-large", "unsupported-media-type", "invalid-request")
+_CHANGE = body_problems("mission-not-found")
 
 
 @router.get(

@@ -2,49 +2,18 @@
 
 import csv
 import io
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 
-from app.mapping.quality.crossovers import warm_up
-from app.settings import Settings
 from tests.support.api.rest import mission_spec, soundings
+from tests.support.api.surveys import START_S, new_mission, post
 from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, measured, pinged
-from tests.support.missions.specs import FRAME, rectangle
+from tests.support.missions.specs import FRAME
 
-SIDE_M, CELL_M = 60.0, 2.0
 OFF_M = 0.3
 """How much too deep the second vehicle measures."""
-START_S = 1_795_225_140.0
-
-
-@pytest.fixture(autouse=True, scope="module")
-def compiled() -> None:
-    """Compile before requests wait for it: a service does so while it starts."""
-    warm_up()
-
-
-@pytest.fixture
-def settings(make_settings: Callable[..., Settings], tmp_path: Path) -> Settings:
-    return make_settings(pings_url=str(tmp_path / "pings"))
-
-
-async def new_mission(client: httpx.AsyncClient, *vehicles: str, **fields: Any) -> str:
-    kinds = [{"name": name, "kind": "rest"} | fields for name in vehicles]
-    area = rectangle(0, 0, SIDE_M, SIDE_M)
-    answer = await client.post("/missions", json=mission_spec(area=area, cell_m=CELL_M, vehicles=kinds))
-    assert answer.status_code == 201, answer.text
-    return f"/missions/{answer.json()['id']}"
-
-
-async def post(client: httpx.AsyncClient, path: str, items: list[dict[str, Any]]) -> None:
-    answer = await client.post(f"{path}/measurements", json={"items": items})
-    assert answer.status_code == 200, answer.text
-    assert answer.json()["accepted"] == len(items)
 
 
 @pytest.fixture

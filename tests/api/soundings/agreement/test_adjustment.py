@@ -1,7 +1,5 @@
 """Tracks adjusted for drift over REST: what overlaps is compared, raw positions stay, one call undoes it."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -9,8 +7,6 @@ import numpy as np
 import pytest
 
 from app.arrays import FloatArray
-from app.estimation.adjustment import warm_up
-from app.settings import Settings
 from tests.support.api.rest import mission_spec
 from tests.support.mapping.tracks import flown, lawnmower
 from tests.support.missions.specs import lon_lat, rectangle
@@ -20,17 +16,6 @@ START_S = 1_795_225_140.0
 OFF_M = 4.0
 """How far the second vehicle has drifted when its dive ends."""
 ANGLES = np.radians(np.arange(-60.0, 61.0, 8.0))
-
-
-@pytest.fixture(autouse=True, scope="module")
-def compiled() -> None:
-    """Compile before requests wait for it."""
-    warm_up()
-
-
-@pytest.fixture
-def settings(make_settings: Callable[..., Settings], tmp_path: Path) -> Settings:
-    return make_settings(pings_url=str(tmp_path / "pings"))
 
 
 def bottom_m(east: FloatArray, north: FloatArray) -> FloatArray:

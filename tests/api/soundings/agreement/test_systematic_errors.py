@@ -1,32 +1,17 @@
 """What is always wrong is found, proposed, taken out by one call and put back by another, over REST."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 
-from app.mapping.quality.crossovers import warm_up
 from app.settings import Settings
 from tests.support.api.rest import make_client, running
+from tests.support.api.surveys import START_S, new_mission, post
 from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 
-from .test_crossovers import START_S, new_mission, post
-
 OFF_M = 0.3
-
-
-@pytest.fixture(autouse=True, scope="module")
-def compiled() -> None:
-    """Compile before requests wait for it: a service does so while it starts."""
-    warm_up()
-
-
-@pytest.fixture
-def settings(make_settings: Callable[..., Settings], tmp_path: Path) -> Settings:
-    return make_settings(pings_url=str(tmp_path / "pings"))
 
 
 async def found_in(client: httpx.AsyncClient, path: str) -> dict[str, Any]:
