@@ -7,9 +7,6 @@ import { VehicleCards } from "./cards/VehicleCards";
 import { DenserQuestion } from "./cards/VehicleOrders";
 import { ChartPane } from "./chart/ChartPane";
 import { Legend } from "./chart/Legend";
-import { MapMenu } from "./chart/MapMenu";
-import { MapPrompt } from "./chart/MapPrompt";
-import { Readout } from "./chart/Readout";
 import {
   cardsWidth,
   legendReach,
@@ -18,7 +15,10 @@ import {
   panelWidth,
   shownFolded,
   watchRoom,
-} from "./chart/room";
+} from "./chart/layout";
+import { MapMenu } from "./chart/MapMenu";
+import { MapPrompt } from "./chart/MapPrompt";
+import { Readout } from "./chart/Readout";
 import { AbortDialog } from "./dialogs/AbortDialog";
 import { FinishDialog } from "./dialogs/FinishDialog";
 import { FleetDialog } from "./dialogs/FleetDialog";
@@ -31,7 +31,7 @@ import { MissionPanel } from "./MissionPanel";
 import { Attention } from "./notices/Attention";
 import { Heard, Others } from "./notices/Heard";
 import { Notices } from "./notices/Notices";
-import { watchPrinting } from "./parts/printing";
+import { watchPrinting } from "./parts/printMap";
 import { SpaceView } from "./space/SpaceView";
 import { BottomStrip } from "./strip/BottomStrip";
 import { TopBar } from "./TopBar";

@@ -6,6 +6,14 @@ import { fileNameOf, missionFile } from "../state/form/missionFile";
 import { dayAndTime } from "../state/format";
 import { deleteMission, selectMission } from "../state/session";
 import {
+  capital,
+  hasEnded,
+  lengthWords,
+  measuredWords,
+  missionSign,
+  missionWords,
+} from "../state/stateNames";
+import {
   copied,
   describing,
   editedMission,
@@ -16,13 +24,12 @@ import {
   selectedId,
   serviceFault,
 } from "../state/store";
-import { capital, hasEnded, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { say, sayWith } from "../words/say";
-import { panelWidth } from "./chart/room";
+import { panelWidth } from "./chart/layout";
 import { NewMissionForm } from "./form/NewMissionForm";
 import { Button, sets } from "./parts/Controls";
+import { saveText } from "./parts/download";
 import { Grip } from "./parts/Grip";
-import { saveText } from "./parts/saving";
 
 export function MissionPanel() {
   return (

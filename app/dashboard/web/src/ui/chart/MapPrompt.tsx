@@ -2,7 +2,7 @@ import "./MapPrompt.css";
 import { drawing, picking } from "../../state/store";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
-import { mapFirst } from "./room";
+import { mapFirst } from "./layout";
 
 /** What is to be done on the map, where the form that asks for it lies over all of it and is away meanwhile. */
 export function MapPrompt() {
