@@ -4,10 +4,10 @@ import json
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from app.mapping.s44 import Order, strictest_sd_m
-from tests.support.dashboard.browser import Watched
+from tests.support.dashboard.browser import PATIENCE_MS, Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, expect_state, picture, show, start, violations
 
@@ -206,3 +206,37 @@ def test_a_block_that_cannot_begin_by_itself_is_shown_with_its_alarm(page: Page,
     expect_state(page, "ready")
     expect(by_id(page, "abort")).to_be_enabled()
     assert service.get(f"/missions/{east}")["state"] == "ready"
+
+
+@pytest.mark.parametrize("size", [(820, 1180), (390, 844)], ids=["tablet", "phone"])
+def test_an_area_is_drawn_where_the_form_lies_over_the_whole_map(
+    browser: Browser, service: Service, size: tuple[int, int]
+) -> None:
+    context = browser.new_context(
+        viewport={"width": size[0], "height": size[1]}, base_url=service.url, reduced_motion="reduce"
+    )
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "toggle-missions").click()
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("By hand")
+    by_id(page, "draw-polygon").click()
+    expect(by_id(page, "map-prompt")).to_contain_text("Tap corner after corner")
+    by_id(page, "back-to-form").click()
+    expect(by_id(page, "field-name")).to_have_value("By hand")
+
+    by_id(page, "draw-polygon").click()
+    expect(by_id(page, "field-name")).to_be_hidden()
+    expect(by_id(page, "drawing")).to_have_attribute("data-ready", "true")
+    picture(page, f"drawing-{size[0]}")
+    click_round(page, [(80, 300), (300, 310), (290, 420), (90, 430)])
+    expect(by_id(page, "field-name")).to_have_value("By hand")
+    expect(by_id(page, "editing")).to_have_attribute("data-ready", "true")
+    # Corners are dragged beside the closed form, which keeps what was typed.
+    by_id(page, "toggle-missions").click()
+    expect(by_id(page, "field-name")).to_be_hidden()
+    by_id(page, "toggle-missions").click()
+    expect(by_id(page, "field-name")).to_have_value("By hand")
+    context.close()

@@ -20,6 +20,7 @@ import {
   fleetOpen,
   mission,
   missions,
+  panelOpen,
   selectedId,
   serviceFault,
 } from "../state/store";
@@ -32,7 +33,13 @@ import { Grip } from "./parts/Grip";
 
 export function MissionPanel() {
   return (
-    <aside class="panel missions" id="missions" aria-label={say("missions.missions")}>
+    <aside
+      class="panel missions"
+      id="missions"
+      aria-label={say("missions.missions")}
+      // What is being described is kept.
+      hidden={!panelOpen.value}
+    >
       <div class="panel-scroll">{describing.value ? <NewMissionForm /> : <MissionList />}</div>
       <Grip
         what={say("missions.theMissions")}

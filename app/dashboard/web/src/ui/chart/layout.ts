@@ -4,7 +4,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { Padding } from "../../map/canvas/chart";
 import type { Box } from "../../map/canvas/labels";
 import { kept } from "../../persistentSignal";
-import { mission, now, panelOpen, stripHeight, tab } from "../../state/store";
+import { describing, drawing, mission, now, panelOpen, picking, stripHeight, tab } from "../../state/store";
 
 /** What lies over the map, in its pixels. */
 export const covers = signal<readonly Box[]>([]);
@@ -32,6 +32,11 @@ narrow.addEventListener("change", (event) => {
 });
 export const shownFolded = computed(
   () => !isNarrow.value && (cardsFolded.value || (isTight.value && panelOpen.value)),
+);
+
+/** Whether somebody draws or picks a place where what is described in lies over the whole map: the map is seen first. */
+export const mapFirst = computed(
+  () => isNarrow.value && describing.value && (drawing.value !== null || picking.value !== null),
 );
 
 const OVER_THE_MAP =
