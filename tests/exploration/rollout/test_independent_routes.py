@@ -250,7 +250,7 @@ def test_every_step_that_a_vehicle_may_try_is_short_enough_and_leads_somewhere(s
     )  # fmt: skip
     best = mission.plan(list(np.random.default_rng(seed).uniform(-0.9, 0.9, (3, 4, 2))))
     for i, here in enumerate(START):
-        wishes, passed = mission.steps(best, i)
+        wishes, passed = mission.steps(i, route_of(best.routes, i), int(best.routes.counts[i]))
         assert len(wishes) == len(passed)
         moves = wishes - here
         assert (np.linalg.norm(moves, axis=1) <= LIMITS.max_step_m).all()
