@@ -61,6 +61,10 @@ def way_to(
     """
     ground = Ground(mission.floor, mission.rules, mission.height_m)
     team = _team(mission.start, best.flown.paths, others)
+    lost = targets.sd_m[target] > LOST * targets.accuracy_sd_m
+    own = np.inf if lost or not best.routes.counts[row] else _lost(_parts(team, targets))
+    if own <= SEEING_COSTS:  # what every other way costs at least
+        return None
     here, goal = mission.start[row], targets.state[target, :3]
     reach = targets.accuracy_sd_m / targets.relative_noise
     low, high = mission.area.min(axis=0), mission.area.max(axis=0)
@@ -69,8 +73,6 @@ def way_to(
     plans = [_straight(place, mission.height_m) for place in places]
     ways = [_way(here, plan, goal[2], part, ground) for plan, part in zip(plans, parts, strict=True)]
     served = int(np.isfinite(targets.state[:target]).all(axis=1).sum())
-    lost = targets.sd_m[target] > LOST * targets.accuracy_sd_m
-    own = np.inf if lost or not best.routes.counts[row] else _lost(_parts(team, targets))
     costs = []
     for way in ways:
         team[:, row] = way
