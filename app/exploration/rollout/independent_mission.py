@@ -88,7 +88,7 @@ class ApartMission:
         self.start = np.ascontiguousarray(team.positions)
         self._free_part = free_part
         self.area, self.floor, self._free, self.rules = team.constraints.area, floor, free, rules
-        self._horizon = max(1, team.steps_total - team.step + 1)
+        self.horizon = max(1, team.steps_total - team.step + 1)
         self.height_m, self._lower, self._rng = height_m, lower_m, rng
         open_ = np.flatnonzero(~belief.accurate)
         row = open_[_sample(belief.xy_m[open_])]
@@ -116,7 +116,7 @@ class ApartMission:
                     changed = int(clear_ways(self._free, route, count + 1, here, count, count, np.inf))
                     count = max(count, changed)
             routes.counts[i] = count
-        paths = no_paths(len(self.start), self._horizon)
+        paths = no_paths(len(self.start), self.horizon)
         for i in range(len(self.start)):
             trace(self.start, i, routes, self.floor, self.rules, paths)
         left = np.empty(len(self._points.work.need))
@@ -138,7 +138,7 @@ class ApartMission:
         """Try a number of changes; the routes are improved in place."""
         trial = RoutesFlown(
             no_routes(len(self.start), ROOM, self.height_m),
-            no_paths(len(self.start), self._horizon),
+            no_paths(len(self.start), self.horizon),
             np.empty(len(best.flown.left)),
         )
         task = RoutesTask(self.start, self._free_part, self._points, self.floor, self.rules)

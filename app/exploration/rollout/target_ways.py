@@ -23,7 +23,8 @@ AHEAD_STEPS = 30
 """Steps over which ways are judged."""
 
 LOST_COSTS = 4.0
-"""Steps of a vehicle that a step is worth in which a target is not accurately known."""
+"""Steps of a vehicle that a step is worth in which a target is not accurately known, where routes take all the time
+that is left; more as they take less of it."""
 
 SEEING_COSTS = 0.5
 """What a step costs in which the vehicle sees the floor all the same."""
@@ -62,7 +63,8 @@ def way_to(
     ground = Ground(mission.floor, mission.rules, mission.height_m)
     team = _team(mission.start, best.flown.paths, others)
     lost = targets.sd_m[target] > LOST * targets.accuracy_sd_m
-    own = np.inf if lost or not best.routes.counts[row] else _lost(_parts(team, targets))
+    worth = LOST_COSTS * mission.horizon / max(1, best.flown.paths.length.max())
+    own = np.inf if lost or not best.routes.counts[row] else worth * _lost(_parts(team, targets))
     if own <= SEEING_COSTS:  # what every other way costs at least
         return None
     here, goal = mission.start[row], targets.state[target, :3]
@@ -77,7 +79,7 @@ def way_to(
     for way in ways:
         team[:, row] = way
         sd = _parts(team, targets)
-        costs.append(_lost(sd) + _away(way, sd[:, served], ground))
+        costs.append(worth * _lost(sd) + _away(way, sd[:, served], ground))
     k = int(np.argmin(costs))
     if own <= costs[k]:
         return None
@@ -86,7 +88,7 @@ def way_to(
     step = ways[k][0] - here
     length, left = np.hypot(*step[:2]), mission.rules.step_m * (1.0 - 1e-9)
     higher = [[*(part * step[:2]), -np.sqrt(left**2 - (part * length) ** 2)] for part in (*PARTS, 0.0)]
-    return here + np.vstack([[part * step for part in PARTS], higher])
+    return np.asarray(here + np.vstack([[part * step for part in PARTS], higher]))
 
 
 def _team(start: FloatArray, paths: Paths, stay: BoolArray) -> FloatArray:
@@ -147,8 +149,8 @@ def _parts(paths: FloatArray, targets: Targets) -> FloatArray:
 
 
 def _lost(part: FloatArray) -> float:
-    """Return what the steps cost in which targets are not accurately known."""
-    return LOST_COSTS * float(np.clip((part - LEAVES_AT) / (1.0 - LEAVES_AT), 0.0, 1.0).sum())
+    """Return in how many steps targets are not accurately known, added up."""
+    return float(np.clip((part - LEAVES_AT) / (1.0 - LEAVES_AT), 0.0, 1.0).sum())
 
 
 @njit(cache=True, nogil=True)
