@@ -290,39 +290,3 @@ def foretold_sd(
             worst = max(worst, P[k, k])
         result[c] = np.sqrt(worst)
     return result
-
-
-@njit(cache=True, nogil=True)
-def foretell(
-    state: FloatArray, covariance: FloatArray, paths: FloatArray, growth: FloatArray, noise: float, hearing: float,
-    sd: float,
-) -> FloatArray:  # fmt: skip
-    """Return the greatest standard deviation of each target's position after every step of a team, (n_steps, k).
-
-    Parameters
-    ----------
-    state, covariance : (k, 6), (k, 6, 6)
-        As predicted for the end of the first step.
-    paths : (n_steps, n_vehicles, 3)
-        Where the vehicles are when each step ends.
-    growth : (6, 6)
-        What a step adds to a covariance.
-    noise, hearing, sd
-        As for :func:`foretold_sd`.
-    """
-    result = np.empty((len(paths), len(state)))
-    blur, F = np.full(3, sd * sd), np.eye(6)
-    for k in range(3):
-        F[k, k + 3] = 1.0
-    for k in range(len(state)):
-        m, P = state[k].copy(), covariance[k].copy()
-        for t in range(len(paths)):
-            if t:
-                m, P = F @ m, F @ P @ F.T + growth
-            for i in range(paths.shape[1]):
-                r = np.sqrt(((m[:3] - paths[t, i]) ** 2).sum())
-                if r < hearing:
-                    here = m.copy()
-                    update_by_range(here, P, paths[t, i], r, noise, blur)
-            result[t, k] = np.sqrt(max(P[0, 0], P[1, 1], P[2, 2]))
-    return result

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from app.estimation import RangeSensor, TargetEstimator, TargetTrack
 from app.estimation.range_filter import update_by_range
-from app.estimation.targets import foretell, foretold_sd, transition
+from app.estimation.targets import foretold_sd, transition
 
 HEARING = RangeSensor(np.inf, 0.1)
 
@@ -134,22 +134,3 @@ def test_a_covariance_stays_symmetric_and_positive(place: Any, y: Any, noise: An
         assert np.isfinite(mean).all()
         np.testing.assert_array_equal(P, P.T)
         assert np.linalg.eigvalsh(P).min() > -1e-12 * np.abs(P).max()
-
-
-def test_deviations_foretold_for_a_way_are_those_of_one_step_after_the_other() -> None:
-    rng = np.random.default_rng(4)
-    estimator = TargetEstimator()
-    state = np.concatenate([rng.uniform(-0.5, 0.5, (2, 3)), rng.normal(0.0, 0.01, (2, 3))], axis=1)
-    covariance = np.stack([np.diag([0.04, 0.02, 0.03, 1e-4, 1e-4, 1e-4])] * 2)
-    paths = rng.uniform(-1.0, 1.0, (5, 3, 3))
-    told = foretell(state, covariance, paths, estimator.process_noise(), 0.1, np.inf, 0.0)
-    for k in range(2):
-        m, P = state[k], covariance[k]
-        for t, places in enumerate(paths):
-            if t:
-                ahead = estimator.predict(TargetTrack(m[None], P[None], np.ones(1)))
-                m, P = ahead.state, ahead.covariance
-            assert told[t, k] == pytest.approx(foretold_sd(m, P, places[None], 0.1, np.inf, 0.0)[0])
-            P = P.copy()
-            for place in places:
-                update_by_range(m.copy(), P, place, float(np.linalg.norm(m[:3] - place)), 0.1, np.zeros(3))

@@ -382,7 +382,6 @@ class TrackWorld:
             self.scenario.target_accuracy,
             sensor.relative_noise,
             sensor.visibility_m,
-            growth=self.target_estimator.process_noise(),
         )
 
     def _told_of_localization(self) -> Localization | None:

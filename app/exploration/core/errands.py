@@ -157,7 +157,7 @@ def errand_move(
     if at_depth is not None:
         candidates[:, row] = at_depth(candidates)[:, row]
     if targets is not None and errand.target != RISE:
-        candidates = candidates[keeps_off(candidates[:, row], origin[row], targets)]
+        candidates = candidates[_keeps_off(candidates[:, row], origin[row], targets)]
     candidates = candidates[constraints.feasible(origin, candidates, bottom)]
     if len(candidates) == 0:
         return np.asarray(origin[row])
@@ -175,7 +175,7 @@ def errand_move(
     return np.asarray(candidates[np.argmin(value), row])
 
 
-def keeps_off(places: FloatArray, here: FloatArray, targets: Targets) -> NDArray[np.bool_]:
+def _keeps_off(places: FloatArray, here: FloatArray, targets: Targets) -> NDArray[np.bool_]:
     """Return which places (k, 3) are not too close to where any target is expected, or at least no closer than here."""
     kept = np.ones(len(places), dtype=np.bool_)
     for target in targets.state[np.isfinite(targets.state).all(axis=1), :3]:

@@ -37,8 +37,6 @@ class Targets:
         Part of the ranges' deviation that is the same at any distance.
     standoff_m : float
         Vehicles on an errand come no closer to any target.
-    growth : (6, 6) or None
-        What a step adds to the covariances, where all steps take the same time; None: nobody looks farther ahead.
     """
 
     state: FloatArray
@@ -49,7 +47,6 @@ class Targets:
     hearing_m: float = np.inf
     range_sd_m: float = 0.0
     standoff_m: float = 0.0
-    growth: FloatArray | None = None
 
     @property
     def sd_m(self) -> FloatArray:

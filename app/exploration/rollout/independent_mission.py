@@ -10,7 +10,7 @@ from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Situation
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.rollout.flight import Plan, Rules
+from app.exploration.rollout.flight import Rules
 from app.exploration.rollout.floor import (
     HELD_NEAR,
     FloorEstimate,
@@ -85,18 +85,18 @@ class ApartMission:
         lower_m: float, accuracy_sd_m: float, rng: np.random.Generator,
     ) -> None:  # fmt: skip
         belief = team.belief
-        self.start = np.ascontiguousarray(team.positions)
+        self._start = np.ascontiguousarray(team.positions)
         self._free_part = free_part
-        self.area, self.floor, self._free, self.rules = team.constraints.area, floor, free, rules
-        self.horizon = max(1, team.steps_total - team.step + 1)
-        self.height_m, self._lower, self._rng = height_m, lower_m, rng
+        self._area, self._floor, self._free, self._rules = team.constraints.area, floor, free, rules
+        self._horizon = max(1, team.steps_total - team.step + 1)
+        self._height, self._lower, self._rng = height_m, lower_m, rng
         open_ = np.flatnonzero(~belief.accurate)
         row = open_[_sample(belief.xy_m[open_])]
         xyz = np.column_stack([belief.xy_m, belief.depth_m])[row]
         fill_depths(xyz, floor)
         total = len(belief.accurate) * len(row) / len(open_)
         self._points: LandmarkPoints = make_points(
-            xyz, belief, row, accuracy_sd_m, self.area, rules.visibility_m, BUCKETS, total, floor
+            xyz, belief, row, accuracy_sd_m, self._area, rules.visibility_m, BUCKETS, total, floor
         )
 
     def plan(self, waypoints: list[FloatArray]) -> Best:
@@ -104,10 +104,10 @@ class ApartMission:
 
         A third column is how quickly the vehicle sinks on the way to each; see ``Routes``.
         """
-        routes = no_routes(len(self.start), ROOM, self.height_m)
+        routes = no_routes(len(self._start), ROOM, self._height)
         for i, stops in enumerate(waypoints):
             route, count = route_of(routes, i), 0
-            here = np.ascontiguousarray(self.start[i : i + 1, :2])
+            here = np.ascontiguousarray(self._start[i : i + 1, :2])
             for stop in stops[: ROOM - 4]:
                 route.at_m[count, 0] = stop[:2]
                 if len(stop) > 2:
@@ -116,20 +116,20 @@ class ApartMission:
                     changed = int(clear_ways(self._free, route, count + 1, here, count, count, np.inf))
                     count = max(count, changed)
             routes.counts[i] = count
-        paths = no_paths(len(self.start), self.horizon)
-        for i in range(len(self.start)):
-            trace(self.start, i, routes, self.floor, self.rules, paths)
+        paths = no_paths(len(self._start), self._horizon)
+        for i in range(len(self._start)):
+            trace(self._start, i, routes, self._floor, self._rules, paths)
         left = np.empty(len(self._points.work.need))
         count_all = int(routes.counts.sum())
-        score = float(judge(paths, self._free_part, count_all, self._points, self.rules, np.inf, left))
+        score = float(judge(paths, self._free_part, count_all, self._points, self._rules, np.inf, left))
         return Best(RoutesFlown(routes, paths, left), score)
 
     def first(self) -> Best:
         """Return the best of the sweeps over what is left, improved."""
-        here = self.start[:, :2]
+        here = self._start[:, :2]
         flown = [
             (self.plan(routes).score, k, routes)
-            for k, routes in enumerate(sectors(self._points.work.xyz[:2].T, here, self.area, self.rules.visibility_m))
+            for k, routes in enumerate(sectors(self._points.work.xyz[:2].T, here, self._area, self._rules.visibility_m))
         ]
         chosen = [self.refine(self.plan(routes), FRESH_SEARCH) for _, _, routes in sorted(flown)[:FRESH_STARTS]]
         return self.refine(min(chosen, key=lambda best: best.score), FIRST_SEARCH)
@@ -137,39 +137,38 @@ class ApartMission:
     def refine(self, best: Best, changes: int, worth: float = 0.0) -> Best:
         """Try a number of changes; the routes are improved in place."""
         trial = RoutesFlown(
-            no_routes(len(self.start), ROOM, self.height_m),
-            no_paths(len(self.start), self.horizon),
+            no_routes(len(self._start), ROOM, self._height),
+            no_paths(len(self._start), self._horizon),
             np.empty(len(best.flown.left)),
         )
-        task = RoutesTask(self.start, self._free_part, self._points, self.floor, self.rules)
+        task = RoutesTask(self._start, self._free_part, self._points, self._floor, self._rules)
         draws = self._rng.random((changes, DRAWS + 1))
         best.score = float(improve_apart(best.flown, best.score, trial, draws, task, self._free, worth))
         return best
 
-    def steps(self, i: int, route: Plan, count: int) -> tuple[FloatArray, list[int]]:
+    def steps(self, best: Best, i: int) -> tuple[FloatArray, list[int]]:
         """Return where vehicle ``i`` may go now, (k, 3), best first, and how many waypoints each of these passes.
 
-        The first is that of a route of ``count`` waypoints; the others go less far, as they are and as high as the step
-        allows, for when the sea floor that the constraints hold to has steps that the plan's estimate smooths. The last
-        is straight up.
+        The first is the route's; the others go less far, as they are and as high as the step allows, for when the sea
+        floor that the constraints hold to has steps that the plan's estimate smooths. The last is straight up.
         """
-        wishes, passed, here = [], [], self.start[i]
-        step = self.rules.step_m
+        wishes, passed, here = [], [], self._start[i]
+        route, count, step = route_of(best.routes, i), int(best.routes.counts[i]), self._rules.step_m
         if not count:
             return here[None].copy(), [0]
         for part in PARTS:
             wish = here[None].copy()
-            rules = self.rules._replace(step_m=part * step)
-            after = int(fly_alone(here[None], route, 0, count, self.floor, rules, wish))
+            rules = self._rules._replace(step_m=part * step)
+            after = int(fly_alone(here[None], route, 0, count, self._floor, rules, wish))
             (x, y, z), ahead = wish[0], float(np.hypot(*(wish[0] - here)[:2]))
             if part == 1.0 or ahead > AHEAD * step:
                 deeper = min(z + self._lower, max(z, here[2] + _left_of(part * step, ahead)))
-                wishes.append([x, y, min(deeper, self.rules.max_depth_m)])
+                wishes.append([x, y, min(deeper, self._rules.max_depth_m)])
                 passed.append(after)
             if part < 1.0:
-                wishes.append([x, y, max(here[2] - _left_of(step, ahead), self.rules.min_depth_m)])
+                wishes.append([x, y, max(here[2] - _left_of(step, ahead), self._rules.min_depth_m)])
                 passed.append(after)
-        wishes.append([*here[:2], max(here[2] - _left_of(step, 0.0), self.rules.min_depth_m)])
+        wishes.append([*here[:2], max(here[2] - _left_of(step, 0.0), self._rules.min_depth_m)])
         passed.append(0)
         return np.array(wishes), passed
 

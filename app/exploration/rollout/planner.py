@@ -17,7 +17,6 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.bottom_contacts import FeltBottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.errands import RISE, Errand, keeps_off
 from app.exploration.core.information_need import Lacking, lacking
 from app.exploration.core.problem import Belief, Proposal, Situation
 from app.exploration.core.routes import FreeSpace
@@ -41,11 +40,10 @@ from app.exploration.rollout.flight import (
 )
 from app.exploration.rollout.floor import FloorEstimate, estimate_floor, fill_depths, margin_m, sample
 from app.exploration.rollout.free_space import Free, clear_ways, free_space, settle_waypoint
-from app.exploration.rollout.independent_mission import WORTH, ApartMission, Best, apart_mission
-from app.exploration.rollout.independent_routes import route_of, stops_of
+from app.exploration.rollout.independent_mission import WORTH, apart_mission
+from app.exploration.rollout.independent_routes import stops_of
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
-from app.exploration.rollout.target_ways import way_to
 from app.exploration.rollout.tour import tour_of
 from app.exploration.rollout.unseen import SLACK, deeper_than_presumed, look_in_vain
 
@@ -137,7 +135,6 @@ class RolloutPlanner(PlannerBase):
         self._felt = FeltBottom()
         self._routes: dict[str, FloatArray] = {}
         self._away: dict[str, float] = {}
-        self._apart: _Apart | None = None
 
     def _remember(self) -> dict[str, Any]:
         kept = self._kept
@@ -168,7 +165,6 @@ class RolloutPlanner(PlannerBase):
             self._kept = Backbone(at, np.array(state["chain"], dtype=np.int64))
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
-        self._apart = None
         if team.belief.accurate.all():
             return Proposal(self._rest(team, bottom), 0.0)
         if team.belief.covariance_m2 is not None and team.belief.on_floor and np.isinf(team.constraints.com_range_m):
@@ -229,7 +225,9 @@ class RolloutPlanner(PlannerBase):
         constraints = team.constraints
         if self._free is None or not _same(self._free[0], constraints):
             self._free = (constraints, free_space(constraints))
-        self._away = {name: (1.0 - 1.0 / AWAY_STEPS) * self._away.get(name, 0.0) for name in whole.vehicles}
+        self._away = {name: self._away.get(name, 0.0) for name in whole.vehicles}
+        for name in whole.vehicles:
+            self._away[name] += (float(name not in team.vehicles) - self._away[name]) / AWAY_STEPS
         free_part = np.array([max(LEAST_FREE, 1.0 - self._away[name]) for name in whole.vehicles])
         mission = apart_mission(
             whole,
@@ -247,41 +245,19 @@ class RolloutPlanner(PlannerBase):
         else:
             best = mission.first()
         positions = team.positions.copy()
-        self._routes = {name: stops_of(best.routes, i) for i, name in enumerate(whole.vehicles)}
-        self._apart = _Apart(mission, best, bottom)
+        rows = {name: whole.vehicles.index(name) for name in whole.vehicles}
+        self._routes = {name: stops_of(best.routes, i) for name, i in rows.items()}
         for j, name in enumerate(team.vehicles):
-            positions[j] = self._along_route(self._apart, team, positions, j, whole.vehicles.index(name))
+            wishes, passed = mission.steps(best, rows[name])
+            tries = np.repeat(positions[None], len(wishes), axis=0)
+            tries[:, j] = wishes
+            feasible = np.flatnonzero(constraints.feasible(team.positions, tries, bottom))
+            if len(feasible):
+                positions = tries[feasible[0]]
+                self._routes[name] = self._routes[name][passed[feasible[0]] :]
         positions, _ = settle(team, bottom, positions[None])
         self._felt.ask(team.vehicles, positions)
         return Proposal(positions, -best.score, {"waypoints": float(best.routes.counts.sum())})
-
-    def _along_route(
-        self, apart: "_Apart", team: Situation, positions: FloatArray, row: int, number: int
-    ) -> FloatArray:
-        """Return where the vehicle in a row goes on its route, (3,), which has that number in the whole team."""
-        routes = apart.best.routes
-        wishes, passed = apart.mission.steps(number, route_of(routes, number), int(routes.counts[number]))
-        chosen = _first_feasible(wishes, team, positions, row, apart.bottom)
-        if chosen is None:
-            return np.asarray(positions[row])
-        name = team.vehicles[row]
-        self._routes[name] = self._routes[name][passed[chosen] :]
-        return np.asarray(wishes[chosen])
-
-    def _go(self, team: Situation, bottom: Bottom, positions: FloatArray, row: int, errand: Errand) -> FloatArray:
-        """Serve a target, where vehicles fly routes of their own, in the way that costs the landmarks least."""
-        apart, targets = self._apart, team.targets
-        if apart is None or errand.target == RISE or targets is None or targets.growth is None:
-            return super()._go(team, bottom, positions, row, errand)
-        busy = self._errands.remember()
-        others = np.array([i != row and name in busy for i, name in enumerate(team.vehicles)])
-        wishes = way_to(apart.mission, apart.best, row, others, targets, errand.target)
-        if wishes is None:
-            return self._along_route(apart, team, positions, row, row)
-        self._away[team.vehicles[row]] += 1.0 / AWAY_STEPS
-        wishes = wishes[keeps_off(wishes, team.positions[row], targets)]
-        chosen = _first_feasible(wishes, team, positions, row, apart.bottom)
-        return np.asarray(team.positions[row] if chosen is None else wishes[chosen])
 
     def _rest(self, team: Situation, bottom: Bottom) -> FloatArray:
         """Return where the vehicles wait, (n_vehicles, 3): here, or closer together when that breaks a limit."""
@@ -311,25 +287,6 @@ class RolloutPlanner(PlannerBase):
         if self._planned == 0:
             return FIRST_SEARCH
         return self.options.rollouts if mission.far_from_done else self.options.rollouts // LAST_SHARE
-
-
-@dataclass
-class _Apart:
-    """What was decided last where each vehicle flies a route of its own."""
-
-    mission: ApartMission
-    best: Best
-    bottom: Bottom
-
-
-def _first_feasible(
-    wishes: FloatArray, team: Situation, positions: FloatArray, row: int, bottom: Bottom
-) -> np.int64 | None:
-    """Return the first of the wishes (k, 3) that the vehicle in a row may follow, the others being at ``positions``."""
-    tries = np.repeat(positions[None], len(wishes), axis=0)
-    tries[:, row] = wishes
-    feasible = np.flatnonzero(team.constraints.feasible(team.positions, tries, bottom))
-    return feasible[0] if len(feasible) else None
 
 
 def _sample(left: Lacking, belief: Belief) -> NDArray[np.int64]:
