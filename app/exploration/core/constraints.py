@@ -137,7 +137,7 @@ class Constraints:
         """Height above the sea floor below which vehicles never are."""
         return self.min_altitude_m if self.held_altitude_m is None else self.held_altitude_m
 
-    @property
+    @cached_property
     def region(self) -> Region:
         """Where vehicles may be."""
         area = np.ascontiguousarray(self.area, dtype=np.float64)
