@@ -64,7 +64,7 @@ class LocalFrame:
             self._threads.transformer = transformer
         return transformer
 
-    def to_local(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def to_local(self, lat_deg: ArrayLike | float, lon_deg: ArrayLike | float) -> tuple[FloatArray, FloatArray]:
         """Return ``(east_m, north_m)`` of WGS 84 positions, in the shape of the input (0-d for scalars).
 
         Raises
