@@ -28,6 +28,8 @@ class FlownLine:
     path: FloatArray
     overlap: float
     begun: bool = False
+    entered: bool = True
+    """Whether the vehicle has come to its beginning, if it has begun."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ def recalled(kept: dict[str, Any]) -> Assignment:
             _path(course["path"]),
             float(course["overlap"]),
             bool(course["begun"]),
+            bool(course.get("entered", True)),
         ),
         _pieces(kept["expected"], kept.get("ends", [])),
         int(kept.get("refused", 0)),

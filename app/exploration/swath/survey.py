@@ -105,17 +105,16 @@ class SwathSurvey:
         reach_m
             Lines farther away than this take more than one leg to get to.
         """
-        left = self._tries.left(coverage)
         self._sweeps = {name: sweep for name, sweep in self._sweeps.items() if name in team}
         for name in team:
             self._sweeps.setdefault(name, Assignment())
         sweep = self._sweeps[vehicle]
+        left = self._tries.left(coverage)
         if sweep.skipped is not None:
             self._count(sweep.skipped, flying, left, tries=MOST_TRIES)
-            left = self._tries.left(coverage)
             sweep.skipped = None
-        asked = Question(vehicle, pose, flying, left, team)
-        self._take_back(sweep, pose)
+        self._take_back(sweep, pose, flying, left)
+        asked = Question(vehicle, pose, flying, self._tries.left(coverage), team)
         for one in self._sweeps.values():
             forget_flown(one.expected, coverage)
         if sweep.laid_on is not coverage:
@@ -173,8 +172,23 @@ class SwathSurvey:
         """Return what is left of each vehicle's line, (k, 2) east and north."""
         return {name: sweep.course.path for name, sweep in self._sweeps.items() if sweep.course is not None}
 
-    def _take_back(self, sweep: Assignment, pose: FloatArray) -> None:
-        """Put a piece of a line back that a vehicle was not sent along: it does not go on from its end."""
+    def _take_back(self, sweep: Assignment, pose: FloatArray, flying: Flying, coverage: Coverage) -> None:
+        """Put back what a vehicle was not sent along, the way to its line or a piece of it: it does not go on there.
+
+        What lies behind it was not tried either.
+        """
+        course = sweep.course
+        if course is not None and course.begun and not course.entered:
+            if not len(course.path) or np.hypot(*(pose[:2] - course.path[0])) <= NEAR_M:
+                course.entered = True
+                return
+            sweep.refused += 1
+            if sweep.refused >= MOST_REFUSED:
+                sweep.course, sweep.refused = None, 0
+                return
+            course.begun = False
+            self._count(course.path, flying, coverage, tries=-1)
+            return
         if not sweep.expected:
             return
         piece = sweep.expected[-1].path
@@ -182,13 +196,15 @@ class SwathSurvey:
             sweep.refused = 0
             return
         del sweep.expected[-1]
-        course = sweep.course
         sweep.refused += 1
         if course is None or not course.begun:
             return
-        course.path = np.vstack([piece, course.path[1:]])
-        if sweep.refused >= MOST_REFUSED:
-            sweep.course, sweep.refused = None, 0
+        if sweep.refused < MOST_REFUSED:
+            course.path = np.vstack([piece, course.path[1:]])
+            return
+        if len(course.path) > 1 and course.sign != 0:
+            self._count(course.path, flying, coverage, tries=-1)
+        sweep.course, sweep.refused = None, 0
 
     def _lay_anew(self, sweep: Assignment, asked: Question) -> None:
         """Lay a vehicle's line by what was measured since."""
@@ -224,6 +240,7 @@ class SwathSurvey:
             course.begun = True
             self._count(course.path, asked.flying, asked.coverage)
             if away_m > NEAR_M:
+                course.entered = False
                 return np.asarray(course.path[0])
         vertices = course.path if np.allclose(course.path[0], here) else np.vstack([here, course.path])
         ahead_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])

@@ -32,14 +32,15 @@ class Tries:
         return replace(coverage, done=coverage.done | (self._counts < 2))
 
     def count(self, path: FloatArray, flying: Flying, coverage: Coverage, raster: LineRaster, tries: int = 1) -> None:
-        """Note what a line (k, 2) that is begun is to see, what it leads over in any case."""
+        """Note what a line (k, 2) that is begun is to see, what it leads over in any case; -1: it was not flown."""
         seen = raster.under(path, flying)
         turned = raster.axes.turned(path)
         seen[raster.columns_of(turned[:, 0]), raster.rows_of(turned[:, 1])] = True
         places = raster.axes.turned(coverage.places_m(coverage.left))
         inside = seen[raster.columns_of(places[:, 0]), raster.rows_of(places[:, 1])]
         rows, cols = np.nonzero(coverage.left)
-        self._counts[rows[inside], cols[inside]] += tries
+        counts = self._counts[rows[inside], cols[inside]]
+        self._counts[rows[inside], cols[inside]] = np.maximum(counts + tries, 0)
 
     def remember(self) -> list[Any]:
         """Return the counts, for ``recall``."""

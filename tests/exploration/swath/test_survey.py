@@ -120,13 +120,13 @@ def test_a_survey_that_is_taken_up_goes_on_the_same() -> None:
     assert np.allclose(whole[1], parts[1])
 
 
-@pytest.mark.parametrize(("refused", "seen"), [(0.1, 0.99), (0.5, 0.95)])
-def test_what_was_refused_is_flown_later(refused: float, seen: float) -> None:
+@pytest.mark.parametrize("refused", [0.1, 0.5])
+def test_what_was_refused_is_flown_later(refused: float) -> None:
     depth = np.maximum(12.0 - 0.05 * np.arange(120)[None] + np.zeros((100, 1)), 4.0)
     sea, calm = Sea(depth), Sea(depth)
     flown, _ = sweep(sea, 2, refused=refused)
     alone, _ = sweep(calm, 2)
-    assert sea.seen.mean() > seen, "but for a little that four lines were to see"
+    assert sea.seen.mean() > 0.99
     assert flown < 1.6 * alone, "without flying everything again"
 
 
