@@ -130,6 +130,21 @@ def test_what_was_refused_is_flown_later(refused: float) -> None:
     assert flown < 1.6 * alone, "without flying everything again"
 
 
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_who_is_refused_the_way_to_its_line_is_sent_to_its_beginning_again(interrupted: bool) -> None:
+    sea = Sea(np.full((60, 80), 8.0))
+    survey, pose = SwathSurvey(0.0, 1.0, 8.0), np.array([40.0, 2.0, np.nan])
+    first = survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+    if interrupted:
+        kept = json.loads(json.dumps(survey.remember()))
+        survey = SwathSurvey(0.0, 1.0, 8.0)
+        survey.recall(kept)
+    again = survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+    assert first is not None
+    assert again is not None
+    assert np.allclose(first, again)
+
+
 def test_a_line_whose_legs_are_never_flown_is_given_up() -> None:
     sea = Sea(np.full((60, 80), 10.0))
     sweep(sea, 1, refused=1.0)
