@@ -62,6 +62,8 @@ the team's kilometres count from its start in the south-western corner. Each leg
 ends. It is kinder than the sea: vehicles fly exactly where they are sent, nothing drifts, and every beam within range
 and aperture detects the bottom. Beams are evenly spaced on a flat bottom, and the speed lets two pings meet each cell.
 The floors called *own*, and seeds 0 and 1 of the *unseen* ones, were looked at while the planner was made.
+Teams of one and two over the *own* floors are of 26 November, the *unseen* ones a day older: single rows have changed
+since, in both directions. The *large* floors were not run as a set: see [trials](trials.md#full-coverage).
 """,
 )
 ADJUSTMENT = Page(

@@ -161,6 +161,35 @@ class LineRaster:
         return np.asarray(near)
 
 
+SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
+"""Metres by which unknown ground is presumed to rise a metre away from known ground, least and most: so many times what
+the steepest known ground does. Lines rather begin too close."""
+
+
+class Rasters:
+    """Rasters of areas whose unknown ground rises as steep known ground does.
+
+    Parameters
+    ----------
+    cell_m
+        Their cell, where the coverage's is not coarser.
+    guess_m
+        Depth that is taken as long as none is known.
+    """
+
+    def __init__(self, cell_m: float, guess_m: float) -> None:
+        self.cell_m, self.guess_m = cell_m, guess_m
+        self._shoaling: tuple[FloatArray, float] | None = None
+        """How much the bottom is presumed to rise, and the depths that this follows from."""
+
+    def of(self, coverage: Coverage, direction_rad: float) -> LineRaster:
+        """Return an area in the frame of lines in a direction, anticlockwise from east."""
+        if self._shoaling is None or self._shoaling[0] is not coverage.depth_m:
+            steep = SHOALING_OF_STEEP * steepness(coverage)
+            self._shoaling = coverage.depth_m, float(np.clip(steep, *SHOALING))
+        return raster_of(coverage, direction_rad, self.cell_m, self.guess_m, self._shoaling[1])
+
+
 def raster_of(
     coverage: Coverage, direction_rad: float, cell_m: float, guess_m: float, shoaling: float = 0.0
 ) -> LineRaster:

@@ -120,14 +120,29 @@ def test_a_survey_that_is_taken_up_goes_on_the_same() -> None:
     assert np.allclose(whole[1], parts[1])
 
 
-@pytest.mark.parametrize(("refused", "seen"), [(0.1, 0.99), (0.5, 0.95)])
-def test_what_was_refused_is_flown_later(refused: float, seen: float) -> None:
+@pytest.mark.parametrize("refused", [0.1, 0.5])
+def test_what_was_refused_is_flown_later(refused: float) -> None:
     depth = np.maximum(12.0 - 0.05 * np.arange(120)[None] + np.zeros((100, 1)), 4.0)
     sea, calm = Sea(depth), Sea(depth)
     flown, _ = sweep(sea, 2, refused=refused)
     alone, _ = sweep(calm, 2)
-    assert sea.seen.mean() > seen, "but for a little that four lines were to see"
+    assert sea.seen.mean() > 0.99
     assert flown < 1.6 * alone, "without flying everything again"
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_who_is_refused_the_way_to_its_line_is_sent_to_its_beginning_again(interrupted: bool) -> None:
+    sea = Sea(np.full((60, 80), 8.0))
+    survey, pose = SwathSurvey(0.0, 1.0, 8.0), np.array([40.0, 2.0, np.nan])
+    first = survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+    if interrupted:
+        kept = json.loads(json.dumps(survey.remember()))
+        survey = SwathSurvey(0.0, 1.0, 8.0)
+        survey.recall(kept)
+    again = survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
+    assert first is not None
+    assert again is not None
+    assert np.allclose(first, again)
 
 
 def test_a_line_whose_legs_are_never_flown_is_given_up() -> None:

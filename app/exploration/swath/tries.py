@@ -1,0 +1,54 @@
+"""How often lines were to see a cell in vain: what so many did not see is given up."""
+
+import base64
+import zlib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.arrays import FloatArray, IntArray
+from app.exploration.core.coverage import Coverage
+from app.exploration.swath.raster import Flying, LineRaster
+
+MOST_TRIES = 4
+"""What so many lines were to see and did not is given up."""
+
+
+class Tries:
+    """Counts of lines for each cell of the grid."""
+
+    def __init__(self) -> None:
+        self._counts: IntArray = np.zeros((0, 0), dtype=np.int64)
+
+    def left(self, coverage: Coverage) -> Coverage:
+        """Return the same without what is given up; all begins anew on another grid."""
+        if self._counts.shape != coverage.wanted.shape:
+            self._counts = np.zeros(coverage.wanted.shape, dtype=np.int64)
+        return replace(coverage, done=coverage.done | (self._counts >= MOST_TRIES))
+
+    def again(self, coverage: Coverage) -> Coverage:
+        """Return the same with nothing left but what two lines were to see and did not."""
+        return replace(coverage, done=coverage.done | (self._counts < 2))
+
+    def count(self, path: FloatArray, flying: Flying, coverage: Coverage, raster: LineRaster, tries: int = 1) -> None:
+        """Note what a line (k, 2) that is begun is to see, what it leads over in any case; -1: it was not flown."""
+        seen = raster.under(path, flying)
+        turned = raster.axes.turned(path)
+        seen[raster.columns_of(turned[:, 0]), raster.rows_of(turned[:, 1])] = True
+        places = raster.axes.turned(coverage.places_m(coverage.left))
+        inside = seen[raster.columns_of(places[:, 0]), raster.rows_of(places[:, 1])]
+        rows, cols = np.nonzero(coverage.left)
+        counts = self._counts[rows[inside], cols[inside]]
+        self._counts[rows[inside], cols[inside]] = np.maximum(counts + tries, 0)
+
+    def remember(self) -> list[Any]:
+        """Return the counts, for ``recall``."""
+        packed = zlib.compress(np.minimum(self._counts, 255).astype(np.uint8).tobytes(), level=1)
+        return [self._counts.shape, base64.b64encode(packed).decode()]
+
+    def recall(self, state: list[Any]) -> None:
+        """Take up what ``remember`` returned. Raises TypeError or ValueError when it is not that."""
+        shape, packed = state
+        counts = np.frombuffer(zlib.decompress(base64.b64decode(packed)), np.uint8)
+        self._counts = counts.reshape(tuple(shape)).astype(np.int64)
