@@ -86,6 +86,22 @@ def test_what_was_imported_is_the_floor_that_lines_are_laid_for() -> None:
     assert known.coverage_pct > 97.0
 
 
+def test_what_was_missed_in_a_few_cells_is_still_to_be_flown_however_wide_swaths_are() -> None:
+    spec = beams(names="a", cell_m=1.0, coverage={"crosslines_pct": 0})
+    east, north = (axis.ravel() for axis in np.meshgrid(np.arange(0.5, 60.0), np.arange(0.5, 60.0)))
+    seen = np.hypot(east - 30.0, north - 30.0) > 3.0
+    sounded = np.column_stack([east, north, np.full_like(east, 50.0), np.full_like(east, 0.1)])
+    team = Team()
+    members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+    starts = starts_of(spec, members)[0]
+    flights = [
+        fly_over(level(50.0, 60.0), spec, members, starts, SoFar(soundings=rows), AMPLE_S)
+        for rows in (sounded, sounded[seen])
+    ]
+    assert flights[0].duration_s < 1.0
+    assert flights[1].duration_s > 20.0
+
+
 def test_a_zone_is_gone_round_and_nobody_waits_beside_it_for_ever() -> None:
     spec = beams(100.0, keep_out=[rectangle(40, 35, 60, 55)], budget={"minutes": 120})
     found = flown(spec, level(12.0, 100.0))
