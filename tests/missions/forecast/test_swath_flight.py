@@ -12,7 +12,7 @@ from app.estimation.swath import SwathSonar
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.request import _view, _whole, starts_of
 from app.missions.forecast.simulate import Forecast, fly_over
-from app.missions.forecast.swarm import Flown, SoFar, steered
+from app.missions.forecast.swarm import Flown, SoFar, circle_m, steered
 from app.missions.forecast.swath_flight import swath_of, sweeps
 from app.missions.forecast.whole_survey import batteries
 from app.missions.recovery.failsafes import with_reserve_s
@@ -20,6 +20,7 @@ from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
 from simulator.floors.terrain import Terrain
+from simulator.world import SimulatedVehicle
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
 
 NONE = np.zeros((0, 4))
@@ -199,3 +200,24 @@ def test_only_surveys_with_swath_sonars_sweep() -> None:
     assert sweeps(beams())
     assert not sweeps(beams(planner={"name": "lawnmower"}))
     assert not sweeps(make_spec(planner={"name": "swath"}))
+
+
+@pytest.mark.parametrize(("course_deg", "aside_m"), [(0.0, 6.0), (0.0, 12.0), (90.0, 6.0), (150.0, 6.0), (180.0, 10.0)])
+def test_ways_are_as_long_as_a_simulated_vehicle_flies_them(course_deg: float, aside_m: float) -> None:
+    """Up a line, aside, and on in another course."""
+    floor = Terrain(np.full((42, 42), 20.0), 5.0, name="level")
+    course = math.radians(90.0 + course_deg)
+    far_m = np.array([100.0 + aside_m, 100.0]) + 40.0 * np.array([math.sin(course), math.cos(course)])
+    ends = [(100.0, 100.0), (100.0 + aside_m, 100.0), (float(far_m[0]), float(far_m[1]))]
+    craft = SimulatedVehicle("a", floor, (100.0, 60.0, 2.0), np.random.default_rng(0))
+    spec = beams(names="a")
+    pose, way_m, flown_m, here = (100.0, 60.0, 0.0), 0.0, 0.0, craft.position
+    for end in ends:
+        craft.go_to(*end, 2.0, 1.3, arrival_radius_m=2.0, pass_within_m=8.0)
+        while not craft.arrived:
+            craft.advance(0.1)
+            before, here = here, craft.position
+            flown_m += math.hypot(here.east_m - before.east_m, here.north_m - before.north_m)
+        poses, piece_m = steered(pose, end, circle_m(spec, spec.vehicles[0]), 2.0)
+        pose, way_m = (float(poses[-1, 0]), float(poses[-1, 1]), float(poses[-1, 2])), way_m + piece_m
+    assert way_m == pytest.approx(flown_m, rel=0.06)
