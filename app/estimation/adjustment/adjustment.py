@@ -6,11 +6,11 @@ from functools import cache
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 from scipy.special import stdtrit
 
-from app.arrays import BoolArray, FloatArray, IntArray
-from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
+from app.arrays import BoolArray, FloatArray
+from app.estimation.adjustment.drift import DriftModel, Nodes
+from app.estimation.adjustment.least_squares import LeastSquares, ModelsOfDrift, Solution, WeighedTies
 from app.estimation.adjustment.ties import Known, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
 
@@ -32,7 +32,6 @@ LEAST_WEIGHT = 0.15
 """Ties that count less are called outliers."""
 
 THREADS = 2
-COLUMNS_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
@@ -126,68 +125,6 @@ class AdjustedTracks:
         return np.asarray(weights @ self.offset_m)
 
 
-@dataclass(frozen=True)
-class _State:
-    """Errors of nodes (m, 2) with what determines them."""
-
-    offset_m: FloatArray
-    factors: SuperLU
-    ties: list[Tie]
-    weights: FloatArray
-
-
-class _Problem:
-    """The least-squares problem: unknowns are errors and rates of all nodes, east first, then north."""
-
-    def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
-        self._m = len(nodes)
-        matrix, right = prior_rows(nodes, fixes, model)
-        normal = sparse.csc_array(matrix.T @ matrix)
-        self._normal = sparse.block_diag([normal, normal], format="csc")
-        self._right = np.concatenate([matrix.T @ right[:, 0], matrix.T @ right[:, 1]])
-
-    def solve(self, ties: list[Tie], targets: FloatArray, weights: FloatArray) -> _State:
-        """Return the solution under ties with targets (k, 2) for what they compare, and weights (k,)."""
-        normal, right = self._normal, self._right.copy()
-        rows: list[IntArray] = []
-        cols: list[IntArray] = []
-        values: list[FloatArray] = []
-        for tie, target, weight in zip(ties, targets, weights, strict=True):
-            if tie.outcome != Outcome.USED or weight <= 0.0:
-                continue
-            squares = np.outer(tie.weights, tie.weights)
-            for i in range(2):
-                for j in range(2):
-                    value = weight * tie.information[i, j]
-                    at = np.broadcast_to((2 * i * self._m + tie.nodes)[:, None], squares.shape)
-                    rows.append(at.ravel())
-                    cols.append(np.broadcast_to(2 * j * self._m + tie.nodes, squares.shape).ravel())
-                    values.append((value * squares).ravel())
-                    right[2 * i * self._m + tie.nodes] += tie.weights * value * target[j]
-        if rows:
-            added = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
-            normal = normal + sparse.csc_array(added, shape=normal.shape)
-        factors = splu(sparse.csc_matrix(normal), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        found = factors.solve(right)
-        offset = np.column_stack([found[: self._m], found[2 * self._m : 3 * self._m]])
-        return _State(offset, factors, ties, weights)
-
-    def covariances(self, state: _State, compared: sparse.csr_array) -> FloatArray:
-        """Return the covariances (k, 2, 2) of combinations (k, m) of the nodes' errors."""
-        k = compared.shape[0]
-        found = np.zeros((k, 2, 2))
-        for begin in range(0, k, COLUMNS_AT_ONCE):
-            piece = compared[begin : begin + COLUMNS_AT_ONCE].toarray()
-            for i in range(2):
-                wide = np.zeros((4 * self._m, len(piece)))
-                wide[2 * i * self._m : (2 * i + 1) * self._m] = piece.T
-                solved = state.factors.solve(wide)
-                for j in range(2):
-                    part = solved[2 * j * self._m : (2 * j + 1) * self._m]
-                    found[begin : begin + len(piece), i, j] = np.einsum("km,mk->k", piece, part)
-        return 0.5 * (found + found.transpose(0, 2, 1))
-
-
 def adjusted(
     soundings: TrackSoundings,
     fixes: Fixes,
@@ -229,13 +166,9 @@ def adjusted(
     if not len(soundings):
         raise ValueError("there is no sounding along which a track could be adjusted")
     nodes = Nodes.along(soundings, fixes, node_s)
-    model = _scaled(model or DriftModel(), nodes, fixes)
-    problem = _Problem(nodes, fixes, model)
-    no_ties = np.zeros((0, 2)), np.zeros(0)
-    by_fixes = problem.solve([], *no_ties)
-    every_node = sparse.csr_array(sparse.identity(len(nodes), format="csr"))
-    raw_sd = _Problem(nodes, Fixes.none(), model)
-    before_sd = _deviations(raw_sd, raw_sd.solve([], *no_ties), every_node)
+    models = ModelsOfDrift(nodes, fixes, model or DriftModel())
+    problem = LeastSquares(nodes, fixes, models.typical())
+    by_fixes = problem.solve(WeighedTies.none())
     weights = nodes.interpolation(soundings.vehicle, soundings.time_s)
     dive = nodes.dive[nodes.weights(soundings.vehicle, soundings.time_s)[0][:, 1]]
     sections = Sections.of_tracks(soundings, dive, section_s)
@@ -249,9 +182,9 @@ def adjusted(
         held_out = found.compare(held, by_fixes, tried)
         by_ties = held_out is not None and held_out.speaks_for_ties
         state = found.run(tried, np.ones(len(sections), dtype=bool), LAST_ROUNDS) if by_ties else by_fixes
-        shown = found.shown(state if by_ties else replace(by_fixes, ties=tried.ties), state.offset_m, held, by_ties)
-    sd = _deviations(problem, state, every_node)
-    return AdjustedTracks(nodes, state.offset_m, sd, before_sd, shown, held_out, by_ties)
+        offset, sd, before_sd = models.average(state.ties)
+        shown = found.shown(state.ties if by_ties else tried.ties, offset, held, by_ties)
+    return AdjustedTracks(nodes, offset, sd, before_sd, shown, held_out, by_ties)
 
 
 class _Adjustment:
@@ -259,7 +192,7 @@ class _Adjustment:
 
     pool: ThreadPoolExecutor
 
-    def __init__(self, matcher: Matcher, problem: _Problem, weights: sparse.csr_array, most_m: float) -> None:
+    def __init__(self, matcher: Matcher, problem: LeastSquares, weights: sparse.csr_array, most_m: float) -> None:
         self._matcher, self._problem, self._weights, self._most_m = matcher, problem, weights, most_m
 
     def places(self, offset_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -268,7 +201,7 @@ class _Adjustment:
         off = self._weights @ offset_m
         return soundings.east_m - off[:, 0], soundings.north_m - off[:, 1]
 
-    def run(self, state: _State, used: BoolArray, rounds: int) -> _State:
+    def run(self, state: Solution, used: BoolArray, rounds: int) -> Solution:
         """Return what ties of the used sections (k,) make of a state."""
         sections = self._matcher.sections
         for _ in range(rounds):
@@ -287,19 +220,19 @@ class _Adjustment:
             targets = before + np.array([tie.shift_m for tie in ties]).reshape(-1, 2)
             weights = np.ones(len(ties))
             for _ in range(5):
-                state = self._problem.solve(ties, targets, weights)
+                state = self._problem.solve(WeighedTies(ties, targets, weights))
                 left = np.array([tie.weights @ state.offset_m[tie.nodes] for tie in ties]).reshape(-1, 2) - targets
                 information = np.array([tie.information for tie in ties]).reshape(-1, 2, 2)
                 square = np.einsum("ki,kij,kj->k", left, information, left)
                 weights = 1.0 / (1.0 + square / CAUCHY**2)
-            state = replace(state, weights=weights)
+            state = replace(state, ties=WeighedTies(ties, targets, weights))
         return state
 
-    def _known(self, state: _State) -> list[Known]:
+    def _known(self, state: Solution) -> list[Known]:
         """Return for each section what is known of its shift, without its own tie, beyond a state's errors."""
         sections, nodes = self._matcher.sections, self._matcher.nodes
         combined = nodes.interpolation(sections.vehicle, sections.middle_s).tolil()
-        for k, tie in enumerate(state.ties):
+        for k, tie in enumerate(state.ties.ties):
             if tie.outcome == Outcome.USED:
                 combined[k] = 0.0
                 combined[[k], tie.nodes] = tie.weights
@@ -307,15 +240,15 @@ class _Adjustment:
         found = []
         for k in range(len(sections)):
             covariance, mean = covariances[k] + 1e-6 * np.eye(2), np.zeros(2)
-            if k < len(state.ties) and state.ties[k].outcome == Outcome.USED:
-                tie, weight = state.ties[k], state.weights[k]
+            if k < len(state.ties.ties) and state.ties.ties[k].outcome == Outcome.USED:
+                tie, weight = state.ties.ties[k], state.ties.weights[k]
                 precision = np.linalg.inv(covariance) - 0.98 * weight * tie.information
                 low, axes = np.linalg.eigh(precision)
                 covariance = (axes / np.maximum(low, 1e-3)) @ axes.T
             found.append(Known(mean, covariance))
         return found
 
-    def compare(self, held: BoolArray, by_fixes: _State, tried: _State) -> HeldOut | None:
+    def compare(self, held: BoolArray, by_fixes: Solution, tried: Solution) -> HeldOut | None:
         """Return how well sections (k,) fit that were left out; None where too few overlap with others."""
         which = np.flatnonzero(held).tolist()
         sets = [self._residuals(which, offset) for offset in (0.0 * tried.offset_m, by_fixes.offset_m, tried.offset_m)]
@@ -333,7 +266,7 @@ class _Adjustment:
         east, north = self.places(offset_m)
         return list(self.pool.map(lambda k: self._matcher.residual_m(k, east, north), which))
 
-    def shown(self, state: _State, offset_m: FloatArray, held: BoolArray, by_ties: bool) -> tuple[TieFound, ...]:
+    def shown(self, ties: WeighedTies, offset_m: FloatArray, held: BoolArray, by_ties: bool) -> tuple[TieFound, ...]:
         """Return what became of all ties."""
         sections, nodes = self._matcher.sections, self._matcher.nodes
         which = list(range(len(sections)))
@@ -342,7 +275,7 @@ class _Adjustment:
         east, north = self.places(offset_m)
         found = []
         for k in which:
-            tie = state.ties[k] if k < len(state.ties) else _NONE
+            tie = ties.ties[k] if k < len(ties.ties) else _NONE
             outcome, others = tie.outcome, None
             sd = (np.inf, np.inf)
             if outcome == Outcome.USED:
@@ -352,7 +285,7 @@ class _Adjustment:
                 others = int(np.argmax(far))
                 if not by_ties:
                     outcome = Outcome.NOT_SIGNIFICANT
-                elif state.weights[k] < LEAST_WEIGHT:
+                elif ties.weights[k] < LEAST_WEIGHT:
                     outcome = Outcome.OUTLIER
             rows = slice(sections.first[k], sections.first[k + 1])
             found.append(
@@ -373,23 +306,6 @@ class _Adjustment:
 
 
 _NONE = Tie(np.zeros(2), np.zeros((2, 2)), np.zeros(0, np.int64), np.zeros(0), Outcome.NO_OVERLAP, np.nan)
-
-
-def _deviations(problem: _Problem, state: _State, every_node: sparse.csr_array) -> FloatArray:
-    covariances = problem.covariances(state, every_node)
-    return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", covariances), 0.0)))
-
-
-def _scaled(model: DriftModel, nodes: Nodes, fixes: Fixes) -> DriftModel:
-    """Return the model as the fixes at the ends of dives show drift."""
-    ends, off = [], []
-    for k in range(len(fixes)):
-        mine = (nodes.vehicle == fixes.vehicle[k]) & (nodes.time_s < fixes.time_s[k] - 1.0)
-        if mine.any():
-            dive = nodes.dive[np.flatnonzero(mine)[-1]]
-            ends.append(fixes.time_s[k] - nodes.time_s[nodes.dive == dive][0])
-            off.append((fixes.east_m[k], fixes.north_m[k]))
-    return model.scaled_to(np.array(ends), np.array(off).reshape(-1, 2))
 
 
 @cache

@@ -9,6 +9,12 @@ from app.arrays import FloatArray, IntArray
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
 
 HOUR_S = 3600.0
+FACTORS = (0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
+FACTOR_LOG_SD = 1.0
+"""Vehicles drift more or less than usual by a factor whose logarithm has this deviation."""
+
+RATE_TIMES_S = (200.0, 500.0, 1200.0)
+"""So long currents and headings last, about; each is as probable."""
 
 
 @dataclass(frozen=True)
@@ -35,22 +41,19 @@ class DriftModel:
     rate_time_s: float = 600.0
     start_sd_m: float = 1.0
 
-    def sd_m(self, time_s: FloatArray) -> FloatArray:
-        """Return the standard deviation of each coordinate so long after the begin of a dive."""
-        tau, rate = self.rate_time_s, self.rate_mph / HOUR_S
-        grown = 2.0 * tau * (time_s - tau * (1.0 - np.exp(-time_s / tau)))
-        return np.sqrt(self.start_sd_m**2 + self.walk_m**2 * time_s / HOUR_S + rate**2 * grown)
+    def alike(self) -> list[tuple["DriftModel", float]]:
+        """Return the models that may hold where this is what is usual, each with the logarithm of its probability.
 
-    def scaled_to(self, ends_s: FloatArray, off_m: FloatArray) -> "DriftModel":
-        """Return the model with a factor on its growth, by which errors off_m (k, 2) so long after begins are likely.
-
-        The model as it is counts as two such errors; the factor is between a third and five.
+        They drift by other factors and keep their rates for other times; all less one constant.
         """
-        if not len(ends_s):
-            return self
-        ratio = (off_m**2).sum(axis=1) / (2.0 * self.sd_m(ends_s) ** 2)
-        factor = float(np.clip(np.sqrt((2.0 + ratio.sum()) / (2.0 + len(ratio))), 1.0 / 3.0, 5.0))
-        return replace(self, walk_m=factor * self.walk_m, rate_mph=factor * self.rate_mph)
+        return [
+            (
+                replace(self, walk_m=factor * self.walk_m, rate_mph=factor * self.rate_mph, rate_time_s=time_s),
+                -0.5 * (np.log(factor) / FACTOR_LOG_SD) ** 2,
+            )
+            for factor in FACTORS
+            for time_s in RATE_TIMES_S
+        ]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,167 @@
+"""Errors of nodes by ties, fixes and how positions drift: one sparse least-squares problem, and several weighed."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from app.arrays import FloatArray, IntArray
+from app.estimation.adjustment.drift import DriftModel, Nodes, prior_rows
+from app.estimation.adjustment.ties import Outcome, Tie
+from app.estimation.adjustment.tracks import Fixes
+
+COLUMNS_AT_ONCE = 256
+LEAST_SHARE = 0.01
+"""Models that are less probable than this share of the most probable one are left out."""
+
+
+@dataclass(frozen=True)
+class WeighedTies:
+    """Ties with what each compares to (k, 2) and how much it counts (k,)."""
+
+    ties: list[Tie]
+    targets_m: FloatArray
+    weights: FloatArray
+
+    @classmethod
+    def none(cls) -> "WeighedTies":
+        """Return no ties."""
+        return cls([], np.zeros((0, 2)), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Errors of nodes (m, 2) with what determines them.
+
+    Attributes
+    ----------
+    offset_m
+    factors
+        Of the normal matrix.
+    ties
+    log_evidence
+        Logarithm of how probable fixes and ties are by the drift model, less what is the same for all models.
+    """
+
+    offset_m: FloatArray
+    factors: SuperLU
+    ties: WeighedTies
+    log_evidence: float
+
+
+class LeastSquares:
+    """The least-squares problem: unknowns are errors and rates of all nodes, east first, then north."""
+
+    def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
+        self._m = len(nodes)
+        self.model = model
+        matrix, right = prior_rows(nodes, fixes, model)
+        self._normal = _of_both(matrix)
+        self._log_prior = _half_log_det(_factors(_of_both(prior_rows(nodes, Fixes.none(), model)[0])))
+        self._right = np.concatenate([matrix.T @ right[:, 0], matrix.T @ right[:, 1]])
+
+    def solve(self, ties: WeighedTies) -> Solution:
+        """Return the solution under ties."""
+        normal, right = self._normal, self._right.copy()
+        rows: list[IntArray] = []
+        cols: list[IntArray] = []
+        values: list[FloatArray] = []
+        for tie, target, weight in zip(ties.ties, ties.targets_m, ties.weights, strict=True):
+            if tie.outcome != Outcome.USED or weight <= 0.0:
+                continue
+            squares = np.outer(tie.weights, tie.weights)
+            for i in range(2):
+                for j in range(2):
+                    value = weight * tie.information[i, j]
+                    at = np.broadcast_to((2 * i * self._m + tie.nodes)[:, None], squares.shape)
+                    rows.append(at.ravel())
+                    cols.append(np.broadcast_to(2 * j * self._m + tie.nodes, squares.shape).ravel())
+                    values.append((value * squares).ravel())
+                    right[2 * i * self._m + tie.nodes] += tie.weights * value * target[j]
+        if rows:
+            added = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
+            normal = normal + sparse.csc_array(added, shape=normal.shape)
+        factors = _factors(normal)
+        found = factors.solve(right)
+        offset = np.column_stack([found[: self._m], found[2 * self._m : 3 * self._m]])
+        log_evidence = self._log_prior - _half_log_det(factors) + 0.5 * float(right @ found)
+        return Solution(offset, factors, ties, log_evidence)
+
+    def covariances(self, solution: Solution, compared: sparse.csr_array) -> FloatArray:
+        """Return the covariances (k, 2, 2) of combinations (k, m) of the nodes' errors."""
+        k = compared.shape[0]
+        found = np.zeros((k, 2, 2))
+        for begin in range(0, k, COLUMNS_AT_ONCE):
+            piece = compared[begin : begin + COLUMNS_AT_ONCE].toarray()
+            for i in range(2):
+                wide = np.zeros((4 * self._m, len(piece)))
+                wide[2 * i * self._m : (2 * i + 1) * self._m] = piece.T
+                solved = solution.factors.solve(wide)
+                for j in range(2):
+                    part = solved[2 * j * self._m : (2 * j + 1) * self._m]
+                    found[begin : begin + len(piece), i, j] = np.einsum("km,mk->k", piece, part)
+        return 0.5 * (found + found.transpose(0, 2, 1))
+
+    def deviations(self, solution: Solution) -> FloatArray:
+        """Return the standard deviations (m, 2) of the nodes' errors."""
+        every_node = sparse.csr_array(sparse.identity(self._m, format="csr"))
+        covariances = self.covariances(solution, every_node)
+        return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", covariances), 0.0)))
+
+
+class ModelsOfDrift:
+    """The same problem by several models of drift, of which nobody knows which one holds.
+
+    How fast positions drift is told by few fixes and by the ties. Deviations of the one model that fits best would be
+    too small: what several models give is averaged, weighed by how probable each is (Bayesian model averaging).
+    """
+
+    def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
+        alike = model.alike()
+        self._problems = [LeastSquares(nodes, fixes, one) for one, _ in alike]
+        self._reckoned = [LeastSquares(nodes, Fixes.none(), one) for one, _ in alike]
+        self._log_prior = np.array([log_prior for _, log_prior in alike])
+
+    def typical(self) -> DriftModel:
+        """Return the mean of the models, as probable as they are by fixes alone."""
+        models = [problem.model for problem in self._problems]
+        chance = self._chances([problem.solve(WeighedTies.none()) for problem in self._problems])
+        walk, rate, rate_time_s = (
+            float(np.exp(chance @ np.log([getattr(one, name) for one in models])))
+            for name in ("walk_m", "rate_mph", "rate_time_s")
+        )
+        return replace(models[0], walk_m=walk, rate_mph=rate, rate_time_s=rate_time_s)
+
+    def average(self, ties: WeighedTies) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return errors of nodes (m, 2) under ties, their deviations, and those by no fix or tie, over all models."""
+        solutions = [problem.solve(ties) for problem in self._problems]
+        chance = self._chances(solutions)
+        kept = np.flatnonzero(chance >= LEAST_SHARE * chance.max())
+        chance = chance[kept] / chance[kept].sum()
+        offsets = np.array([solutions[k].offset_m for k in kept])
+        deviations = np.array([self._problems[k].deviations(solutions[k]) for k in kept])
+        mean = np.einsum("h,hmi->mi", chance, offsets)
+        variance = np.einsum("h,hmi->mi", chance, deviations**2 + (offsets - mean) ** 2)
+        before = [self._reckoned[k].deviations(self._reckoned[k].solve(WeighedTies.none())) for k in kept]
+        before_variance = np.einsum("h,hmi->mi", chance, np.array(before) ** 2)
+        return mean, np.sqrt(variance), np.sqrt(before_variance)
+
+    def _chances(self, solutions: list[Solution]) -> FloatArray:
+        log = np.array([one.log_evidence for one in solutions]) + self._log_prior
+        chance = np.exp(log - log.max())
+        return np.asarray(chance / chance.sum())
+
+
+def _of_both(matrix: sparse.csr_array) -> sparse.csc_array:
+    """Return the normal matrix of rows that say the same of east and north."""
+    normal = sparse.csc_array(matrix.T @ matrix)
+    return sparse.csc_array(sparse.block_diag([normal, normal], format="csc"))
+
+
+def _factors(normal: sparse.csc_array) -> SuperLU:
+    return splu(sparse.csc_matrix(normal), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+
+
+def _half_log_det(factors: SuperLU) -> float:
+    return 0.5 * float(np.log(np.abs(factors.U.diagonal())).sum())
