@@ -16,7 +16,7 @@ from app import __version__
 from app.commands.alarms import alarms_app
 from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
-from app.commands.common import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, command_settings, noted
 from app.commands.data import adjust, export, import_file, report, tide
 from app.commands.failsafes import failsafes
 from app.commands.home import home

@@ -23,7 +23,7 @@ from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.api import logs
-from app.api.access import audit_routes, signing_in
+from app.api.access import audit_routes, sign_in
 from app.api.access.address_key import AddressKeyMiddleware
 from app.api.access.auth import console_log_in
 from app.api.access.shares import ShareMiddleware
@@ -100,7 +100,7 @@ ROUTERS = (
     orders.router,
     alarms.router,
     audit_routes.router,
-    signing_in.router,
+    sign_in.router,
     health_router(API),
 )
 """In the order in which a request's path is looked for."""

@@ -28,7 +28,8 @@ from imc_bridge.links import Links
 from imc_bridge.network.drops import DropMeter
 from imc_bridge.network.transport import Address, Transport
 from imc_bridge.nodes.node import Node
-from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.registry import NodeRegistry
+from imc_bridge.nodes.status import status_of
 from imc_bridge.receiver import Hearing
 from imc_bridge.sender import Speaker
 from imc_bridge.settings import BridgeSettings
@@ -86,14 +87,14 @@ class Bridge:
         self._clock = clock
         self._wall_clock = wall_clock
         self._on_event: EventCallback = lambda _event: None
-        self._roster = Roster(settings)
+        self._registry = NodeRegistry(settings)
         self.transport = Transport(settings, self.on_packet, self.on_announce)
-        self._speaker = Speaker(settings, self.transport, self._roster, commanding=commanding, wall_clock=wall_clock)
+        self._speaker = Speaker(settings, self.transport, self._registry, commanding=commanding, wall_clock=wall_clock)
         self._crew = Crew(settings, self._speaker.send, self._tell, wall_clock)
         self._links = Links(self._tell, wall_clock)
         self._hearing = Hearing(
             settings,
-            self._roster,
+            self._registry,
             self._crew,
             self._links,
             self._tell,
@@ -102,8 +103,8 @@ class Bridge:
             wall_clock,
             self._speaker,
         )
-        self._roster.capacity.in_use = self._crew.works_with
-        self._roster.left += [self._crew.forget, self._links.forget, self._hearing.forget]
+        self._registry.capacity.in_use = self._crew.works_with
+        self._registry.left += [self._crew.forget, self._links.forget, self._hearing.forget]
         self.board = self._speaker.board
         """What other consoles are shown."""
         self.decoder, self.announces = self._hearing.decoder, self._hearing.announces
@@ -198,12 +199,12 @@ class Bridge:
                 rate_limiters=self._crew.rates_text(node),
                 way_home=way_home.text if (way_home := self._crew.way_home(node)) is not None else "",
             )
-            for node in self._roster
+            for node in self._registry
         )
 
     def want(self, vehicle: str) -> None:
         """Reserve a place for a vehicle of this name, however many other systems announce themselves."""
-        self._roster.capacity.wanted.add(vehicle)
+        self._registry.capacity.wanted.add(vehicle)
 
     def position_rad(self) -> tuple[float, float]:
         """The place that we announce as ours."""
@@ -229,7 +230,7 @@ class Bridge:
         self._crew.guide(node, guidance)
         control = self._crew.of(node)
         if guidance is Guidance.ACOUSTIC:
-            self._crew.attach_sound(node, gateway, self._roster, self._now)
+            self._crew.attach_sound(node, gateway, self._registry, self._now)
         if not control.engaged and control.engage(self._now()):
             self._crew.rates_of(node).begin()
             way_home = self._crew.way_home(node)
@@ -246,9 +247,9 @@ class Bridge:
         """Return a vehicle that may be commanded. Raises RefusedError."""
         if not self._commanding:
             raise RefusedError(vehicle, "this bridge only listens", "Use one that may command")
-        node = self._roster.named(vehicle)
+        node = self._registry.named(vehicle)
         if node is None:
-            known = ", ".join(n.name for n in self._roster if n.is_vehicle) or "none"
+            known = ", ".join(n.name for n in self._registry if n.is_vehicle) or "none"
             raise RefusedError(vehicle, f"never heard of (known: {known})", "Switch it on; see `bathyfleet doctor`")
         return node
 
@@ -287,7 +288,7 @@ class Bridge:
 
     def intervention(self, vehicle: str) -> str:
         """Return why a vehicle left us of its own or another console's will, until :meth:`stop` is called; else ''."""
-        node = self._roster.named(vehicle)
+        node = self._registry.named(vehicle)
         return self._crew.of(node).intervention if node is not None and self._commanding else ""
 
     def goto(self, vehicle: str, waypoint: Waypoint) -> None:
@@ -298,7 +299,7 @@ class Bridge:
         RefusedError
             When the vehicle is not engaged.
         """
-        node = self._roster.named(vehicle)
+        node = self._registry.named(vehicle)
         control = self._crew.get(node) if node is not None else None
         if control is None or not control.engaged:
             refusal = control.refusal if control is not None else None
@@ -316,7 +317,7 @@ class Bridge:
         acknowledged the references have ceased all the same, which ends the plan on board within seconds, and STOP
         goes on being sent whenever the vehicle shows up in our plan.
         """
-        node = self._roster.named(vehicle)
+        node = self._registry.named(vehicle)
         if node is None:
             return StopResult(vehicle, False, "never heard of")
         if not self._commanding:
@@ -328,7 +329,7 @@ class Bridge:
 
     async def _stop(self, node: Node, timeout_s: float) -> StopResult:
         vehicle, control = node.name, self._crew.of(node)
-        if node.status(self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
+        if status_of(node, self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
             # It is out of reach, and is stopped when its packets arrive again.
             timeout_s = min(timeout_s, SILENT_STOP_WALL_S)
         control.begin_stop(self._now())
@@ -337,7 +338,7 @@ class Bridge:
             waited = self._clock() - begun
             if waited >= timeout_s:
                 control.give_up_stop(self._now())
-                reason = node.status(self._now()).reason
+                reason = status_of(node, self._now()).reason
                 return StopResult(
                     vehicle,
                     False,
@@ -383,7 +384,7 @@ class Bridge:
         now = self._now()
         if seconds > WORTH_TELLING_WALL_S * self.settings.time_scale:
             log.warning("The IMC bridge was held up for %.1f s", seconds / self.settings.time_scale)
-        for node in self._roster:
+        for node in self._registry:
             node.excuse(seconds, now)
         for control in self._crew:
             control.excuse(seconds, now)
@@ -400,11 +401,11 @@ class Bridge:
         lost = self.drops.look(self._clock())
         if lost:
             self._tell(PacketsDropped(lost))
-        for node in self._roster:
+        for node in self._registry:
             if node.is_vehicle and self._speaker.talks_to(node):
                 self._crew.tick(node, now)
-        self._roster.pass_time(now)
-        for node in self._roster:
+        self._registry.pass_time(now)
+        for node in self._registry:
             self._links.check(node, self._crew.get(node), now)
 
     # Telling the user

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from imc_bridge.control.control import Control
 from imc_bridge.events import LinkChange, NodeState
 from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.status import status_of
 
 KEPT = 32
 """Changes of a link that are kept, with their times and reasons."""
@@ -39,7 +40,7 @@ class Links:
 
     def check(self, node: Node, control: Control | None, now: float) -> None:
         """Tell when a node's link is not as it was."""
-        status = node.status(now)
+        status = status_of(node, now)
         engaged = control is not None and control.engaged
         past = self._past.setdefault(node.imc_id, deque(maxlen=KEPT))
         known = past[-1] if past else None

@@ -16,7 +16,7 @@ from imc_bridge.network.transport import Address
 from imc_bridge.nodes.admission import Admission
 from imc_bridge.nodes.node import Node
 from imc_bridge.nodes.refusals import Refused
-from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.nodes.vehicle_clock import Tick
 from imc_bridge.sender import Speaker
 from imc_bridge.settings import BridgeSettings
@@ -58,7 +58,7 @@ class Hearing:
     Parameters
     ----------
     settings
-    roster, crew, links
+    registry, crew, links
         Known nodes, controlled vehicles and their links; each is updated.
     tell
         Receives events for the bridge's user.
@@ -75,7 +75,7 @@ class Hearing:
     def __init__(
         self,
         settings: BridgeSettings,
-        roster: Roster,
+        registry: NodeRegistry,
         crew: Crew,
         links: Links,
         tell: Callable[[BridgeEvent], None],
@@ -89,7 +89,7 @@ class Hearing:
         self.double = ""
         """Names of other systems that announce our own id; usually empty."""
         self._settings = settings
-        self._roster = roster
+        self._registry = registry
         self._crew = crew
         self._links = links
         self._tell = tell
@@ -98,7 +98,7 @@ class Hearing:
         self._wall_clock = wall_clock
         self._speaker = speaker
         self._state_reported: dict[int, float] = {}
-        self.admission = Admission(settings, roster, clock)
+        self.admission = Admission(settings, registry, clock)
 
     def _now(self) -> float:
         return self._clock() * self._settings.time_scale
@@ -124,11 +124,11 @@ class Hearing:
             return
         now = self._now()
         if not self._counts(announcement.imc_id, message.timestamp, address, now):
-            self._roster.note_rival(announcement, now)
-            if self._roster.may_be_another(announcement.imc_id):
+            self._registry.note_rival(announcement, now)
+            if self._registry.may_be_another(announcement.imc_id):
                 self._greet(announcement, address, now)
             return
-        if not self._roster.find_place(announcement, address[0], now):
+        if not self._registry.find_place(announcement, address[0], now):
             self.admission.refuse(Refused.CROWDED, address)
             self._greet(announcement, address, now)
             return
@@ -136,7 +136,7 @@ class Hearing:
 
     def _greet(self, announcement: Announcement, address: Address, now: float) -> None:
         """Speak once to a system without a place: one that is there answers, and has shown thereby that it is."""
-        self._roster.newcomers.note(announcement, address[0])
+        self._registry.newcomers.note(announcement, address[0])
         self._speaker.greet(announcement, address[0])
         self._answer(now)
 
@@ -146,7 +146,7 @@ class Hearing:
             self._speaker.announce(now)
 
     def _take_up(self, announcement: Announcement, host: str, now: float) -> None:
-        arrival = self._roster.announced(announcement, host, now)
+        arrival = self._registry.announced(announcement, host, now)
         if arrival is None:
             return
         node = arrival.node
@@ -168,9 +168,9 @@ class Hearing:
         """Whether an announce may change where a node is: neither a stranger's, nor one that was recorded before."""
         if not self.admission.admits_id(imc_id, address):
             return False
-        if self._roster.comes_from_elsewhere(imc_id, address[0], now):
+        if self._registry.comes_from_elsewhere(imc_id, address[0], now):
             return self.admission.refuse(Refused.MOVED, address)
-        return not self._roster.is_old(imc_id, timestamp, now) or self.admission.refuse(Refused.OLD, address)
+        return not self._registry.is_old(imc_id, timestamp, now) or self.admission.refuse(Refused.OLD, address)
 
     def _look_for_double(self, announcement: Announcement, address: Address) -> None:
         """Our own announces come back to us; those of another system under our id are trouble."""
@@ -204,15 +204,15 @@ class Hearing:
         if header is None:
             return
         now = self._now()
-        sender = self._roster.speaker(header.src, address) or self._newcomer(header.src, address, now)
+        sender = self._registry.speaker(header.src, address) or self._newcomer(header.src, address, now)
         if sender is None:
             self._pass_on(header, packet, address, now)
             return
         if sender.packets == 0:
-            if not self._roster.capacity.may_be_heard(sender, address[0]):
+            if not self._registry.capacity.may_be_heard(sender, address[0]):
                 self.admission.refuse(Refused.CROWDED, address)
                 return
-            self._roster.first_heard(sender)
+            self._registry.first_heard(sender)
         if header.msg_id != SIMULATED_STATE and not sender.clock.is_old(header.timestamp):
             # DUNE's simulation lets that one through where radio would not reach.
             sender.heard(now, address)
@@ -228,14 +228,14 @@ class Hearing:
 
     def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
         """The system that had no place when it announced itself and now sends, if it gets one."""
-        announcement = self._roster.newcomers.answered(imc_id, address)
+        announcement = self._registry.newcomers.answered(imc_id, address)
         if announcement is None:
             return None
-        if not self._roster.find_place(announcement, address[0], now, heard=True):
+        if not self._registry.find_place(announcement, address[0], now, heard=True):
             self.admission.refuse(Refused.CROWDED, address)
             return None
         self._take_up(announcement, address[0], now)
-        return self._roster.speaker(imc_id, address)
+        return self._registry.speaker(imc_id, address)
 
     def forget(self, node: Node) -> None:
         """Keep nothing of a node that has lost its place."""
@@ -243,7 +243,7 @@ class Hearing:
 
     def _pass_on(self, header: Header, packet: bytes, address: Address, now: float) -> None:
         """Take a packet that is not its sender's own word: an echo of ours, one relayed by a node, a stranger's."""
-        via = self._roster.at(address)
+        via = self._registry.at(address)
         if via is None:
             self._from_unknown_address(header.src, address, now)
             self.decoder.wants(header)
@@ -257,7 +257,7 @@ class Hearing:
     def _from_unknown_address(self, imc_id: int, address: Address, now: float) -> None:
         if imc_id in (self._settings.id, 0, BROADCAST_ID) or not self.admission.admits_id(imc_id, address):
             return
-        node = self._roster.stranger(imc_id, address[0], now)
+        node = self._registry.stranger(imc_id, address[0], now)
         if node is None:
             self.admission.refuse(Refused.CROWDED, address)
             return

@@ -13,7 +13,7 @@ from imc_bridge.network.consoles import Board
 from imc_bridge.network.discovery import Announcement, own_announce
 from imc_bridge.network.transport import Address, Transport
 from imc_bridge.nodes.node import Node
-from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.settings import BridgeSettings
 
 ENTITY_QUERY_S = 2.0
@@ -33,7 +33,7 @@ class Speaker:
     Parameters
     ----------
     settings
-    transport, roster
+    transport, registry
     commanding
         False for a listener, which shows nothing to other consoles.
     wall_clock
@@ -44,7 +44,7 @@ class Speaker:
         self,
         settings: BridgeSettings,
         transport: Transport,
-        roster: Roster,
+        registry: NodeRegistry,
         *,
         commanding: bool,
         wall_clock: Callable[[], float],
@@ -54,7 +54,7 @@ class Speaker:
         self.board = Board(settings.name)
         """What other consoles are shown."""
         self.announced_at = -math.inf
-        self._roster = roster
+        self._registry = registry
         self._commanding = commanding
         self._wall_clock = wall_clock
         self._announce_due = 0.0
@@ -74,16 +74,16 @@ class Speaker:
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + self.settings.heartbeat_period_s
             self._greeted.clear()
-            for node in self._roster:
+            for node in self._registry:
                 # A system that never answered may not exist: its address is not addressed for long.
                 if self.talks_to(node) and (node.packets or not node.given_up(now)):
                     self._beat(node)
-        for node in self._roster:
+        for node in self._registry:
             if node.is_vehicle and self.talks_to(node):
                 self._ask_for_names(node, now)
                 self._ask_for_supervisor(node, now)
         for message in self.board.due(now):
-            for node in self._roster:
+            for node in self._registry:
                 if self._is_other_console(node):
                     self.send(node, message)
 
@@ -144,7 +144,7 @@ class Speaker:
         if self.settings.position is not None:
             lat, lon = self.settings.position
             return math.radians(lat), math.radians(lon)
-        for node in self._roster:
+        for node in self._registry:
             if node.announcement is not None and node.announcement.is_vehicle:
                 place = node.announcement.lat_rad, node.announcement.lon_rad
                 if place != (0.0, 0.0):

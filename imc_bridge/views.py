@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imc_bridge.events import LinkChange, NodeView
 from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.status import status_of
 
 
 def view_of(
@@ -17,7 +18,7 @@ def view_of(
     way_home: str,
 ) -> NodeView:
     """All that is known of a node at ``now``; ``scale``: seconds of the bridge's clock per second of the wall's."""
-    status = node.status(now)
+    status = status_of(node, now)
 
     def age(at: float | None) -> float | None:
         return None if at is None else (now - at) / scale

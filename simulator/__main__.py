@@ -17,7 +17,7 @@ import typer
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.fleet import EQUIPMENT
 from simulator.dune.lost_comms import TIMEOUT_S
-from simulator.dune.node import DEFAULT_ANNOUNCE_PORTS
+from simulator.dune.options import DEFAULT_ANNOUNCE_PORTS
 from simulator.equipment import Equipment
 from simulator.floors import seafloors
 from simulator.floors.terrain_files import load_terrain

@@ -6,9 +6,9 @@ import pytest
 import structlog
 from hypothesis import settings
 
-from tests.support.databases import KINDS, Databases
-from tests.support.numba_cache import share
+from tests.support.compute.numba_cache import share
 from tests.support.paths import CAPTURES, TERRAINS
+from tests.support.storage.databases import KINDS, Databases
 
 share()
 # Nothing is said about how fast a machine is. Examples are the same in every run; others are looked for with

@@ -21,11 +21,29 @@ import rasterio
 from app.cli import main
 from app.mapping.coordinates.georeference import LocalFrame
 from tests.support import commands
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.commands import serving
 from tests.support.imc import log_writer as writer
-from tests.support.multibeam import line, write_gsf, write_kmall
+from tests.support.mapping.multibeam import line, write_gsf, write_kmall
 from tests.support.paths import PROJECT
-from tests.support.rest import mission_spec, soundings
+
+COMMANDS = (
+    "serve",
+    "demo",
+    "evaluate",
+    "export",
+    "report",
+    "import",
+    "import-log",
+    "tide",
+    "doctor",
+    "migrate",
+    "token",
+    "audit",
+    "backup",
+    "restore",
+    "prune",
+)
 
 
 @dataclass
@@ -70,23 +88,7 @@ def bathyfleet(
 def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -> None:
     shown = bathyfleet("--help")
     assert shown.code == 0
-    for command in (
-        "serve",
-        "demo",
-        "evaluate",
-        "export",
-        "report",
-        "import",
-        "import-log",
-        "tide",
-        "doctor",
-        "migrate",
-        "token",
-        "audit",
-        "backup",
-        "restore",
-        "prune",
-    ):
+    for command in COMMANDS:
         assert command in shown.stdout
     imported = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", "import app.cli"],
@@ -99,28 +101,7 @@ def test_help_lists_every_command_without_loading_the_service(bathyfleet: Run) -
         assert f" {heavy}\n" not in imported.stderr
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "serve",
-        "demo",
-        "evaluate",
-        "evaluate explore",
-        "export",
-        "report",
-        "import",
-        "import-log",
-        "tide",
-        "doctor",
-        "migrate",
-        "token",
-        "token create",
-        "audit",
-        "backup",
-        "restore",
-        "prune",
-    ],
-)
+@pytest.mark.parametrize("command", [*COMMANDS, "evaluate explore", "token create"])
 def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> None:
     shown = bathyfleet(*command.split(), "--help")
     assert shown.code == 0

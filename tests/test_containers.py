@@ -23,8 +23,8 @@ from benchmarks.installation.dockerfile import (
     variables_of,
     words_of,
 )
+from tests.support.api.rest import running_in_thread
 from tests.support.paths import PROJECT
-from tests.support.rest import running_in_thread
 
 IMAGE = (PROJECT / "Dockerfile").read_text().replace("\\\n", " ")
 COMPOSE = yaml.safe_load((PROJECT / "compose.yaml").read_text())

@@ -30,7 +30,8 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.main import create_app
-from app.missions.spec.mission import Limits, MissionSpec
+from app.missions.spec.limits import Limits
+from app.missions.spec.mission import MissionSpec
 from app.settings import Settings
 from simulator.__main__ import app as simulator_app
 from tests.support.commands import environment, serving

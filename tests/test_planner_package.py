@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bathyfleet.client import Client, InvalidRequestError
+from tests.support.api.rest import mission_spec
 from tests.support.commands import COMMAND, environment, serving
 from tests.support.paths import PROJECT
-from tests.support.rest import mission_spec
 
 GUIDE = (PROJECT / "docs" / "adding-a-planner.md").read_text()
 

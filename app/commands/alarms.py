@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.common import CommandError, command_settings, this_user
+from app.commands.command import CommandError, command_settings, this_user
 
 if TYPE_CHECKING:
     from app.missions.alarm_settings import AlarmSettings
@@ -45,25 +45,25 @@ def try_out(
 async def _told(settings: "AlarmSettings", names: list[str]) -> bool:
     """Send a test to each; tell whether all arrived."""
     from app.missions.alarm_kinds import AlarmKind
+    from app.missions.alarms.channels import Channels, DeliveryError
     from app.missions.alarms.message import Message
     from app.missions.alarms.raised import alarm_view, make_alarm
     from app.missions.alarms.routes import delivery_id
-    from app.missions.alarms.ways import DeliveryError, Ways
     from app.missions.clock import now
     from app.missions.views.alarms import Notice
 
     alarm = alarm_view(make_alarm(AlarmKind.TEST, None, f"this is a test, asked for by {this_user()}", now()))
-    ways, arrived = Ways(settings), True
+    channels, arrived = Channels(settings), True
     try:
         for name in names:
             message = Message(delivery_id(alarm.id, name, Notice.RAISED), Notice.RAISED, alarm, "")
             try:
-                await ways.send(name, message, now())
+                await channels.send(name, message, now())
             except DeliveryError as error:
                 arrived = False
                 typer.echo(f"{name}: failed: {error}")
             else:
                 typer.echo(f"{name}: delivered")
     finally:
-        await ways.close()
+        await channels.close()
     return arrived

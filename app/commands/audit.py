@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.common import CommandError, Database, command_settings
+from app.commands.command import CommandError, Database, command_settings
 
 if TYPE_CHECKING:
     from app.storage.models import AuditRow

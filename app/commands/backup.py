@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.common import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, command_settings, noted
 
 if TYPE_CHECKING:
     from app.storage.upkeep.backup import Contents

@@ -7,16 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.common import (
-    CommandError,
-    Database,
-    ask_service,
-    checked,
-    command_settings,
-    meant_mission,
-    resting_mission,
-    with_missions,
-)
+from app.commands.command import CommandError, Database, checked, command_settings
+from app.commands.running_service import ask_service
+from app.commands.stored_missions import meant_mission, resting_mission, with_missions
 
 if TYPE_CHECKING:
     from app.missions.maps.products import Product

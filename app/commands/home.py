@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from app.missions.live.mission import LiveMission
     from app.missions.service import MissionService
     from app.missions.settings import SimulationSettings
-    from app.missions.spec.mission import MissionSpec, VehicleSpec
+    from app.missions.spec.mission import MissionSpec
+    from app.missions.spec.vehicle import VehicleSpec
 
 NEAR_M = 25.0
 """A vehicle this near its recovery point is home."""
@@ -56,7 +57,8 @@ def drawn(seed: int, *, still: bool) -> "tuple[MissionSpec, SimulationSettings, 
 
     from app.mapping.coordinates.georeference import LocalFrame
     from app.missions.settings import SimulationSettings
-    from app.missions.spec.mission import MissionSpec, VehicleSpec
+    from app.missions.spec.mission import MissionSpec
+    from app.missions.spec.vehicle import VehicleSpec
 
     rng = np.random.default_rng(seed)
     frame, side = LocalFrame(*ORIGIN), float(rng.uniform(100, 300))
@@ -129,7 +131,7 @@ async def _flown(
 
     from app.commands.home_watch import Watch
     from app.missions.fleet.links.sim import SimFleetLink
-    from app.missions.spec.mission import VehicleKind
+    from app.missions.spec.vehicle import VehicleKind
     from app.missions.states import ENDED, Action
 
     link = service.hub.link(VehicleKind.SIM)

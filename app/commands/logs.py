@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.common import Database, command_settings, meant_mission, with_missions
+from app.commands.command import Database, command_settings
+from app.commands.stored_missions import meant_mission, with_missions
 
 if TYPE_CHECKING:
     from app.missions.service import MissionService

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.common import CommandError, Database, command_settings, with_missions
+from app.commands.command import CommandError, Database, command_settings
 from app.commands.data import write_product
+from app.commands.stored_missions import with_missions
 
 if TYPE_CHECKING:
     from app.missions.maps.products import Product

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands.common import CommandError
+from app.commands.command import CommandError
 
 
 def train(

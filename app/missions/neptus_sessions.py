@@ -13,7 +13,10 @@ from app.missions.fleet.links.neptus import NeptusFleetLink
 from app.missions.live.mission import LiveMission
 from app.missions.settings import NeptusSettings
 from app.missions.spec.base import PolygonGeometry
-from app.missions.spec.mission import Limits, MissionSpec, PlannerSpec, Tide, VehicleKind, VehicleSpec
+from app.missions.spec.limits import Limits
+from app.missions.spec.mission import MissionSpec, PlannerSpec
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
+from app.missions.spec.water import Tide
 from app.missions.states import ENDED, Action, MissionState
 from app.missions.views.mission import ActionView, Level, MissionView
 from app.storage.database import Database

@@ -15,7 +15,7 @@ import structlog
 from app.compute.compute import Compute
 from app.exploration.planners import INSTALLED
 from app.missions import states
-from app.missions.alarms.desk import AlarmDesk
+from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
@@ -25,10 +25,11 @@ from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
-from app.missions.live.mission import Ending, LiveMission
+from app.missions.live.header import Ending
+from app.missions.live.mission import LiveMission
 from app.missions.operations.corrections.recorrection import check_level_is_known
 from app.missions.operations.imports.imports import Imports
-from app.missions.operations.imports.reading import Reader
+from app.missions.operations.imports.reader_process import Reader
 from app.missions.operations.imports.uploads import Uploads
 from app.missions.operations.maps.map_pictures import MapPictures
 from app.missions.operations.reports import Reports
@@ -147,7 +148,7 @@ class MissionService:
         )
         self.process = Ownership(database, url, certificate)
         """This process among those that share the database."""
-        self.alarms = AlarmDesk(settings.alarms, database, lambda: self.process.number)
+        self.alarms = AlarmDispatcher(settings.alarms, database, lambda: self.process.number)
         """Alarms of all missions: who is told, and who has taken them."""
         self._failover = Failover(database, self.hub, self.process, self._registry, self._supervisor, self._claims)
         self.uploads = Uploads()

@@ -25,8 +25,10 @@ from app.missions.flown import Flown
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import Active
 from app.missions.spec.failsafes import Response
-from app.missions.spec.mission import Limits, MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec.limits import Limits
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import OrderKind, OrderState
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 
 SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointStatus.MISSED})
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})

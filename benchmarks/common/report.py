@@ -164,6 +164,15 @@ def write_section(
     write_page(file, "\n\n".join(part.strip() for part in (beginning, *kept)))
 
 
+def put_page(file: Path | None, lines: Sequence[str]) -> None:
+    """Write a whole page, or print it where no file is asked for."""
+    text = "\n".join(lines).rstrip() + "\n"
+    if file is None:
+        print(text)
+    else:
+        write_page(file, text)
+
+
 def write_page(file: Path, text: str) -> None:
     """Write a whole page."""
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -21,7 +21,7 @@ from benchmarks.common.report import LOAD, make_parser, write_section
 from benchmarks.service.boats import FRAME, SIDE_M, begin, beside, create_mission, running_service
 from benchmarks.service.opening import Watch
 from tests.support.dashboard.service import Service
-from tests.support.gis import tile_of
+from tests.support.mapping.gis import tile_of
 
 VEHICLES = 10
 ZOOMS = (15, 16, 17, 18)

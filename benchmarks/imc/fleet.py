@@ -27,7 +27,7 @@ import psutil
 
 from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import Bridge, BridgeSettings, NodeState, StateReport, Waypoint
-from imc_bridge.network.sieve import LOUD
+from imc_bridge.network.packet_filter import LOUD
 from tests.support.paths import PROJECT
 
 ANNOUNCE_PORTS = (32100, 32101)

@@ -36,7 +36,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.links.imc import sounding_report
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import MAX_OCEAN_DEPTH_M, Gate
-from app.missions.spec.mission import Tide
+from app.missions.spec.water import Tide
 from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import Bridge, BridgeSettings, LinkChange, RefusedError, Sounding, StateReport, SwathPing, Waypoint
 from imc_bridge.events import PingRefused, SoundingRefused

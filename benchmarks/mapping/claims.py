@@ -23,7 +23,7 @@ from app.missions.forecast.simulate import fly
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
-from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.common.report import Page, facts, make_parser, put_page
 from benchmarks.mapping.terrains import terrains
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
@@ -224,11 +224,7 @@ def main() -> None:
         "| --- " * (len(PARTS) + 3) + "|",
         *(row(one) for one in found),
     ]
-    text = "\n".join(lines) + "\n"
-    if options.write is None:
-        print(text)
-    else:
-        write_page(options.write, text)
+    put_page(options.write, lines)
 
 
 if __name__ == "__main__":

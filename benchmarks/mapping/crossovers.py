@@ -34,8 +34,8 @@ from app.storage.database import Database
 from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import Page, make_parser, write_section
 from benchmarks.imc.mission import ORIGIN
+from tests.support.mapping.tracks import GMT, gmt_crossings
 from tests.support.paths import TERRAINS
-from tests.support.tracks import GMT, gmt_crossings
 
 QUALITY = Page(
     "quality.md",

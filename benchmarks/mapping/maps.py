@@ -18,7 +18,7 @@ from app.mapping.compare import difference, interval_coverage
 from app.mapping.gaussian_process.gp import warm_up
 from app.mapping.gross_errors.outliers import flag_outliers
 from app.mapping.types import Grid, Soundings
-from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.common.report import Page, facts, make_parser, put_page
 from benchmarks.mapping.methods import METHODS, Method, ours
 from benchmarks.mapping.speed import exactness, speed
 from benchmarks.mapping.terrains import DESIGNS, PATCHY, sound, terrains, with_outliers
@@ -147,11 +147,7 @@ def main() -> None:
             lines += exactness(floors, table)
         else:
             lines += speed(table, huge=options.huge)
-    text = "\n".join(lines).rstrip() + "\n"
-    if options.write is None:
-        print(text)
-    else:
-        write_page(options.write, text)
+    put_page(options.write, lines)
 
 
 if __name__ == "__main__":

@@ -16,10 +16,10 @@ from pathlib import Path
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.types import MapExtent, ReadOptions
 from app.mapping.types import Grid
-from app.missions.operations.imports.reading import Reader
+from app.missions.operations.imports.reader_process import Reader
 from app.missions.operations.imports.uploads import open_upload
 from benchmarks.common.report import LOAD, make_parser, write_section
-from tests.support.multibeam import line, write_gsf, write_kmall
+from tests.support.mapping.multibeam import line, write_gsf, write_kmall
 
 FRAME = LocalFrame(41.185, -8.704)
 PLACE = MapExtent(FRAME, Grid(-500.0, -500.0, 1.0, 1000, 1000), 10.0)

@@ -27,7 +27,7 @@ from app.mapping.shoals import deviations_above, shoal_chance
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map, without_guesses
 from app.mapping.types import BathymetricMap, Grid, Soundings
-from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.common.report import Page, facts, make_parser, put_page
 from simulator.floors.seafloors import generate
 from tests.support.paths import TERRAINS
 
@@ -204,11 +204,7 @@ def main() -> None:
     lines += ["| survey | true | sounded | process | map | cells above datum, % | RMSE | deviation |"]
     lines += ["| --- " * 8 + "|"]
     lines += [bounds(*start) for start in starts(options.terrains, options.floors, options.seeds[:1])]
-    text = "\n".join(lines) + "\n"
-    if options.write is None:
-        print(text)
-    else:
-        write_page(options.write, text)
+    put_page(options.write, lines)
 
 
 if __name__ == "__main__":

@@ -29,9 +29,9 @@ from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
 from simulator.sonars.swath import SwathErrors, SwathSonar, SwathSounder
 from simulator.vehicles.vehicle import Motion
+from tests.support.api.rest import make_client, mission_spec, running
+from tests.support.mapping.tracks import flown, lawnmower
 from tests.support.missions.specs import lon_lat, rectangle
-from tests.support.rest import make_client, mission_spec, running
-from tests.support.tracks import flown, lawnmower
 
 FLOORS = ("flat", "slope", "smooth", "rugged", "ridge", "reef", "canyon", "harbour")
 SIDE_M, CELL_M, DEPTH_M = 60.0, 1.0, 1.0

@@ -43,7 +43,7 @@ from app.evaluation.survey.run import judge
 from app.evaluation.survey.world import SOUNDING_RATE_HZ, SPEED_MPS, SurveyScenario, fly_routes
 from app.exploration.lines.lawnmower import lawnmower_routes
 from app.mapping.types import Soundings
-from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.common.report import Page, facts, make_parser, put_page
 from benchmarks.planning.survey_study import PATCHY, STEPS, VEHICLES, StudyJob, best_pattern, chosen_floors, study_jobs
 
 METHODS = ("ours", "offline", "adaptive")
@@ -344,10 +344,7 @@ def main() -> None:
             bar.advance(task)
     head = facts(command=command_for(list(results.runs.values())), processes=given.jobs)
     text = report(list(results.runs.values()), head)
-    if given.write is None:
-        print(text)
-    else:
-        write_page(given.write, text)
+    put_page(given.write, [text])
     print(f"{given.runs}: {len(open_)} runs made, {len(results.runs)} kept")
 
 

@@ -27,7 +27,7 @@ from app.evaluation.survey.symmetry import turned, turned_soundings
 from app.evaluation.survey.world import Sampling, Sounder, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.types import Soundings
-from benchmarks.common.report import Page, facts, make_parser, write_page
+from benchmarks.common.report import Page, facts, make_parser, put_page
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
 from simulator.floors.terrain_files import load_terrain
@@ -256,10 +256,7 @@ def main() -> None:
             bar.advance(task)
     head = facts(command="python -m benchmarks.planning.survey_study --terrains FOLDER --write", processes=given.jobs)
     text = report(list(results.runs.values()), head)
-    if given.write is None:
-        print(text)
-    else:
-        write_page(given.write, text)
+    put_page(given.write, [text])
     print(f"{given.runs}: {len(open_)} runs made, {len(results.runs)} kept")
 
 

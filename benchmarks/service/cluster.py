@@ -38,7 +38,7 @@ from app.missions.operations.work_processes import WorkProcesses
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
 from benchmarks.common.report import LOAD, make_parser, write_section
-from tests.support.cluster import DaskCluster, dask_cluster
+from tests.support.compute.cluster import DaskCluster, dask_cluster
 from tests.support.missions.harbour import sim_spec
 from tests.support.waiting import until
 

@@ -24,8 +24,8 @@ from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage.database import Database
 from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import LOAD, make_parser, write_section
-from tests.support.databases import KINDS, Databases
 from tests.support.missions.specs import FRAME, make_spec
+from tests.support.storage.databases import KINDS, Databases
 from tests.support.waiting import until
 
 VEHICLES = 5

@@ -21,13 +21,10 @@ import psutil
 
 from app.missions.fleet.interface import PingReport, Position
 from app.missions.live.mission import LiveMission
-from app.missions.service import MissionService
-from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
-from app.storage.database import Database
-from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import LOAD, make_parser, write_section
 from benchmarks.service.boats import FRAME, SIDE_M, START_S, bottom_m, running_service
+from benchmarks.service.in_process import missions_in
 from benchmarks.service.opening import Watch
 from tests.support.dashboard.service import Service
 
@@ -104,37 +101,29 @@ def used_s() -> float:
 
 async def by_telemetry(pings: Sequence[PingReport], folder: Path) -> dict[str, Any]:
     """Take pings as from a link, end the mission, and read all of them back."""
-    settings = ServiceSettings(
-        database_url=f"sqlite+aiosqlite:///{folder / 'fleet.db'}", imc=ImcSettings(enabled=False)
-    )
-    await prepare_database(settings.database_url, may_upgrade=True)
-    database = Database(settings.database_url)
-    service = MissionService(settings, database)
-    await service.startup()
-    live = await service.get((await service.create(MissionSpec.model_validate(mission_json()))).id)
-    watch = LoopWatch()
-    idle_s = await _idle_share()
-    watch.longest_s = 0.0
-    cpu, began = used_s(), time.perf_counter()
-    for number, ping in enumerate(pings):
-        live.receive(ping)
-        wait_s = began + number / PER_SECOND - time.perf_counter()
-        if wait_s > 0.0:
-            await asyncio.sleep(wait_s)
-    await live.journal.flush()
-    taken_s = used_s() - cpu - idle_s * (time.perf_counter() - began)
-    in_database = await _bytes_in_database(live)
-    cpu = used_s()
-    await live.pings.move()
-    moved_s = used_s() - cpu
-    watch.stop()
-    files = [part.stat().st_size for part in (folder / "pings").rglob("*.parquet")]
-    began = time.perf_counter()
-    read = sum([pings.beams async for _, pings in live.pings.all_accepted()])
-    reading_s = time.perf_counter() - began
-    counts = live.journal.counts
-    await service.shutdown()
-    await database.close()
+    async with missions_in(folder) as service:
+        live = await service.get((await service.create(MissionSpec.model_validate(mission_json()))).id)
+        watch = LoopWatch()
+        idle_s = await _idle_share()
+        watch.longest_s = 0.0
+        cpu, began = used_s(), time.perf_counter()
+        for number, ping in enumerate(pings):
+            live.receive(ping)
+            wait_s = began + number / PER_SECOND - time.perf_counter()
+            if wait_s > 0.0:
+                await asyncio.sleep(wait_s)
+        await live.journal.flush()
+        taken_s = used_s() - cpu - idle_s * (time.perf_counter() - began)
+        in_database = await _bytes_in_database(live)
+        cpu = used_s()
+        await live.pings.move()
+        moved_s = used_s() - cpu
+        watch.stop()
+        files = [part.stat().st_size for part in (folder / "pings").rglob("*.parquet")]
+        began = time.perf_counter()
+        read = sum([pings.beams async for _, pings in live.pings.all_accepted()])
+        reading_s = time.perf_counter() - began
+        counts = live.journal.counts
     if (counts.pings, counts.beams) != (len(pings), read):
         raise SystemExit(f"{counts.pings} of {len(pings)} pings are stored, {read} of {counts.beams} beams are read")
     beams = len(pings) * len(pings[0].angles_rad)

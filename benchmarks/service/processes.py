@@ -19,9 +19,9 @@ from typing import Any
 import httpx
 
 from benchmarks.common.report import LOAD, make_parser, write_section
-from tests.support.databases import Databases, query
 from tests.support.faults.missions import mission_of
 from tests.support.faults.service import Service, service_in
+from tests.support.storage.databases import Databases, query
 
 WARM_UP_S = 10.0
 PATIENCE_S = 60.0

@@ -23,13 +23,10 @@ from app.missions.operations.maps.mission_maps import export
 from app.missions.operations.reports import ReportOptions
 from app.missions.report.kinds import REPORTS
 from app.missions.report.texts import Language
-from app.missions.service import MissionService
-from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
-from app.storage.database import Database
-from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import LOAD, make_parser, write_section
 from benchmarks.imc.mission import ORIGIN
+from benchmarks.service.in_process import missions_in
 from benchmarks.service.pings import LoopWatch
 
 START_S = 1_795_000_000.0
@@ -94,14 +91,7 @@ def pings(side: float) -> list[PingReport]:
 
 
 async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    settings = ServiceSettings(
-        database_url=f"sqlite+aiosqlite:///{folder / 'fleet.db'}", imc=ImcSettings(enabled=False)
-    )
-    await prepare_database(settings.database_url, may_upgrade=True)
-    database = Database(settings.database_url)
-    service = MissionService(settings, database)
-    await service.startup()
-    try:
+    async with missions_in(folder) as service:
         live = await service.get((await service.create(mission(options))).id)
         taken = pings(options.side)
         for number, ping in enumerate(taken):
@@ -141,9 +131,6 @@ async def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         found["processor_s"] = round(sum(one.ru_utime + one.ru_stime for one in used) - processor_s, 1)
         found["memory_mib"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
         return found
-    finally:
-        await service.shutdown()
-        await database.close()
 
 
 def main() -> None:

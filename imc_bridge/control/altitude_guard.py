@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imc_bridge.control.places import Place, distance_m, offset_m
+from imc_bridge.control.distances import Place, distance_m, offset_m
 from imc_bridge.control.seabed import Seabed
 from imc_bridge.events import BottomPoint
 

@@ -30,7 +30,9 @@ from imc_bridge.control.seabed import Seabed
 from imc_bridge.events import NodeState, StateReport, Waypoint, WaypointChange, WaypointStatus
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
-from imc_bridge.nodes.node import Node, OperationMode, PlanState
+from imc_bridge.nodes.modes import OperationMode, PlanState
+from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.status import status_of
 from imc_bridge.settings import BridgeSettings
 
 STOP_RETRY_S = 0.5
@@ -140,7 +142,7 @@ class Control(ABC):
         self._again = False
         self._order = None
         self._abandoned = False
-        status = self.node.status(now)
+        status = status_of(self.node, now)
         if status.state in (NodeState.LOST, NodeState.HEARD, NodeState.EXPECTED_OFFLINE):
             self.refusal = Refusal(status.reason, "Bring its link up first; `bathyfleet doctor` says what is missing")
         elif self.node.conflict is not None:
@@ -188,7 +190,7 @@ class Control(ABC):
         self.stop_detail = ""
         if self.phase is Phase.STOPPING:
             return
-        status = self.node.status(now)
+        status = status_of(self.node, now)
         if not self.engaged or self.phase is Phase.WAITING:
             ours = self._runs_ours()
             if status.state in (NodeState.IN_PLAN, NodeState.READY, NodeState.ACTIVE) and not ours:
@@ -326,7 +328,7 @@ class Control(ABC):
             self._evidence = Evidence()
             self._begin(now)
             return
-        status = node.status(now)
+        status = status_of(node, now)
         if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now, wanted=True)
         elif now - self._since > self._waiting_limit_s():

@@ -17,7 +17,7 @@ from imc_bridge.control.way_home import WayHome
 from imc_bridge.events import Guidance, RefusedError, WaypointChange
 from imc_bridge.network.codec import Message
 from imc_bridge.nodes.node import Node
-from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.settings import BridgeSettings
 
 
@@ -130,12 +130,12 @@ class Crew:
             self._guidance[node.imc_id] = guidance
             self._controls.pop(node.imc_id, None)
 
-    def attach_sound(self, node: Node, gateway: str, roster: Roster, now: Callable[[], float]) -> None:
+    def attach_sound(self, node: Node, gateway: str, registry: NodeRegistry, now: Callable[[], float]) -> None:
         """Reach a vehicle through a gateway when radio is silent. Raises RefusedError for an unknown gateway."""
         control = self.of(node)
-        via = roster.named(gateway)
+        via = registry.named(gateway)
         if via is None or via.address is None:
-            known = ", ".join(other.name for other in roster if not other.is_vehicle) or "none"
+            known = ", ".join(other.name for other in registry if not other.is_vehicle) or "none"
             raise RefusedError(
                 node.name,
                 f"its acoustic gateway {gateway!r} was never heard of (other nodes: {known})",

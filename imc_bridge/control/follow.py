@@ -16,7 +16,7 @@ from imc_bridge.control.references import SentReference
 from imc_bridge.events import StateReport, WaypointStatus
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
-from imc_bridge.nodes.node import PlanState
+from imc_bridge.nodes.modes import PlanState
 
 START_RETRY_S = 2.0
 BLOCKED_S = 1.0

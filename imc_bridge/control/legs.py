@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from imc_bridge.control.acoustics import SoundPath, SoundReport
 from imc_bridge.control.control import Control, Phase
+from imc_bridge.control.distances import Place, distance_m
 from imc_bridge.control.orders import Order
-from imc_bridge.control.places import Place, distance_m
 from imc_bridge.control.plans import (
     NEARNESS_S,
     OPERATION_START,
@@ -31,7 +31,7 @@ from imc_bridge.control.plans import (
 from imc_bridge.events import StateReport, Waypoint, WaypointStatus
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
-from imc_bridge.nodes.node import PlanState
+from imc_bridge.nodes.modes import PlanState
 
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""

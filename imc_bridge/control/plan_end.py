@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from imc_bridge.nodes.node import Node, PlanState
+from imc_bridge.nodes.modes import PlanState
+from imc_bridge.nodes.node import Node
 
 STARVED_TEXT = "path control reference"
 """Part of what DUNE says when references cease: to it that is an error of its path controller."""

@@ -22,13 +22,14 @@ import imcpy
 from imc_bridge.control.altitude_guard import FARTHEST_M, AltitudeGuard
 from imc_bridge.control.control import Refusal
 from imc_bridge.control.depth_layers import ALONE, DepthLayer
-from imc_bridge.control.places import Place, distance_m
+from imc_bridge.control.distances import Place, distance_m
 from imc_bridge.control.plans import HOME_RADIUS_M, goto_maneuver, goto_plan, station_maneuver
 from imc_bridge.events import NodeState, Waypoint
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
 from imc_bridge.nodes.lost_comms import DEFAULT_PLAN_NAME
 from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.status import status_of
 from imc_bridge.settings import BridgeSettings
 
 RETRY_S = 2.0
@@ -169,7 +170,7 @@ class WayHome:
         """Send what is due."""
         if self._step is Step.NOTHING:
             return
-        if self._node.status(now).state in _OUT_OF_REACH:
+        if status_of(self._node, now).state in _OUT_OF_REACH:
             self._unconfirmed("it is out of reach", now)
         elif self._step is Step.WAIT:
             self._wait(now)

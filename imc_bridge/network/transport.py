@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import ifaddr
 
-from imc_bridge.network.sieve import divert, refuse_all
+from imc_bridge.network.packet_filter import divert, refuse_all
 from imc_bridge.network.streams import TcpStreams
 from imc_bridge.settings import BridgeSettings
 

@@ -1,1 +1,1 @@
-"""Systems on the network: one ``Node`` per vehicle or console, the roster of all, and the admission of packets."""
+"""Systems on the network: one ``Node`` per vehicle or console, the registry of all, and the admission of packets."""

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.refusals import Refused
-from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.settings import BridgeSettings
 
 WINDOW_S = 1.0
@@ -28,7 +28,7 @@ class Admission:
     Parameters
     ----------
     settings
-    roster
+    registry
         A system that announced an address has an allowance of its own there, which no other port can use up.
     clock
         Seconds of the wall clock that never step back.
@@ -42,11 +42,11 @@ class Admission:
         When that was, by ``clock``.
     """
 
-    def __init__(self, settings: BridgeSettings, roster: Roster, clock: Callable[[], float]) -> None:
+    def __init__(self, settings: BridgeSettings, registry: NodeRegistry, clock: Callable[[], float]) -> None:
         self.refused: Counter[Refused] = Counter()
         self.last: dict[Refused, str] = {}
         self.last_at: dict[Refused, float] = {}
-        self._roster = roster
+        self._registry = registry
         self._clock = clock
         self._networks = tuple(map(ipaddress.IPv4Network, settings.allowed_addresses))
         self._ids = frozenset(settings.allowed_ids)
@@ -66,7 +66,7 @@ class Admission:
         if not self._window <= now < self._window + WINDOW_S:
             self._counts.clear()
             self._window = now
-        known = self._roster.at(address) is not None
+        known = self._registry.at(address) is not None
         source = address if known else (address[0], _ANNOUNCES if announce else _TRAFFIC)
         if source not in self._counts and len(self._counts) >= MAX_SOURCES:
             source = ("", _TRAFFIC)

@@ -8,19 +8,18 @@ timestamps order its messages.
 from __future__ import annotations
 
 import math
-from collections import deque
-from dataclasses import dataclass
-from enum import IntEnum
 
 from imcpy.coordinates import toWGS84
 
-from imc_bridge.events import LostComms, NodeState, StateReport
+from imc_bridge.events import LostComms, StateReport
 from imc_bridge.network.codec import Message
 from imc_bridge.network.discovery import MAX_NAME, Announcement
 from imc_bridge.network.text_fields import text
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.lost_comms import is_lost_comms, read_lost_comms
+from imc_bridge.nodes.modes import OperationMode, PlanState, mode_name
 from imc_bridge.nodes.plausibility import PlausiblePlace, Step
+from imc_bridge.nodes.rate_meter import RateMeter
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.printable import printable
@@ -44,70 +43,13 @@ CONTACT_AGAIN_S = 20.0
 """DUNE looks for contacts every 5 s; a few of our heartbeats may be lost."""
 LONGEST_BOND_S = 3600.0
 """A vehicle that was under water for longer may come back under another address."""
-RATE_WINDOW_S = 10.0
 STATE_MESSAGES_FRESH_S = 3.0
 MAX_TEXT = 500
 """Characters kept of what a vehicle says in words."""
-
-
-class OperationMode(IntEnum):
-    """VehicleState.op_mode."""
-
-    SERVICE = 0
-    CALIBRATION = 1
-    ERROR = 2
-    MANEUVER = 3
-    EXTERNAL = 4
-    BOOT = 5
-
-
-class PlanState(IntEnum):
-    """PlanControlState.state."""
-
-    BLOCKED = 0
-    READY = 1
-    INITIALIZING = 2
-    EXECUTING = 3
-
-
 NO_OUTCOME = 0
 """PlanControlState.last_outcome of a plan control that has had no plan yet."""
 MEDIUM_UNDERWATER = 3
 ANY_CONSOLE = 0xFFFF
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """A link state with the reason an operator can act on."""
-
-    state: NodeState
-    reason: str = ""
-
-
-class RateMeter:
-    """Messages per second over the last window, by name."""
-
-    def __init__(self) -> None:
-        self._arrivals: dict[str, deque[float]] = {}
-
-    def count(self, name: str, now: float) -> None:
-        """Note one message."""
-        arrivals = self._arrivals.get(name)
-        if arrivals is None:
-            arrivals = self._arrivals[name] = deque(maxlen=256)
-        arrivals.append(now)
-
-    def rates_hz(self, now: float) -> dict[str, float]:
-        """Rate of every message seen within the window."""
-        rates = {}
-        for name, arrivals in self._arrivals.items():
-            while arrivals and now - arrivals[0] > RATE_WINDOW_S:
-                arrivals.popleft()
-            if len(arrivals) > 1:
-                rates[name] = (len(arrivals) - 1) / max(now - arrivals[0], 1e-3)
-            elif arrivals:
-                rates[name] = 1.0 / RATE_WINDOW_S
-        return rates
 
 
 class Node:
@@ -191,7 +133,7 @@ class Node:
         self.faults = Faults(name)
         self._uncertainty: tuple[float, float] | None = None
         self._current: tuple[float, float, float] | None = None
-        self._settings = settings
+        self.settings = settings
         self._latest: dict[str, float] = {}
 
     @property
@@ -249,7 +191,7 @@ class Node:
     def given_up(self, now: float) -> bool:
         """Whether it was silent long enough for another host to announce its id."""
         last = max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
-        patience = max(ANNOUNCES_MISSED * self._settings.announce_period_s, min(self.patience_s, LONGEST_BOND_S))
+        patience = max(ANNOUNCES_MISSED * self.settings.announce_period_s, min(self.patience_s, LONGEST_BOND_S))
         return now - last > patience
 
     # Packets and the vehicle's clock
@@ -395,7 +337,7 @@ class Node:
     @property
     def foreign_controller(self) -> int | None:
         """The console that its maneuver listens to when that is not us."""
-        return None if self.controller in (None, ANY_CONSOLE, self._settings.id) else self.controller
+        return None if self.controller in (None, ANY_CONSOLE, self.settings.id) else self.controller
 
     def take_entities(self, message: Message) -> None:
         """EntityList report: ``Name=id;…``."""
@@ -421,16 +363,16 @@ class Node:
     @property
     def references_needed(self) -> bool:
         """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
-        return self.executing(self._settings.plan_id) and self.expected_back is None
+        return self.executing(self.settings.plan_id) and self.expected_back is None
 
     @property
     def patience_s(self) -> float:
         """How long it may be silent before its silence means a loss."""
         if not self.submerged:
-            return self._settings.release_after_s
+            return self.settings.release_after_s
         if not self.references_needed:
             return math.inf
-        return self._settings.follow_timeout_s + self.ascent_s
+        return self.settings.follow_timeout_s + self.ascent_s
 
     @property
     def ascent_s(self) -> float:
@@ -449,7 +391,7 @@ class Node:
 
     def can_start(self, now: float) -> bool:
         """In service and ready for a plan, by messages that are not old."""
-        limit = max(STATE_MESSAGES_FRESH_S, self._settings.lost_after_wall_s * self._settings.time_scale)
+        limit = max(STATE_MESSAGES_FRESH_S, self.settings.lost_after_wall_s * self.settings.time_scale)
         return (
             self.operation_mode == OperationMode.SERVICE
             and self.plan_state == PlanState.READY
@@ -465,7 +407,7 @@ class Node:
     @property
     def home_prefix(self) -> str:
         """What the names of the maneuvers of our way home begin with."""
-        return f"{self._settings.plan_id} home"
+        return f"{self.settings.plan_id} home"
 
     @property
     def home_bound(self) -> bool:
@@ -475,99 +417,22 @@ class Node:
     @property
     def ours(self) -> bool:
         """Whether it executes our plan."""
-        return self.executing(self._settings.plan_id)
-
-    def status(self, now: float) -> Status:
-        """The link's state and the reason for it."""
-        settings = self._settings
-        lost_after = max(settings.lost_after_s, settings.lost_after_wall_s * settings.time_scale)
-        if self.announcement is None:
-            ports = f"{settings.announce_ports[0]}-{settings.announce_ports[-1]}"
-            return Status(
-                NodeState.HEARD,
-                f"packets arrive but no announce: let it announce itself to UDP ports {ports} of this machine",
-            )
-        if self.address is None:
-            return Status(NodeState.HEARD, "its announce names no imc+udp address: enable its UDP transport")
-        if self.heard_at is None and self.announced_at is not None and self.first_announced_at is not None:
-            return self._without_telemetry(now, self.announced_at, self.first_announced_at)
-        silence = math.inf if self.heard_at is None else now - self.heard_at
-        if silence > lost_after:
-            return self._silent(silence, now)
-        if self.operation_mode is None or self.plan_state is None:
-            return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
-        if self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
-            if self.plan_state == PlanState.INITIALIZING:
-                return Status(NodeState.IN_PLAN, "starts a plan")
-            if self.home_bound:
-                return Status(NodeState.IN_PLAN, "goes home by the plan that it keeps on board for that")
-            whose = "our plan"
-            if self.plan_id != settings.plan_id or self.foreign_controller is not None:
-                controller = f" (0x{self.foreign_controller:04X})" if self.foreign_controller is not None else ""
-                whose = f"plan {self.plan_id!r} of another console{controller}"
-            return Status(NodeState.IN_PLAN, f"executes {whose}")
-        if self.operation_mode == OperationMode.SERVICE and self.plan_state == PlanState.READY:
-            return Status(NodeState.READY)
-        return Status(NodeState.ACTIVE, self._why_not_ready())
+        return self.executing(self.settings.plan_id)
 
     def telemetry_overdue(self, now: float) -> bool:
         """Whether it announced itself long ago and nothing else came."""
         since = self.first_announced_at
-        return self.heard_at is None and since is not None and now - since > self._settings.telemetry_timeout_s
-
-    def _without_telemetry(self, now: float, announced_at: float, first_announced_at: float) -> Status:
-        if now - announced_at > ANNOUNCES_MISSED * self._settings.announce_period_s:
-            return Status(NodeState.LOST, "it announced itself and then fell silent")
-        if now - first_announced_at <= self._settings.telemetry_timeout_s:
-            return Status(NodeState.ANNOUNCED, "announced; its telemetry starts within 5 s of our heartbeats")
-        return Status(
-            NodeState.ANNOUNCED,
-            "announced but sends nothing to us: it may remember "
-            f"id 0x{self._settings.id:04X} at another port (restart DUNE or return to that port), "
-            f"or a firewall blocks UDP port {self._settings.port}",
-        )
-
-    def _silent(self, silence: float, now: float) -> Status:
-        seconds = silence / self._settings.time_scale
-        if self.expected_back is not None and now <= self.expected_back:
-            left = (self.expected_back - now) / self._settings.time_scale
-            return Status(
-                NodeState.EXPECTED_OFFLINE,
-                f"silent for {seconds:.0f} s on a leg of ours, expected back within {left:.0f} s",
-            )
-        away = self.expected_back is None and self.plan_state == PlanState.EXECUTING
-        if away and self.submerged and silence <= self.patience_s:
-            whose = "our plan" if self.executing(self._settings.plan_id) else f"plan {self.plan_id!r}"
-            comes_up = "; without references that ends and it comes up" if self.references_needed else ""
-            return Status(
-                NodeState.EXPECTED_OFFLINE,
-                f"silent for {seconds:.0f} s, under water in {whose}: radio ends at the surface{comes_up}",
-            )
-        afloat = self.plan_state not in (PlanState.INITIALIZING, PlanState.EXECUTING)
-        since_start = math.inf if self.started_at is None else now - self.started_at
-        if afloat and self.submerged and min(silence, since_start) <= self.ascent_s:
-            words = f"silent for {seconds:.0f} s, under water without a plan: it floats up"
-            return Status(NodeState.EXPECTED_OFFLINE, words)
-        where = "under water" if self.submerged else "at the surface"
-        return Status(NodeState.LOST, f"silent for {seconds:.0f} s, last heard {where}")
-
-    def _why_not_ready(self) -> str:
-        mode = _enum_name(OperationMode, self.operation_mode)
-        if self.operation_mode == OperationMode.ERROR:
-            return f"in error: {self.error_text or 'no text given'}"
-        if self.plan_state == PlanState.BLOCKED:
-            return f"refuses plans (plan control blocked, mode {mode})"
-        return f"mode {mode}, plan control {_enum_name(PlanState, self.plan_state)}"
+        return self.heard_at is None and since is not None and now - since > self.settings.telemetry_timeout_s
 
     @property
     def operation_mode_name(self) -> str | None:
         """The operation mode in words."""
-        return None if self.operation_mode is None else _enum_name(OperationMode, self.operation_mode)
+        return None if self.operation_mode is None else mode_name(OperationMode, self.operation_mode)
 
     @property
     def plan_state_name(self) -> str | None:
         """The state of plan control in words."""
-        return None if self.plan_state is None else _enum_name(PlanState, self.plan_state)
+        return None if self.plan_state is None else mode_name(PlanState, self.plan_state)
 
 
 def listed_entities(message: Message) -> dict[int, str]:
@@ -582,10 +447,3 @@ def listed_entities(message: Message) -> dict[int, str]:
 
 def _fresh(at: float | None, now: float, limit_s: float) -> bool:
     return at is not None and now - at <= limit_s
-
-
-def _enum_name(kind: type[IntEnum], value: int | None) -> str:
-    try:
-        return kind(value).name.lower() if value is not None else "unknown"
-    except ValueError:
-        return f"unknown ({value})"

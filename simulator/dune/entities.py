@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from simulator.sonars.sensors import SensorKind
+from simulator.world import SimulatedVehicle
+
 # fmt: off
 _NAMES = (
     "Daemon", "Text Message Parser", "Allocator", "Attitude", "Roll Parcel", "Pitch Parcel",
@@ -45,3 +48,9 @@ ANY = 255
 def entity_list(extra: dict[str, int]) -> str:
     """The ``list`` field of an EntityList report: ``name=id`` pairs joined by semicolons."""
     return ";".join(f"{name}={number}" for name, number in (SIMULATION | extra).items())
+
+
+def equipment_of(vehicle: SimulatedVehicle) -> dict[str, int]:
+    """Ids by name of what a vehicle has beyond DUNE's own simulation."""
+    sonars = {SensorKind.DVL: HARDWARE_DVL, SensorKind.MULTIBEAM: HARDWARE_MULTIBEAM}
+    return sonars.get(vehicle.sonar.kind, {}) | ({} if vehicle.battery is None else HARDWARE_FUEL)

@@ -14,7 +14,8 @@ from typing import Any, Self
 import numpy as np
 
 from simulator.clock import SimulationClock
-from simulator.dune.node import DuneOptions, FakeDune
+from simulator.dune.node import FakeDune
+from simulator.dune.options import DuneOptions
 from simulator.dune.transport.discovery import listen_for_announces
 from simulator.equipment import Equipment
 from simulator.floors.terrain import Terrain

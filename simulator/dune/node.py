@@ -4,37 +4,29 @@ from __future__ import annotations
 
 import logging
 import math
-import struct
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from ipaddress import ip_address
-from pathlib import Path
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import imcpy
 import numpy as np
 
 from simulator.clock import SimulationClock
-from simulator.dune.entities import (
-    ANY,
-    HARDWARE_DVL,
-    HARDWARE_FUEL,
-    HARDWARE_MULTIBEAM,
-    SIMULATION,
-    SUPERVISORS,
-    entity_list,
-)
+from simulator.dune.chatter import Chatter
+from simulator.dune.entities import ANY, SIMULATION, SUPERVISORS, entity_list, equipment_of
 from simulator.dune.log_book import LogBook
 from simulator.dune.lost_comms import ENTITY as LOST_COMMS
 from simulator.dune.lost_comms import PERIOD_S as LOST_COMMS_PERIOD_S
-from simulator.dune.lost_comms import PLAN_NAME, LostComms
+from simulator.dune.lost_comms import LostComms
+from simulator.dune.options import DuneOptions
 from simulator.dune.plan import PLAN_ENGINE, SUPERVISOR, PlanEngine
 from simulator.dune.plan_database import PLAN_DATABASE, PlanDatabase
 from simulator.dune.telemetry import Telemetry
 from simulator.dune.transport.contacts import REFRESH_PERIOD_S, Contacts
+from simulator.dune.transport.header import read_header
 from simulator.dune.transport.radio import Radio
 from simulator.dune.transport.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
 from simulator.dune.transport.tcp import FIRST_PORT, TcpServer
-from simulator.network import Address, Endpoint, NetworkFaults, UdpEndpoint
+from simulator.network import Address, Endpoint, UdpEndpoint
 from simulator.sonars.sensors import SensorKind, cast_rays, to_local_frame
 from simulator.targets import Ranging
 from simulator.vehicles.navigation import SURFACE_DEPTH_M
@@ -42,102 +34,29 @@ from simulator.vehicles.vehicle import STEP_S
 from simulator.world import SimulatedVehicle
 
 log = logging.getLogger(__name__)
-
 PORT_TRIES = 5
 """DUNE takes the first free one of this many ports."""
 TCP_PORT_TRIES = 50
 """As many nodes may share this host."""
-DEFAULT_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 ANNOUNCE_PERIOD_S = 10.0
-BOOT_S = 5.0
 LEAK_SENSOR, FAULTY = "Leak Sensor - Nose", "Motor"
 STREAM_PERIOD_S = 10.0
 """Between two estimates of the current at the surface."""
 STILL_WATER = (0.0, 0.0)
-IMC_VERSION = "5.4.31"
 RESTART_S = 5.0
 """How long DUNE is away when it crashes."""
 UDP_ENTITY = "UDP"
 RATE_LIMITERS = "Rate Limiters"
 FORWARD_RANGE_M = 30.0
-CHATTER_HZ = 94.0
-OTHER_CHATTER = tuple(SIMULATION)[:32]
-"""Entities whose states make up the rest of some 710 packets a second."""
-
 RATE_TEXT = ", ".join(f"{name}:{rate:g}" for name, rate in DEFAULT_LIMITS_HZ.items())
-
 Handler = Callable[[imcpy.Message, float], None]
-
 _BROADCAST = 0xFFFF
-_HEADER = struct.Struct("<HHHdHBHB")
-_HEADER_BIG = struct.Struct(">HHHdHBHB")
-_SYNC = 0xFE54
-
 _ANNOUNCE = imcpy.Announce().msg_id
 _HEARTBEAT = imcpy.Heartbeat().msg_id
 _PLAN_CONTROL = imcpy.PlanControl().msg_id
 _ENTITY_LIST = imcpy.EntityList().msg_id
 _TRANSPORTED = frozenset({_HEARTBEAT, _PLAN_CONTROL, _ENTITY_LIST})
 """Received messages that are passed on to every active system, the sender included."""
-
-
-@dataclass(frozen=True, slots=True)
-class DuneOptions:
-    """Settings shared by the nodes of a fleet.
-
-    Attributes
-    ----------
-    bind_address
-        Where the imc+udp socket listens, and the announced address.
-    announce_addresses, announce_ports
-        Every combination gets the announce.
-    faults
-        Of the network, in both directions.
-    chatter
-        Also send servo positions, attitude and states of entities at full rate, as a real vehicle does.
-    boot_s
-        Vehicle time from start to service.
-    static_destinations
-        Addresses that get everything, known or not.
-    imc_version
-        As announced.
-    tcp
-        Also serve consoles by TCP.
-    radio_range_m
-        Above 0 the radio ends there, and at the surface.
-    lost_comms_s
-        For how long no console may be heard before a stored plan is started; 0: that supervisor is not enabled, as in
-        DUNE's own configurations.
-    lost_comms_plan
-        What that plan is called.
-    log_dir
-        Where vehicles keep their logs, each in a folder of its name; none by default.
-    """
-
-    bind_address: str = "127.0.0.1"
-    announce_addresses: tuple[str, ...] = ("127.0.0.1",)
-    announce_ports: tuple[int, ...] = DEFAULT_ANNOUNCE_PORTS
-    faults: NetworkFaults = field(default_factory=NetworkFaults)
-    chatter: bool = False
-    boot_s: float = BOOT_S
-    static_destinations: tuple[Address, ...] = ()
-    imc_version: str = IMC_VERSION
-    tcp: bool = False
-    radio_range_m: float = 0.0
-    lost_comms_s: float = 0.0
-    lost_comms_plan: str = PLAN_NAME
-    log_dir: Path | None = None
-
-    def __post_init__(self) -> None:
-        try:
-            unspecified = ip_address(self.bind_address).is_unspecified
-        except ValueError:
-            unspecified = True
-        if unspecified:
-            raise ValueError(
-                f"bind address is {self.bind_address!r}; it must be an IP address of this host that consumers "
-                "reach, because the announce tells it to them"
-            )
 
 
 @dataclass(slots=True)
@@ -195,17 +114,8 @@ class FakeDune:
         self.plan, self.lost_comms = self._booted(clock.now() + options.boot_s)
         self._rng = rng
         self._ranging = ranging
-        self._entities = dict(SIMULATION)
-        self._extra: dict[str, int] = {}
-        if vehicle.sonar.kind is SensorKind.DVL:
-            self._extra = HARDWARE_DVL
-        elif vehicle.sonar.kind is SensorKind.MULTIBEAM:
-            self._extra = HARDWARE_MULTIBEAM
-        if vehicle.battery is not None:
-            self._extra = self._extra | HARDWARE_FUEL
-        if self.lost_comms is not None:
-            self._extra = self._extra | SUPERVISORS
-        self._entities |= self._extra
+        self._extra = equipment_of(vehicle) | ({} if self.lost_comms is None else SUPERVISORS)
+        self._entities = SIMULATION | self._extra
         self._radio = Radio(options.radio_range_m)
         self._tcp = TcpServer(self._receive_by_tcp) if options.tcp else None
         self._log: LogBook | None = None
@@ -217,7 +127,7 @@ class FakeDune:
         self._refresh = Periodic(REFRESH_PERIOD_S, self._now_s + REFRESH_PERIOD_S)
         self._supervise = Periodic(LOST_COMMS_PERIOD_S, self._now_s)
         self._leak: imcpy.EntityState.StateEnum | None = None
-        self._chatter_owed = 0.0
+        self._chatter = Chatter(self._entities) if options.chatter else None
         self._offered = ""
         self._down_until_s: float | None = None
         self._rate_text = RATE_TEXT
@@ -427,8 +337,8 @@ class FakeDune:
         if self._ranging is not None and self._telemetry is not None:
             for system, range_m in self._ranging.step(now_s, self.vehicle.true_position):
                 self.send(self._telemetry.acoustic_range(system, range_m), self._entities["Acoustic Modem"])
-        if self._options.chatter:
-            self._send_chatter()
+        if self._chatter is not None:
+            self._chatter.step(self.vehicle.vehicle.motion, self._send_limited)
 
     def _periodic_messages(self, t: Telemetry) -> list[tuple[Periodic, Callable[[], None]]]:
         ids, now_s = self._entities, self._now_s
@@ -526,26 +436,6 @@ class FakeDune:
         found = cast_rays(self.vehicle.terrain, m.east_m, m.north_m, m.depth_m, bow, FORWARD_RANGE_M)[0]
         return float(found) if math.isfinite(found) else FORWARD_RANGE_M
 
-    def _send_chatter(self) -> None:
-        """Attitude of an AHRS at 94 Hz and four servos each as often: 660 packets a second, unless they are limited."""
-        self._chatter_owed += CHATTER_HZ * STEP_S
-        m = self.vehicle.vehicle.motion
-        ahrs, servos = self._entities["AHRS"], self._entities["Servos"]
-        while self._chatter_owed >= 1.0:
-            self._chatter_owed -= 1.0
-            euler = imcpy.EulerAngles()
-            euler.phi, euler.theta, euler.psi = m.roll_rad, m.pitch_rad, m.heading_rad
-            rates = imcpy.AngularVelocity()
-            rates.z = m.turn_rate_radps
-            for message in (euler, rates, imcpy.Acceleration()):
-                self._send_limited(message, ahrs)
-            for servo in range(4):
-                position = imcpy.ServoPosition()
-                position.id = servo
-                self._send_limited(position, servos)
-        for label in OTHER_CHATTER:
-            self._send_limited(imcpy.EntityState(), self._entities[label])
-
     def _send_limited(self, message: imcpy.Message, entity: int) -> None:
         if self.limiter.passes(message.msg_name, entity, self._now_s):
             self.send(message, entity)
@@ -554,7 +444,7 @@ class FakeDune:
         """Take a packet from the network."""
         if self._down_until_s is not None:
             return
-        header = _read_header(data)
+        header = read_header(data)
         if header is None:
             self.counts.malformed += 1
             return
@@ -573,7 +463,7 @@ class FakeDune:
         self._obey(data, message_id, handler, now_s)
 
     def _receive_by_tcp(self, data: bytes, sender: Address) -> None:
-        header = _read_header(data)
+        header = read_header(data)
         if header is None:
             self.counts.malformed += 1
             return
@@ -690,15 +580,3 @@ class FakeDune:
         entry.context = "Transports.UDP"
         entry.text = text
         self.send(entry, self._entities[UDP_ENTITY])
-
-
-def _read_header(data: bytes) -> tuple[int, int] | None:
-    """Message id and source of a packet in either byte order, None where it is not IMC."""
-    if len(data) < _HEADER.size + 2:
-        return None
-    fields: Sequence[int] = _HEADER.unpack_from(data)
-    if fields[0] != _SYNC:
-        fields = _HEADER_BIG.unpack_from(data)
-        if fields[0] != _SYNC:
-            return None
-    return fields[1], fields[4]

@@ -9,6 +9,7 @@ import imcpy
 
 from simulator.dune.entities import ANY, SIMULATION
 from simulator.dune.maneuvers.elevator import ElevatorManeuver
+from simulator.dune.maneuvers.ending import EndingManeuver
 from simulator.dune.maneuvers.follow_reference import FollowReference
 from simulator.dune.maneuvers.goto import GotoManeuver
 from simulator.dune.maneuvers.pop_up import PopUpManeuver
@@ -31,9 +32,8 @@ IS_DONE = "ManeuverIsDone"
 UNATTENDED_S = 1.0
 """How long a maneuver that is done waits for the plan engine; then the supervisor ends it."""
 
-Timed = GotoManeuver | ElevatorManeuver | StationKeepingManeuver | PopUpManeuver
 """Maneuvers that end by themselves."""
-Maneuver = FollowReference | Timed
+Maneuver = FollowReference | EndingManeuver
 SPECIFICATIONS = (imcpy.FollowReference, imcpy.Goto, imcpy.Elevator, imcpy.StationKeeping, imcpy.PopUp)
 """Of the maneuvers that are flown."""
 

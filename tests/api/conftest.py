@@ -12,8 +12,16 @@ from app.main import Server
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.databases import Databases
-from tests.support.rest import Guarded, make_client, make_tokens, mission_spec, new_mission, running, running_in_thread
+from tests.support.api.rest import (
+    Guarded,
+    make_client,
+    make_tokens,
+    mission_spec,
+    new_mission,
+    running,
+    running_in_thread,
+)
+from tests.support.storage.databases import Databases
 
 
 @pytest.fixture(scope="session")

@@ -28,9 +28,9 @@ from app.api.accounts.tokens import Role, TokenStore
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.contract import CONTRACT
-from tests.support.databases import Databases
-from tests.support.rest import mission_spec, running_in_thread, soundings
+from tests.support.api.contract import CONTRACT
+from tests.support.api.rest import mission_spec, running_in_thread, soundings
+from tests.support.storage.databases import Databases
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
 # what they are called, profiles go down, times go on, there is such a site, there is a reference grid to differ from.

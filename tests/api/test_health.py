@@ -12,7 +12,7 @@ from app.main import Server, create_app
 from app.settings import Settings
 from app.storage.upkeep import migrate
 from app.storage.upkeep.prepare import DatabaseNotReadyError
-from tests.support.rest import mission_spec, soundings
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.waiting import until
 
 

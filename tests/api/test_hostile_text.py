@@ -28,7 +28,7 @@ from app.storage.upkeep.prepare import prepare_database
 from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, problem
 from imc_bridge.events import NodeState
 from imc_bridge.printable import printable
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 HOSTILE = "a\x1b[2J\x07\x9b31m\x7f\u202eb\u2028c\u2066[red]d[/red]"
 SHOWN = r"a\x1b[2J\x07\x9b31m\x7f\u202eb\u2028c\u2066[red]d[/red]"

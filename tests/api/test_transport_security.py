@@ -14,7 +14,7 @@ import pytest
 
 from app.main import create_app, serve
 from app.settings import Settings, SettingsError, StartupError, load_settings
-from tests.support.rest import make_client, running
+from tests.support.api.rest import make_client, running
 
 HTTPS_ONLY = "strict-transport-security"
 

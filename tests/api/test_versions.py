@@ -5,8 +5,8 @@ from collections.abc import Callable
 from app.settings import Settings
 from app.storage.upkeep import migrate
 from bathyfleet.client import AsyncClient
-from tests.support.databases import query
-from tests.support.rest import mission_spec, running, soundings
+from tests.support.api.rest import mission_spec, running, soundings
+from tests.support.storage.databases import query
 
 FIRST = "0001"
 KEPT = (

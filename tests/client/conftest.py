@@ -6,8 +6,8 @@ from app.main import Server
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from bathyfleet.client import Client
-from tests.support.databases import Databases
-from tests.support.rest import running_in_thread
+from tests.support.api.rest import running_in_thread
+from tests.support.storage.databases import Databases
 
 
 @pytest.fixture(scope="session")

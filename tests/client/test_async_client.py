@@ -14,8 +14,8 @@ from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
 from bathyfleet.client import AsyncClient, NotAllowedError, NotFoundError, UnreachableError, models
-from tests.support.relay import relay_to
-from tests.support.rest import Tokens, make_tokens, mission_spec, running, soundings
+from tests.support.api.relay import relay_to
+from tests.support.api.rest import Tokens, make_tokens, mission_spec, running, soundings
 
 
 @pytest.fixture

@@ -21,9 +21,9 @@ from bathyfleet.client import (
     UnreachableError,
     models,
 )
+from tests.support.api.relay import Relay, relay_to
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.ports import free_ports
-from tests.support.relay import Relay, relay_to
-from tests.support.rest import mission_spec, soundings
 
 SIMULATED = [{"name": "a", "kind": "sim"}]
 

@@ -9,7 +9,7 @@ import pytest
 from app.client.__main__ import TARGET, main, sources
 from app.client.classes import TypeNames
 from bathyfleet.client import AsyncClient, Client, models
-from tests.support.contract import CONTRACT
+from tests.support.api.contract import CONTRACT
 
 
 def test_models_and_operations_are_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from app.missions.alarm_kinds import alarms_text
-from tests.support.alarms import SECRET, hook
+from tests.support.missions.alarms import SECRET, hook
 
 
 @pytest.fixture

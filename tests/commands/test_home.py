@@ -10,7 +10,7 @@ from app.commands.home import drawn, fly_mission, summary, wrong_with
 from app.commands.home_watch import Seen, leads_on
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import VehicleSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import Team
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.specs import lon_lat

@@ -19,8 +19,8 @@ from app.compute.settings import ComputeSettings
 from app.compute.worker import facts
 from app.missions.errors import InvalidRequestError, ProductUnavailableError
 from app.missions.operations.work_processes import WorkProcesses
-from tests.support import heavy_work
-from tests.support.cluster import DaskCluster, dask_cluster
+from tests.support.compute import heavy_work
+from tests.support.compute.cluster import DaskCluster, dask_cluster
 from tests.support.paths import PROJECT
 from tests.support.waiting import until
 

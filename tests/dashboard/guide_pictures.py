@@ -19,9 +19,9 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from tests.dashboard.conftest import CHROMIUM, FLAGS
-from tests.support.ais import named, nmea, position
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, show
+from tests.support.missions.ais import named, nmea, position
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.paths import PROJECT
 from tests.support.ports import free_ports

@@ -1,7 +1,7 @@
 import pytest
 
 from app.arrays import FloatArray
-from tests.support.situations import SQUARE
+from tests.support.exploration.situations import SQUARE
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
 from app.exploration.survey.error import expected_roughness
-from tests.support.situations import SQUARE, make_belief, make_situation
+from tests.support.exploration.situations import SQUARE, make_belief, make_situation
 
 QUICK = {"search": 30, "candidates": 24, "rollouts": 20}
 KINDS = [

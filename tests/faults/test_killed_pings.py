@@ -10,10 +10,10 @@ import pytest
 
 from app.storage.database import Database
 from app.storage.ping_files import PingFiles
-from tests.support.databases import Databases
 from tests.support.missions.pings import open_store, times_of
 from tests.support.paths import PROJECT
-from tests.support.rows import mission
+from tests.support.storage.databases import Databases
+from tests.support.storage.rows import mission
 
 KILLS = 6
 

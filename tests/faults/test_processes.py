@@ -11,9 +11,9 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from tests.support.databases import Databases, query
 from tests.support.faults.missions import mission_of, pollers
 from tests.support.faults.service import Service, service_in
+from tests.support.storage.databases import Databases, query
 
 PATIENCE_S = 120.0
 

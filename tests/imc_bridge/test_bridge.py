@@ -279,7 +279,7 @@ async def test_rates_are_sent_until_the_vehicle_reports_them() -> None:
         sea.bridge.transport.send = send_but_the_first
         await sea.bridge.stop(name, timeout_s=20.0)
         await until(lambda: node._rate_text == former, "the rates are as before")
-        known = sea.bridge._roster.named(name)
+        known = sea.bridge._registry.named(name)
         assert known is not None
         request = sea.bridge._crew.asked_rates(known)
         assert request is not None

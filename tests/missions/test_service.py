@@ -39,7 +39,8 @@ from app.missions.running.mission_views import planner_views, watched
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
-from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 from app.missions.states import Action, MissionState, MoveRefusedError
 from app.missions.views.measurements.soundings import Verdict
 from app.missions.views.messages import EventMessage, MapMessage, SnapshotMessage, StateMessage

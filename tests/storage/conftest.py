@@ -3,7 +3,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from app.storage.database import Database
-from tests.support.databases import KINDS, Databases
+from tests.support.storage.databases import KINDS, Databases
 
 
 @pytest.fixture(params=KINDS)

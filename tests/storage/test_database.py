@@ -15,7 +15,7 @@ from sqlalchemy.exc import IntegrityError, OperationalError, StatementError
 
 from app.storage.database import Database
 from app.storage.models import MissionRow, SoundingRow, StepRow, WaypointRow
-from tests.support.rows import TIME, mission, one_of_each, step, waypoint
+from tests.support.storage.rows import TIME, mission, one_of_each, step, waypoint
 
 
 async def _pragma(database: Database, name: str) -> object:
@@ -163,7 +163,7 @@ import asyncio, sys
 from sqlalchemy import func, select
 from app.storage.database import Database
 from app.storage.models import StepRow
-from tests.support.rows import step
+from tests.support.storage.rows import step
 
 async def main(url, first):
     database = Database(url)

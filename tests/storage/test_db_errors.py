@@ -11,7 +11,7 @@ from sqlalchemy.exc import DBAPIError
 from app.storage import database as database_module
 from app.storage.database import Database
 from app.storage.db_errors import trouble_of
-from tests.support.rows import mission
+from tests.support.storage.rows import mission
 
 
 def _file(database: Database) -> Path:

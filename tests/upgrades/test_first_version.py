@@ -21,8 +21,8 @@ from app.settings import Settings
 from app.storage.database import make_engine
 from app.storage.upkeep import migrate
 from app.storage.upkeep.prepare import prepare_database
-from tests.support.databases import KINDS, Databases, path_of
-from tests.support.rest import running
+from tests.support.api.rest import running
+from tests.support.storage.databases import KINDS, Databases, path_of
 from tests.support.waiting import until
 
 FIRST = Path(__file__).with_name("first_version.sql")

@@ -183,6 +183,14 @@ def problems(*kinds: str) -> dict[int | str, dict[str, Any]]:
     return responses
 
 
+BODY_KINDS = ("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request")
+
+
+def body_problems(*further: str) -> dict[int | str, dict[str, Any]]:
+    """Describe the problems that a route with a JSON body may answer: those of bodies, and further ones."""
+    return problems(*sorted((*BODY_KINDS, *further), key=lambda kind: TITLES[kind][0]))
+
+
 def example_problem(kind: str) -> dict[str, Any]:
     """An example of a problem of ``kind``."""
     details: dict[str, tuple[str, str]] = {

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Body, Path, Query, Response
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import ProblemError, problems
+from app.api.http.problems import ProblemError, body_problems, problems
 from app.api.maps.maps import file_answer
 from app.api.mission import Mission
 from app.api.schemas import API, SiteChoice
@@ -25,7 +25,7 @@ mission_router = APIRouter(
     route_class=JsonRoute, prefix=f"{API}/missions", tags=["sites"], responses=problems("unauthenticated", "forbidden")
 )
 
-_SENT = problems("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request")
+_SENT = body_problems()
 _FOUND = problems("site-not-found", "invalid-request")
 _MAPPED = problems("site-not-found", "map-not-ready", "invalid-request")
 _COMPARED = _MAPPED | problems("conflict")

@@ -2,19 +2,18 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Query, Request
+from fastapi import APIRouter, Query, Request
 
 from app.api.access.auth import Operator
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import problems
+from app.api.http.problems import body_problems, problems
 from app.api.http.while_connected import while_connected
 from app.api.mission import Mission
-from app.api.missions.missions import EXAMPLE_SPEC
+from app.api.missions.missions import DescribedMission
 from app.api.schemas import API
 from app.api.state import Service
 from app.missions.forecast.preview import PlanView
 from app.missions.forecast.request import ForecastView
-from app.missions.spec.mission import MissionSpec
 
 router = APIRouter(
     route_class=JsonRoute, prefix=API, tags=["missions"], responses=problems("unauthenticated", "forbidden")
@@ -31,9 +30,7 @@ _FloorDepth = Annotated[
     operation_id="forecastMission",
     summary="Foretell a mission",
     response_model=ForecastView,
-    responses=problems(
-        "malformed-body", "mission-not-found", "conflict", "body-too-large", "unsupported-media-type", "invalid-request"
-    ),
+    responses=body_problems("mission-not-found", "conflict"),
 )
 async def forecast_mission(
     service: Service, operator: Operator, mission: Mission, request: Request, floor_depth_m: _FloorDepth = None
@@ -47,12 +44,10 @@ async def forecast_mission(
     operation_id="forecastDescription",
     summary="Foretell a mission that is being described",
     response_model=ForecastView,
-    responses=problems("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request"),
+    responses=body_problems(),
 )
 async def forecast_description(
-    spec: Annotated[
-        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
-    ],
+    spec: DescribedMission,
     service: Service,
     operator: Operator,
     request: Request,
@@ -70,12 +65,10 @@ async def forecast_description(
     operation_id="previewPlan",
     summary="Plan a mission that is being described",
     response_model=PlanView,
-    responses=problems("malformed-body", "body-too-large", "unsupported-media-type", "invalid-request"),
+    responses=body_problems(),
 )
 async def preview_plan(
-    spec: Annotated[
-        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
-    ],
+    spec: DescribedMission,
     service: Service,
     operator: Operator,
     request: Request,

@@ -7,7 +7,7 @@ from pydantic import TypeAdapter
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import problems
+from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.peer_lists import from_peers
 from app.api.schemas import API, ActionRequest, EndRequest, NoteRequest, VehicleName
@@ -16,7 +16,8 @@ from app.missions.operations import history
 from app.missions.preflight.survey import preflight
 from app.missions.running.homecoming import call_home, hold
 from app.missions.running.mission_views import action_view, mission_view
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import Action
 from app.missions.views.mission import ActionView, EventView, MissionSummary, MissionView, PreflightView, StepView
 from app.missions.views.telemetry import TelemetryView
@@ -51,19 +52,22 @@ EXAMPLE_SPEC = {
     "planner": {"name": "cao"},
 }
 
+DescribedMission = Annotated[
+    MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
+]
+"""A mission as the body of a request."""
+
 
 @router.post(
     "",
     operation_id="createMission",
     summary="Describe a new mission",
     status_code=201,
-    responses=problems("malformed-body", "conflict", "body-too-large", "unsupported-media-type", "invalid-request")
+    responses=body_problems("conflict")
     | {201: {"headers": {"Location": {"description": "Path of the mission", "schema": {"type": "string"}}}}},
 )
 async def create_mission(
-    spec: Annotated[
-        MissionSpec, Body(openapi_examples={"quay": {"summary": "Two IMC vehicles at a quay", "value": EXAMPLE_SPEC}})
-    ],
+    spec: DescribedMission,
     service: Service,
     operator: Operator,
     response: Response,
@@ -96,14 +100,7 @@ async def get_mission(reader: Reader, mission: Mission) -> MissionView:
     "/{mission_id}",
     operation_id="describeMission",
     summary="Describe a mission anew that has not started",
-    responses=problems(
-        "malformed-body",
-        "mission-not-found",
-        "conflict",
-        "body-too-large",
-        "unsupported-media-type",
-        "invalid-request",
-    ),
+    responses=body_problems("mission-not-found", "conflict"),
 )
 async def describe_mission(
     spec: Annotated[MissionSpec, Body()], service: Service, operator: Operator, mission: Mission
@@ -130,15 +127,7 @@ async def delete_mission(service: Service, operator: Operator, mission: Mission)
     await service.delete(mission)
 
 
-_ACTION_PROBLEMS = problems(
-    "malformed-body",
-    "mission-not-found",
-    "move-refused",
-    "conflict",
-    "body-too-large",
-    "unsupported-media-type",
-    "invalid-request",
-)
+_ACTION_PROBLEMS = body_problems("mission-not-found", "move-refused", "conflict")
 
 _ACTION_TEXTS = {
     Action.START: (
@@ -239,9 +228,7 @@ async def get_telemetry(
     operation_id="writeNote",
     summary="Write into the log",
     status_code=201,
-    responses=problems(
-        "malformed-body", "mission-not-found", "body-too-large", "unsupported-media-type", "invalid-request"
-    ),
+    responses=body_problems("mission-not-found"),
 )
 async def write_note(note: NoteRequest, operator: Operator, mission: Mission) -> EventView:
     """Keep an operator's words in the mission's log, for the next watch."""
@@ -299,14 +286,7 @@ async def resume_vehicle(name: VehicleName, service: Service, operator: Operator
     "/{mission_id}/vehicles",
     operation_id="addVehicle",
     summary="Add a vehicle to a mission",
-    responses=problems(
-        "malformed-body",
-        "mission-not-found",
-        "conflict",
-        "body-too-large",
-        "unsupported-media-type",
-        "invalid-request",
-    ),
+    responses=body_problems("mission-not-found", "conflict"),
     tags=["vehicles"],
 )
 async def add_vehicle(vehicle: VehicleSpec, service: Service, operator: Operator, mission: Mission) -> MissionView:

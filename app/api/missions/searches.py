@@ -6,7 +6,7 @@ from fastapi import APIRouter, Body, Query, Response
 
 from app.api.access.auth import Reader, VehicleOrOperator, check_vehicle
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import problems
+from app.api.http.problems import body_problems, problems
 from app.api.maps.maps import file_answer
 from app.api.mission import Mission
 from app.api.schemas import API, ScanBatch
@@ -28,14 +28,7 @@ router = APIRouter(
     "/scans",
     operation_id="postScans",
     summary="Post scans",
-    responses=problems(
-        "malformed-body",
-        "mission-not-found",
-        "conflict",
-        "body-too-large",
-        "unsupported-media-type",
-        "invalid-request",
-    ),
+    responses=body_problems("mission-not-found", "conflict"),
 )
 async def post_scans(batch: Annotated[ScanBatch, Body()], vehicle: VehicleOrOperator, mission: Mission) -> BatchVerdict:
     """Store scans of a mission of kind search, and add them to what is known of its site.

@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import problems
+from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.schemas import API
 from app.api.state import Service
@@ -12,8 +12,8 @@ from app.missions.operations.corrections import adjustment, recorrection
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
 from app.missions.operations.maps.mission_maps import newest_map
-from app.missions.spec.mission import SoundSpeed
 from app.missions.spec.systematic_errors import SystematicErrors
+from app.missions.spec.water import SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
 from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection
 from app.missions.views.measurements.systematic_errors import SystematicErrorsView
@@ -25,7 +25,7 @@ router = APIRouter(
     responses=problems("unauthenticated", "forbidden"),
 )
 
-_CHANGE = problems("malformed-body", "mission-not-found", "body-too-large", "unsupported-media-type", "invalid-request")
+_CHANGE = body_problems("mission-not-found")
 
 
 @router.get(

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from app.api.access.auth import VehicleOrOperator, check_vehicle
 from app.api.bodies.json_route import JsonRoute
 from app.api.http.first_completed import first_of
-from app.api.http.problems import ProblemError, problems
+from app.api.http.problems import ProblemError, body_problems, problems
 from app.api.mission import Mission
 from app.api.schemas import API, MeasurementBatch, VehicleName
 from app.api.state import Service, State
@@ -31,14 +31,7 @@ MAX_WAIT_S = 60.0
     "/measurements",
     operation_id="postMeasurements",
     summary="Post measurements",
-    responses=problems(
-        "malformed-body",
-        "mission-not-found",
-        "conflict",
-        "body-too-large",
-        "unsupported-media-type",
-        "invalid-request",
-    ),
+    responses=body_problems("mission-not-found", "conflict"),
 )
 async def post_measurements(
     batch: MeasurementBatch,

@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
-from app.api.http.problems import problems
+from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.schemas import API, ActionRequest
 from app.missions.live.mission import LiveMission
@@ -82,9 +82,7 @@ async def list_sounding_points(
     return await sounding_points(mission, after=after, limit=limit)
 
 
-_RULING = problems(
-    "malformed-body", "sounding-not-found", "conflict", "body-too-large", "unsupported-media-type", "invalid-request"
-)
+_RULING = body_problems("sounding-not-found", "conflict")
 
 
 @router.post("/restore", operation_id="restoreSoundings", summary="Let many soundings count", responses=_RULING)

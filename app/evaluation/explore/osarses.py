@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.arrays import FloatArray
-from app.evaluation.explore.tries import Trier
+from app.evaluation.explore.oracles import MoveOracle
 from app.evaluation.explore.world import World
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.objective import Terms
@@ -17,7 +17,7 @@ SPREAD = 0.5
 """Standard deviation of a move per coordinate, as a fraction of the largest step; longer moves are shortened to it."""
 
 
-class Osarses(Trier):
+class Osarses(MoveOracle):
     """Takes the best of ``tries`` random feasible moves and of staying; 0 tries are one random feasible move.
 
     That the team may stay is what makes plain J a deadlock: where no vehicle can gain, no move is better than none.

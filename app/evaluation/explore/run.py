@@ -8,9 +8,9 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.estimation import Landmarks
+from app.evaluation.explore.oracles import GradientOracle, MoveOracle
 from app.evaluation.explore.osarses import Osarses
 from app.evaluation.explore.teams import LimitedTeam, UnlimitedTeam
-from app.evaluation.explore.tries import GradientTrier, Trier
 from app.evaluation.explore.world import DEEPEST, SHALLOWEST, ExploreScenario, World, names_of
 from app.evaluation.runs.summary import first_step
 from app.exploration.core.problem import Situation
@@ -125,7 +125,7 @@ def run_explore(
         wall_s=time.perf_counter() - began,
         plan_ms_median=1e3 * float(np.median(plan_s)),
         plan_ms_p99=1e3 * float(np.quantile(plan_s, 0.99)),
-        real_tries=chooser.real_tries if isinstance(chooser, Trier) else 0,
+        real_tries=chooser.real_tries if isinstance(chooser, MoveOracle) else 0,
         broken_constraints=broken,
         capacity=scenario.capacity,
         message_bytes=team.sent_bytes,
@@ -143,9 +143,11 @@ def _claims_of_done(landmarks: Landmarks, truth: FloatArray, accuracy_sd: float)
     return float((error**2 / landmarks.variance_m2[done]).mean()), 100.0 * float((abs(error) <= accuracy_sd).mean())
 
 
-def _chooser(planner: str, options: PlannerOptions, world: World, noise: np.random.Generator) -> PlannerBase | Trier:
+def _chooser(
+    planner: str, options: PlannerOptions, world: World, noise: np.random.Generator
+) -> PlannerBase | MoveOracle:
     if planner == OSARSES:
         return Osarses(world, options.tries, noise, options.objective)
     if planner in (TRIED_SPSA, TRIED_FDSA):
-        return GradientTrier("spsa" if planner == TRIED_SPSA else "fdsa", world, noise, options.objective)
+        return GradientOracle("spsa" if planner == TRIED_SPSA else "fdsa", world, noise, options.objective)
     return create_planner(planner, options, world.scenario.sensor)

@@ -13,8 +13,8 @@ from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.evaluation.explore.run import OSARSES, run_explore
 from app.evaluation.explore.world import ExploreScenario
+from app.evaluation.pcao.simulation.oracles import FDSA, SE, SPSA, fly_tried, tries_per_step
 from app.evaluation.pcao.simulation.task import TrainingTask
-from app.evaluation.pcao.simulation.tried import FDSA, SE, SPSA, fly_tried, tries_per_step
 from app.evaluation.pcao.simulation.world import LANDMARKS, ROBOTS, STEPS, SeaFloor
 from app.evaluation.pcao.training.optimisers import METHODS
 from app.evaluation.runs.jobs import Job, Progress

@@ -29,6 +29,7 @@ Seed = Annotated[int, typer.Option(help="Seed of everything random.")]
 Seeds = Annotated[str | None, typer.Option(help="Several runs: FIRST:END (END excluded), or a list 1,5,9.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else, to standard output.")]
 Regressors = Annotated[str, typer.Option(help="What CAO's estimator is linear in: map or polynomial.")]
+NoRun = Annotated[bool, typer.Option("--no-run", help="With --write: only report the runs that are there.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes; with several seeds or planners, runs at a time.")]
 
 Scheduler = Annotated[
@@ -120,6 +121,12 @@ def seed_list(seed: int, seeds: str | None, option: str = "--seeds") -> list[int
     if not chosen or min(chosen) < 0:
         raise typer.BadParameter(f"{seeds!r} holds no number, or a negative one", param_hint=option)
     return chosen
+
+
+def check_report(write: Path | None, only: str | None, *, no_run: bool) -> None:
+    """Refuse what is said of a report that is not asked for."""
+    if (only is not None or no_run) and write is None:
+        raise typer.BadParameter("goes with --write only", param_hint="--only" if only is not None else "--no-run")
 
 
 def planner_options(

@@ -9,9 +9,11 @@ from rich.progress import Progress as ProgressBar
 from app.evaluation.runs.command import (
     Jobs,
     Json,
+    NoRun,
     Scheduler,
     Seed,
     Seeds,
+    check_report,
     compare,
     evaluate_app,
     planners_named,
@@ -58,15 +60,12 @@ def rescue(
     only: Annotated[
         str | None, typer.Option(help=f"With --write: one or more of {', '.join(VARIANTS)}, separated by commas.")
     ] = None,
-    no_run: Annotated[
-        bool, typer.Option("--no-run", help="With --write: only report the runs that are there.")
-    ] = False,
+    no_run: NoRun = False,
 ) -> None:
     """Run ACCESS13's searches: explore a goal area and the rest of a partly known site, and be back in time."""
     if clock not in CLOCKS:
         raise typer.BadParameter(f"{clock!r} is none of {', '.join(CLOCKS)}", param_hint="--clock")
-    if (only is not None or no_run) and write is None:
-        raise typer.BadParameter("goes with --write only", param_hint="--only" if only is not None else "--no-run")
+    check_report(write, only, no_run=no_run)
     chosen = seed_list(seed, seeds)
     if write is not None:
         _report(write, chosen, seeds or str(seed), jobs, scheduler, only, no_run=no_run)

@@ -11,9 +11,11 @@ from app.estimation import Fading
 from app.evaluation.runs.command import (
     Jobs,
     Json,
+    NoRun,
     Scheduler,
     Seed,
     Seeds,
+    check_report,
     compare,
     evaluate_app,
     planners_named,
@@ -78,15 +80,12 @@ def track(
     only: Annotated[
         str | None, typer.Option(help="With --write: one or more experiments, separated by commas.")
     ] = None,
-    no_run: Annotated[
-        bool, typer.Option("--no-run", help="With --write: only report the runs that are there.")
-    ] = False,
+    no_run: NoRun = False,
 ) -> None:
     """Run MED13's and NGCUV12's scenarios: moving targets, fading localization, landmarks in three dimensions."""
     if setup not in SETUPS:
         raise typer.BadParameter(f"{setup!r} is none of {', '.join(SETUPS)}", param_hint="--setup")
-    if (only is not None or no_run) and write is None:
-        raise typer.BadParameter("goes with --write only", param_hint="--only" if only is not None else "--no-run")
+    check_report(write, only, no_run=no_run)
     if terrain is not None and setup == "ngcuv12":
         raise typer.BadParameter("ngcuv12 has no sea floor; leave it out", param_hint="--terrain")
     if own_fix and setup != "ngcuv12":

@@ -2,7 +2,7 @@
 
 In the papers the perturbations are really flown, which takes 3 (SPSA) or 1 + 6 N_R (FDSA) times as long. A planner may
 not try anything really, so these evaluate the perturbed team configurations on the current map: what CAO's ``map``
-regressors predict, weighted by their prior. The literal reading, with real tries: ``app.evaluation.explore.tries``.
+regressors predict, weighted by their prior. The literal reading, with real tries: ``app.evaluation.explore.oracles``.
 """
 
 from collections.abc import Callable

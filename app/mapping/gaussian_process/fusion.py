@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.gaussian_process.gp import GaussianProcessMap
-from app.mapping.kriging.counting import count_per_cell
+from app.mapping.kriging.cell_index import count_per_cell
 from app.mapping.types import BathymetricMap, Grid, Soundings
 
 

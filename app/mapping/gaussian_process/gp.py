@@ -41,7 +41,7 @@ from app.mapping.gaussian_process.reach import (
 from app.mapping.gaussian_process.roughness import hole_errors, local_ratio
 from app.mapping.gaussian_process.support import support
 from app.mapping.gross_errors.outliers import OutlierReport, flag_outliers
-from app.mapping.kriging.counting import count_per_cell
+from app.mapping.kriging.cell_index import count_per_cell
 from app.mapping.kriging.fields import Field, coarse_grid
 from app.mapping.kriging.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging.kriging import Conditioned

@@ -1,4 +1,4 @@
-"""Reads one file, locked in; see ``app.missions.operations.imports.reading`` for the other side.
+"""Reads one file, locked in; see ``app.missions.operations.imports.reader_process`` for the other side.
 
 The file is standard input. Arguments: the task as JSON, and the number of the open file for the values found. What was
 found is said as JSON on standard output, in one line. Exit code 3: the file cannot be used, and why; 4: this system
@@ -23,7 +23,7 @@ def main(layers: tuple[str, ...] = LAYERS) -> int:
     sys.modules["pyarrow"] = None  # type: ignore[assignment]
     # Everything is imported and used once before the file is looked at: afterwards nothing more can be loaded.
     from app.mapping.readers.reading import place_file
-    from app.mapping.readers.warming import data_folders, warm_up
+    from app.mapping.readers.warm_up import data_folders, warm_up
 
     warm_up(task)
     held = confine([result], data_folders(), layers)

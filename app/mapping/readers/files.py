@@ -2,7 +2,7 @@
 
 from typing import BinaryIO
 
-from app.mapping.readers.endings import ENC, MULTIBEAM, NETCDF, PACKED, S102, TEXT
+from app.mapping.readers.file_extensions import ENC, MULTIBEAM, NETCDF, PACKED, S102, TEXT
 from app.mapping.readers.text import read_text
 from app.mapping.readers.types import MapExtent, Points, Raster
 

@@ -8,7 +8,7 @@ import rasterio
 from rasterio.errors import RasterioError
 
 from app.arrays import FloatArray
-from app.mapping.readers.endings import DRIVERS
+from app.mapping.readers.file_extensions import DRIVERS
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
 

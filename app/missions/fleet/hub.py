@@ -18,7 +18,7 @@ from app.missions.fleet.interface import (
     VehicleRefusedError,
     WaypointOrder,
 )
-from app.missions.spec.mission import VehicleKind
+from app.missions.spec.vehicle import VehicleKind
 from imc_bridge.control.depth_layers import ALONE, DepthLayer
 
 VehicleKey = tuple[VehicleKind, str]

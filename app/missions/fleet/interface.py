@@ -14,7 +14,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from imc_bridge.control.depth_layers import ALONE, DepthLayer
 from simulator.obstacles.obstacles import ObstacleWorld
 

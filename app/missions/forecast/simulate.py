@@ -19,7 +19,8 @@ from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm, planner_of, poses_apart
 from app.missions.forecast.swath_flight import sweep_over, sweeps
 from app.missions.maps.builder import MapBuilder
-from app.missions.spec.mission import MissionSpec, Sensor
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import Sensor
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
 

@@ -9,12 +9,14 @@ from app.mapping.water.tides import parse_tid
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flown import Flown
-from app.missions.live.journals.journal import Counts
-from app.missions.live.mission import RISES, LiveMission, StoredMission, builder_of
+from app.missions.live.header import StoredMission
+from app.missions.live.journals.journal import RISES, Counts
+from app.missions.live.mission import LiveMission, builder_of
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import ENDED
 from app.missions.targets.filters import warm_up as tracking_warm_up
 from app.missions.team import Withdrawal

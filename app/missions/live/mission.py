@@ -1,16 +1,14 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
-import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
-import structlog
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
@@ -18,25 +16,10 @@ from app.compute.compute import Compute
 from app.estimation import Sensor, SingleBeam
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
-from app.mapping.water.tides import TideTable
-from app.missions.alarm_kinds import AlarmKind
-from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import (
-    FleetEvent,
-    LinkReport,
-    LinkState,
-    PingReport,
-    RangeReport,
-    RestartReport,
-    ScanReport,
-    SoundingReport,
-    VehicleReport,
-    WaypointReport,
-    WaypointStatus,
-)
-from app.missions.flown import Phase
+from app.missions.fleet.interface import FleetEvent
 from app.missions.live.boundaries import Boundaries
+from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
 from app.missions.live.journals.range_journal import RangeJournal
 from app.missions.live.journals.swath_intake import SwathIntake
@@ -44,9 +27,10 @@ from app.missions.live.remaining import remaining
 from app.missions.live.ships import ShipsAbout
 from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.trails import Trails
+from app.missions.live.vehicle_reports import VehicleReports
 from app.missions.live.watchers.broadcast import Broadcaster
 from app.missions.live.watchers.feed import LiveFeed
-from app.missions.live.watchers.vehicles import VehicleViews, local_place
+from app.missions.live.watchers.vehicles import VehicleViews
 from app.missions.live.watchers.waypoints import WaypointViews
 from app.missions.maps.builder import HEAVY, BuiltMap, MapBuilder
 from app.missions.maps.live_grid import map_of
@@ -59,95 +43,28 @@ from app.missions.recovery.failsafes import STRENGTH
 from app.missions.search.progress import progress_of
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
-from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
 from app.missions.spec.failsafes import Response
-from app.missions.spec.mission import MissionSpec, VehicleSpec
-from app.missions.spec.mission import Sensor as SensorName
-from app.missions.states import AT_SEA, ENDED, MissionState
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import Sensor as SensorName
+from app.missions.spec.vehicle import VehicleSpec
+from app.missions.states import ENDED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
 from app.missions.team import Member, Swath, Team, Withdrawal
 from app.missions.views.messages import StateMessage
-from app.missions.views.mission import Level, MissionSummary, Progress
+from app.missions.views.mission import MissionSummary, Progress
 from app.missions.views.search import SearchProgress
 from app.missions.views.targets import TargetView
 from app.storage.concurrency.single_flight import Shared
 from app.storage.database import Database
-from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
 from app.storage.queries import events as event_queries
 from app.storage.queries import soundings as sounding_queries
 
-LONGEST_GAP_S = 60.0
-"""What a vehicle flew in a longer silence is not known."""
-FASTEST_MPS = 10.0
-"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
-
-SURFACE_M = 0.7
-"""Who is not deeper can receive satellites."""
-
-LONGEST_SILENCE_S = 6 * 3600.0
-"""A vehicle was under way, and used energy, in a silence that was not longer."""
-
-PACE_MEMORY = 0.9
-"""Weight of the past in the running mean of a leg's duration."""
-
-RISES = "rises"
-"""Marks events that tell of a vehicle sent up for a fix."""
-
-log = structlog.get_logger(__name__)
-
 Made = TypeVar("Made")
 Part = TypeVar("Part")
-
-
-@dataclass
-class MissionHeader:
-    """A mission's state as last committed."""
-
-    state: MissionState
-    reason: str
-    created_at: Any
-    updated_at: Any
-    elapsed_s: float
-    step: int = 0
-    objective: float | None = None
-    terms: dict[str, float] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """What a mission becomes once all its vehicles are home, and by whose word."""
-
-    state: MissionState
-    reason: str
-    actor: str
-
-    def remember(self) -> dict[str, str]:
-        """Return what is stored."""
-        return {"state": self.state, "reason": self.reason, "actor": self.actor}
-
-    @classmethod
-    def recall(cls, stored: dict[str, Any] | None) -> "Ending | None":
-        """Return what was stored."""
-        return None if not stored else cls(MissionState(stored["state"]), stored["reason"], stored["actor"])
-
-
-@dataclass(frozen=True)
-class StoredMission:
-    """What the database has of a mission, read and checked before it is taken into memory."""
-
-    row: MissionRow
-    spec: MissionSpec
-    """What is in its row, checked."""
-    counts: Counts
-    """Of its soundings."""
-    tide_table: TideTable | None = None
-    """Measured water levels; None: there are none."""
-    adjustment: TrackAdjustment | None = None
-    """How far tracks are moved; None: they stay as they were reported."""
 
 
 class LiveMission:
@@ -222,8 +139,6 @@ class LiveMission:
         """Set while vehicles are being stopped: the flight must not send them off again as it ends."""
         self.standstill = ""
         """Why no vehicle may be sent anywhere now; empty while at least one may."""
-        self._leg_s: float | None = None
-        """How long a leg takes, running mean on the wall clock."""
         self.running_since_s: float | None = None
         self.database = database
         """What is written through it is refused once another process has the mission."""
@@ -231,6 +146,17 @@ class LiveMission:
         self.boundaries = Boundaries(self.area, [spec.to_local(zone) for zone in spec.keep_out])
         self.vehicles = VehicleViews(row.id, spec, self.frame, hub, self.team, self.boundaries.breach, time_scale)
         targets = self.target_views if spec.targets else None
+        self.reports = VehicleReports(
+            row.id,
+            self.frame,
+            self.team,
+            self.header,
+            self.journal,
+            self.ranges,
+            self.boundaries,
+            self.waypoints,
+            self.changed,
+        )
         self.measured_late: Callable[[], None] = _nothing
         """Called when what was measured changes after the mission has ended."""
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
@@ -337,95 +263,13 @@ class LiveMission:
         self.header.terms = terms
         self.journal.step = number
 
-    def receive(self, event: FleetEvent) -> None:
-        """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
-        member = self.team.get(event.vehicle)
-        if member is None:
-            return
-        match event:
-            case VehicleReport():
-                place = local_place(self.frame, event.position)
-                if place is None:
-                    log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
-                    return
-                self._count_way(member, event, place)
-                self._count_energy(member, event)
-                member.report, member.heard_s = event, now().timestamp()
-                self.journal.position(event)
-                self._hold_against_boundaries(event, place)
-                if self.spec.targets:
-                    self.ranges.times.heard(event.vehicle, event.time_s)
-            case SoundingReport():
-                self.journal.sounding(event)
-                return
-            case PingReport():
-                self.journal.ping(event)
-                return
-            case ScanReport():
-                self.journal.scan(event)
-                return
-            case RangeReport():
-                self.ranges.note(event, member.report.time_s if member.report else None)
-                return
-            case LinkReport():
-                member.link = event.state
-                if event.state in (LinkState.HEARD, LinkState.READY):
-                    # It can be reached but follows nothing of ours (any more): the loop engages it again.
-                    member.engaged = False
-            case RestartReport():
-                words = f"{event.vehicle}: {event.reason}"
-                line = self.journal.alarm_line(AlarmKind.VEHICLE_RESTARTED, words, vehicle=event.vehicle)
-                self.journal.note_line(line)
-            case WaypointReport():
-                self._receive_waypoint(member, event)
-        self.changed.set()
-
-    def _count_way(self, member: Member, report: VehicleReport, place: tuple[float, float]) -> None:
-        """Add what a vehicle has flown since its last report, if that can have been."""
-        flown = member.flown
-        before = None if member.report is None else local_place(self.frame, member.report.position)
-        if not self.running or member.report is None or before is None:
-            return
-        passed_s = report.time_s - member.report.time_s
-        if not 0.0 < passed_s <= LONGEST_GAP_S or math.dist(before, place) > FASTEST_MPS * passed_s:
-            return
-        leg = None
-        if member.ordered and member.leg_start_m is not None and member.target_m is not None:
-            leg = place_of(member.leg_start_m), place_of(member.target_m)
-        flown.add_way(before, place, leg)
-        way_left_m = member.way_left_m(self.spec)
-        flown.left_m = way_left_m + member.way_ahead_m(self.frame)
-        if not member.ordered and member.legs and way_left_m > 0.0:
-            flown.idle_s += passed_s
-        flown.phase = self._phase(member, way_left_m)
-
-    def _count_energy(self, member: Member, report: VehicleReport) -> None:
-        """Count what a vehicle has used since its last report."""
-        energy, before = member.energy, member.report
-        energy.take_level(report.battery_pct, report.battery_confidence_pct, report.energy_left_s)
-        if self.header.state not in AT_SEA:
-            energy.begin()
-            return
-        passed_s = 0.0 if before is None else report.time_s - before.time_s
-        if 0.0 < passed_s <= LONGEST_SILENCE_S:
-            energy.pass_time(passed_s, report.speed_mps)
-            self._count_submersion(member, report.position.depth_m, passed_s)
-        member.flown.used_s = energy.used_s
-
-    def _count_submersion(self, member: Member, depth_m: float, passed_s: float) -> None:
-        """Count how long a vehicle has been under water, or up again; what counts as a fix the policy says."""
-        policy = self.spec.surface_policy
-        if depth_m > SURFACE_M:
-            member.surfaced_s = 0.0
-            member.submerged_s += passed_s
-            return
-        member.surfaced_s += passed_s
-        if policy is None or member.surfaced_s >= policy.stay_s:
-            member.submerged_s = 0.0
-
     def _energy_of(self, vehicle: VehicleSpec) -> Energy:
         endurance_s = None if vehicle.endurance_min is None else 60.0 * vehicle.endurance_min
         return Energy(self.spec.speed_of(vehicle), endurance_s)
+
+    def receive(self, event: FleetEvent) -> None:
+        """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
+        self.reports.take(event, self.spec, running=self.running)
 
     def withdraw(self, member: Member, response: Response, why: str, *, asked: bool = False) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.
@@ -448,50 +292,6 @@ class LiveMission:
         for member in self.team:
             home = self.spec.recovery_of(member.spec)
             self.withdraw(member, Response.STOP if home is None else Response.RETURN, why)
-
-    def _phase(self, member: Member, way_left_m: float) -> Phase:
-        if member.withdrawal is not None:
-            return phase_of(member.withdrawal)
-        if member.surfacing:
-            return Phase.SURFACING
-        if member.legs == 0 or self.boundaries.breach(member.name):
-            return Phase.TRANSIT
-        return Phase.SURVEY if member.ordered or member.ahead or way_left_m > 0.0 else Phase.STOPPED
-
-    def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
-        if self.header.state in ENDED:
-            return
-        member = self.team.get(report.vehicle)
-        on_its_way_home = member is not None and member.withdrawal is not None
-        for crossing in self.boundaries.judge(
-            report.vehicle,
-            place,
-            report.position.depth_m,
-            asyncio.get_running_loop().time(),
-            may_leave=on_its_way_home,
-        ):
-            journal, words, data = self.journal, crossing.message, crossing.data
-            if crossing.begins:
-                journal.note_line(journal.alarm_line(crossing.alarm, words, **data))
-            elif crossing.ends:
-                journal.note_line(journal.end_line([crossing.alarm], words, **data))
-            else:
-                journal.note_line(journal.line(Level.INFO, "boundary", words, **data))
-
-    def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
-        if event.mission_id != self.id or member.order is None or event.step != member.order.step:
-            return
-        member.status = event.status
-        member.reason = event.reason
-        if event.status is WaypointStatus.REACHED:
-            member.misses = 0
-            took_s = asyncio.get_running_loop().time() - member.leg_began_s
-            before_s = took_s if self._leg_s is None else self._leg_s
-            self._leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
-        elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
-            member.misses += 1
-        self.journal.waypoint(event)
-        self.waypoints.take(event)
 
     async def build_map(self) -> BuiltMap | None:
         """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
@@ -636,12 +436,12 @@ class LiveMission:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
         if self.search is not None:
             return max(self.search.left_s(), 0.0) / self._time_scale
-        if self._leg_s is None:
+        if self.reports.leg_s is None:
             return None
         committed = [len(m.ahead) + m.ordered for m in self.team]
         leg_m = self.spec.limits.max_step_m
         left = [m.way_left_m(self.spec) / leg_m for m in self.team.present] or [self.spec.steps - self.header.step]
-        return (max(left) + max(committed, default=0)) * self._leg_s
+        return (max(left) + max(committed, default=0)) * self.reports.leg_s
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""
@@ -694,18 +494,6 @@ class LiveMission:
 
 def _nothing() -> None:
     return None
-
-
-def phase_of(withdrawal: Withdrawal) -> Phase:
-    """Return what a vehicle is at that does not survey any more."""
-    if withdrawal.response is Response.RETURN:
-        return Phase.HOME if withdrawal.over else Phase.RETURNING
-    return Phase.STOPPED if withdrawal.over or withdrawal.response is Response.HOLD else Phase.SURFACING
-
-
-def place_of(place_m: FloatArray) -> tuple[float, float]:
-    """Return an array (2,) as a pair."""
-    return float(place_m[0]), float(place_m[1])
 
 
 def builder_of(spec: MissionSpec) -> MapBuilder:

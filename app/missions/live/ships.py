@@ -12,7 +12,7 @@ from app.missions.clock import now
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member, Team
 from app.missions.traffic.approach import PlannedWay, closest_approach, planned_way
-from app.missions.traffic.roster import Ship
+from app.missions.traffic.ship_list import Ship
 from app.missions.traffic.watch import Traffic
 from app.missions.views.traffic import ApproachView, ShipView, TrafficMessage, own_ship_view, ship_view
 

@@ -13,7 +13,7 @@ from app.missions.live.journals.journal import Journal
 from app.missions.maps.builder import BuiltMap, MapBuilder
 from app.missions.maps.codec import pack, unpack
 from app.missions.maps.queue import Replacement
-from app.missions.maps.table import SoundingTable
+from app.missions.maps.sounding_table import SoundingTable
 from app.storage.bulk import read_numbers
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database

@@ -23,8 +23,8 @@ from app.mapping.swath.gridded import is_of_swaths, without_guesses
 from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
 from app.missions.maps.live_grid import LiveGrid
 from app.missions.maps.queue import MapQueue, Replacement
+from app.missions.maps.sounding_table import SoundingTable
 from app.missions.maps.swath_grid import SwathGrid
-from app.missions.maps.table import SoundingTable
 
 MAX_LANDMARKS = 4000
 """More landmarks make planning slower, not better: neighbouring cells are almost the same question."""

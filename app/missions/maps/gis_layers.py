@@ -14,7 +14,7 @@ from app.mapping.products.pictures.tile_pictures import Pixels, coarser, coarser
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.types import Grid
 from app.missions.maps.snapshot import MapSnapshot
-from app.missions.spec.mission import Limits
+from app.missions.spec.limits import Limits
 
 Range = tuple[float, float]
 """Values of the first and of the last colour."""

@@ -20,7 +20,7 @@ from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
 from app.missions.pings.store import BEAMS_PER_ITEM, JudgedBatch
 from app.missions.soundings.measurement import Measurement
-from app.missions.spec.mission import Sensor
+from app.missions.spec.vehicle import Sensor
 from app.missions.states import MissionState
 from app.missions.targets.filters import Arrived
 from app.missions.views.measurements.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict

@@ -43,8 +43,8 @@ from app.missions.operations.maps.mission_maps import newest_map, surveyed, trac
 from app.missions.operations.maps.sounding_files import all_lines
 from app.missions.operations.pings import pings_of
 from app.missions.report.answers import Answers, Incident
+from app.missions.report.contents import document_of
 from app.missions.report.kinds import ReportKind
-from app.missions.report.sections import document_of
 from app.missions.report.texts import Language, Texts
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.mission_views import mission_view

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from app.missions.live.mission import LiveMission
 from app.missions.states import ENDED
-from app.missions.traffic.roster import Ship
+from app.missions.traffic.ship_list import Ship
 from app.missions.traffic.watch import Traffic
 from app.missions.views.traffic import ApproachView, TrafficView, own_ship_view, ship_view, source_views
 
@@ -30,8 +30,8 @@ def traffic_view(traffic: Traffic, missions: Iterable[LiveMission]) -> TrafficVi
         sources=source_views(traffic),
         malformed=traffic.malformed,
         dropped=traffic.dropped,
-        turned_away=traffic.roster.turned_away,
-        jumps=traffic.roster.jumps,
+        turned_away=traffic.ship_list.turned_away,
+        jumps=traffic.ship_list.jumps,
     )
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.spec.mission import MissionSpec, VehicleKind, VehicleSpec
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.recovery import Recovery
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 from imc_bridge.control.depth_layers import DepthLayer
 from imc_bridge.control.plans import HOME_RADIUS_M
 

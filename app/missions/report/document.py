@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+PNG, SVG = "image/png", "image/svg+xml"
+
 
 @dataclass(frozen=True)
 class Shown:

@@ -11,7 +11,7 @@ from typing import Any
 
 import orjson
 
-from app.missions.report.document import Document, Figure, as_json
+from app.missions.report.document import SVG, Document, Figure, as_json
 
 PAGE_WIDTH_CM, MOST_HEIGHT_CM = 17.0, 15.5
 """Of the page's text, and of a figure in it."""
@@ -61,7 +61,7 @@ def _typeset(sources: dict[str, bytes], timestamp: int) -> bytes:
 
 def _drawing(figure: Figure) -> bytes:
     """Return a figure as SVG: files in memory have to be text."""
-    if figure.media_type == "image/svg+xml":
+    if figure.media_type == SVG:
         return figure.content
     from PIL import Image
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
 from app.missions.errors import InvalidRequestError
-from app.missions.spec.mission import MissionKind, MissionSpec, Sensor, VehicleKind, VehicleSpec
+from app.missions.spec.mission import MissionKind, MissionSpec
+from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
 
 
 def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:

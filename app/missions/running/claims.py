@@ -10,7 +10,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Deployment, LinkState, VehicleRefusedError
 from app.missions.live.mission import LiveMission
 from app.missions.search.site import simulated_world
-from app.missions.spec.mission import VehicleSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import AT_SEA
 from app.storage.database import Guard
 from app.storage.processes import processes

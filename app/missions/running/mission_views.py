@@ -11,7 +11,7 @@ from app.missions.fleet.interface import StopReceipt, VehicleInfo
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.broadcast import Subscription
 from app.missions.running.supervisor import receipt
-from app.missions.spec.mission import VehicleKind
+from app.missions.spec.vehicle import VehicleKind
 from app.missions.views.messages import LiveMessage, SnapshotMessage
 from app.missions.views.mission import ActionView, MissionView, PlannerView, StopView, VehicleView
 from app.storage.queries import events as event_queries

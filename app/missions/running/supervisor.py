@@ -15,8 +15,9 @@ from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
 from app.missions.flight.runner import Runner
+from app.missions.live.header import Ending
 from app.missions.live.journals.journal import ENDS, add_lines
-from app.missions.live.mission import Ending, LiveMission
+from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.final_maps import FinalMaps
 from app.missions.states import ENDED, MissionState

@@ -12,7 +12,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_vehicle
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.supervisor import PATIENCE_S, MissionSupervisor
-from app.missions.spec.mission import VehicleSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level

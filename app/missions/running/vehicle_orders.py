@@ -11,7 +11,7 @@ from app.missions.flight.orders import Flight, OrderBook, free_region, is_free
 from app.missions.live.mission import LiveMission
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import DenserOrder, GoOrder, OrderKind, RepeatOrder
-from app.missions.spec.sonar import SwathSonarSpec
+from app.missions.spec.swath import SwathSonarSpec
 from app.missions.team import Member
 from app.missions.views.orders import OrderView
 

@@ -16,8 +16,9 @@ from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.fleet.interface import Position, SoundingReport
 from app.missions.soundings.adjustment import TrackAdjustment
-from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.systematic_errors import InstrumentErrors, SystematicErrors
+from app.missions.spec.water import SoundSpeed, Tide
 from imc_bridge.printable import printable
 
 NO_LEVEL = "tide: "

@@ -3,14 +3,12 @@
 The REST schema, the command line's help and the dashboard's forms are all made from these models.
 """
 
-import math
 from enum import StrEnum
 from functools import lru_cache
-from itertools import pairwise
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import FailFast, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
@@ -19,39 +17,28 @@ from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
-from app.mapping.water.vertical import LOWEST_ASTRONOMICAL_TIDE, check_depth_datum
-from app.missions.spec.base import Latitude, Longitude, Model, Name, PolygonGeometry, cell_count
+from app.missions.spec.base import Model, PolygonGeometry, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
+from app.missions.spec.limits import Limits
 from app.missions.spec.recovery import Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.site import SiteId
-from app.missions.spec.sonar import SwathSonarSpec
+from app.missions.spec.surface_policy import SurfacePolicy
+from app.missions.spec.swath import CoverageSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
+from app.missions.spec.vehicle import Speed, VehicleSpec
+from app.missions.spec.water import SoundSpeed, Tide
 
-Speed = Annotated[float, Field(gt=0, le=5)]
 MissionId = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$")]
-ProfileDepth = Annotated[float, Field(ge=0, le=12_000)]
-ProfileSpeed = Annotated[float, Field(ge=1300, le=1700)]
-
 FARTHEST_HOME_M = 10_000.0
 """Farther from the area no recovery point lies."""
 
 MAX_GRID_CELLS = 4_000_000
 MAX_SEARCH_CELLS = 1_000_000
 """Of a search, which plans on every cell at every step."""
-
-NO_TIDE = "none applied"
-
-
-class Sensor(StrEnum):
-    """How a vehicle sounds the bottom."""
-
-    SINGLE_BEAM = "single_beam"
-    DVL = "dvl"
-    MULTIBEAM = "multibeam"
 
 
 class MissionKind(StrEnum):
@@ -63,301 +50,11 @@ class MissionKind(StrEnum):
     """To look for something in a partly known site, and to be back in time."""
 
 
-class VehicleKind(StrEnum):
-    """Which link reaches a vehicle."""
-
-    IMC = "imc"
-    REST = "rest"
-    SIM = "sim"
-    NEPTUS = "neptus"
-    """Commanded by a Neptus console that asks this service where to, through the gateway."""
-
-
-class Guidance(StrEnum):
-    """How a vehicle of kind ``imc`` is led."""
-
-    FOLLOW = "follow"
-    LEGS = "legs"
-    ACOUSTIC = "acoustic"
-
-
-class VehicleSpec(Model):
-    """A vehicle that takes part in a mission."""
-
-    name: Name = Field(description="Its name; for IMC the name it announces", examples=["lauv-xplore-1"])
-    kind: VehicleKind = Field(
-        default=VehicleKind.IMC,
-        description="imc: DUNE over UDP; rest: polls and posts by itself; sim: simulated inside the service; "
-        "neptus: of a session of Neptus' ConvCAO panel, which makes its mission itself",
-    )
-    sensor: Sensor = Sensor.SINGLE_BEAM
-    sonar: SwathSonarSpec | None = Field(
-        default=None, description="With sensor multibeam: what that sonar can do; null: its defaults"
-    )
-    depth_m: float | None = Field(
-        default=None,
-        ge=0,
-        le=6000,
-        description="Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at "
-        "limits.min_depth_m, each further one limits.min_vertical_separation_m deeper",
-    )
-    altitude_m: float | None = Field(
-        default=None,
-        gt=0,
-        le=1000,
-        description="Height above the bottom that it keeps where the bottom is known, down to limits.max_depth_m and "
-        "never less than limits.min_altitude_m; elsewhere it travels at depth_m. null: it keeps its depth",
-    )
-    speed_mps: Speed | None = Field(default=None, description="Speed asked of it; null: the mission's speed_mps")
-    turn_radius_m: float | None = Field(
-        default=None,
-        gt=0,
-        le=200,
-        description="Radius of its turning circle, by which plans pay for turns; null: what it flies in 4 s",
-    )
-    endurance_min: float | None = Field(
-        default=None,
-        gt=0,
-        le=60 * 24 * 365,
-        description="How long its energy lasts at its speed, minutes, from the start of the mission; counts where the "
-        "vehicle tells no battery level. null: not known",
-    )
-    recovery_point: tuple[Longitude, Latitude] | None = Field(
-        default=None,
-        description="Where it is taken out of the water, [longitude, latitude]; null: at the mission's recovery.point",
-    )
-    guidance: Guidance = Field(
-        default=Guidance.FOLLOW,
-        description="How a vehicle of kind imc is led. follow: by references, one a second; legs: by a plan for each "
-        "whole leg, where radio ends at the surface; acoustic: by legs, and by sound while radio is silent",
-    )
-    gateway: Name | None = Field(
-        default=None, description="With guidance acoustic: the name that the node with the modem announces"
-    )
-    start: tuple[Longitude, Latitude] | None = Field(
-        default=None,
-        description="Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area",
-    )
-
-    @model_validator(mode="after")
-    def _has_the_sonar_that_is_described(self) -> Self:
-        if self.sonar is not None and self.sensor is not Sensor.MULTIBEAM:
-            raise ValueError(f"sonar is given but sensor is {self.sensor}: only a multibeam is described by it")
-        return self
-
-    @model_validator(mode="after")
-    def _is_led_as_its_kind_can_be(self) -> Self:
-        if self.guidance is not Guidance.FOLLOW and self.kind is not VehicleKind.IMC:
-            raise ValueError(
-                f"guidance is {self.guidance} but kind is {self.kind}: only vehicles of kind imc have that"
-            )
-        if (self.guidance is Guidance.ACOUSTIC) != (self.gateway is not None):
-            raise ValueError(
-                f"guidance is {self.guidance} and gateway is {self.gateway!r}: "
-                "a gateway is named with guidance acoustic, and only there"
-            )
-        return self
-
-
-class Limits(Model):
-    """What no waypoint may break. Checked before anything is sent to a vehicle."""
-
-    max_step_m: float = Field(default=10.0, gt=0, le=2000, description="Largest distance a vehicle moves in one step")
-    min_depth_m: float = Field(default=2.0, ge=0, le=6000, description="Shallowest depth of travel under water")
-    max_depth_m: float = Field(default=30.0, gt=0, le=6000, description="Deepest depth of travel")
-    min_altitude_m: float = Field(default=1.0, ge=0, le=1000, description="Least clearance above the sea floor")
-    keep_out_margin_m: float = Field(
-        default=10.0,
-        ge=0,
-        le=1000,
-        description="Legs stay this far from keep-out zones: vehicles turn in circles and drift. With less "
-        "than 10 m the circle in which one waits for its next waypoint can reach into a zone",
-    )
-    border_margin_m: float = Field(
-        default=0.0,
-        ge=0,
-        le=1000,
-        description="Waypoints stay this far inside the area: vehicles turn in circles at them and drift",
-    )
-    com_range_m: float | None = Field(
-        default=None, gt=0, description="Every vehicle keeps another one within this range; null: unlimited"
-    )
-    min_separation_m: float = Field(
-        default=5.0,
-        ge=0,
-        le=10_000,
-        description="Least horizontal distance between vehicles at similar depth",
-    )
-    min_vertical_separation_m: float = Field(
-        default=1.0,
-        gt=0,
-        le=1000,
-        description="Difference in depth that makes horizontal separation unnecessary",
-    )
-
-    @model_validator(mode="after")
-    def _depth_band_is_not_empty(self) -> Self:
-        if self.max_depth_m < self.min_depth_m:
-            raise ValueError(
-                f"max_depth_m is {self.max_depth_m} but min_depth_m is {self.min_depth_m}: "
-                "max_depth_m must be at least min_depth_m"
-            )
-        return self
-
-
-class SurfacePolicy(Model):
-    """When a vehicle comes up for a GPS fix: by how well it says that it knows where it is, by the clock, or both."""
-
-    max_position_sd_m: float | None = Field(
-        default=None,
-        gt=0,
-        le=1000,
-        description="Standard deviation of its position (position_sd_m) that a vehicle should not exceed; it comes up "
-        "at 90 % of it. null: never because of it",
-        examples=[3.0],
-    )
-    every_min: float | None = Field(
-        default=None,
-        gt=0,
-        le=60 * 24,
-        description="Minutes after which a vehicle comes up, also one that does not say how well it knows where it is. "
-        "null: never because of the clock",
-    )
-    stay_s: float = Field(
-        default=60.0, gt=0, le=3600, description="How long a vehicle stays up that comes up by the clock"
-    )
-    good_position_sd_m: float | None = Field(
-        default=None,
-        gt=0,
-        le=1000,
-        description="It stays at the surface until its position is known this well; null: a third of the limit",
-    )
-
-    @model_validator(mode="after")
-    def _can_be_reached(self) -> Self:
-        if self.max_position_sd_m is None:
-            if self.every_min is None:
-                raise ValueError("neither max_position_sd_m nor every_min is given: give one of them")
-            if self.good_position_sd_m is not None:
-                raise ValueError("good_position_sd_m is given without max_position_sd_m: it has no meaning")
-            return self
-        if self.until_sd_m >= self.max_position_sd_m:
-            raise ValueError(
-                f"good_position_sd_m is {self.good_position_sd_m} but max_position_sd_m is {self.max_position_sd_m}: "
-                "a good position must be known better than the limit"
-            )
-        return self
-
-    @property
-    def until_sd_m(self) -> float:
-        """What counts as a good position again."""
-        if self.max_position_sd_m is None:
-            return math.inf
-        return self.max_position_sd_m / 3.0 if self.good_position_sd_m is None else self.good_position_sd_m
-
-
 class PlannerSpec(Model):
     """Which planner decides, and its options."""
 
     name: str = Field(default=DEFAULT_PLANNER, description="One of the planners of GET /api/v1/planners")
     options: PlannerOptions = Field(default_factory=PlannerOptions, description="Its settings")
-
-
-class Tide(Model):
-    """Water level correction: depth below the datum = sounded depth - level + datum_offset_m."""
-
-    level_m: float = Field(
-        default=0.0,
-        ge=-20,
-        le=20,
-        description="Water level above the zero of the tide gauge or table (chart datum), metres",
-    )
-    source: str = Field(
-        default=NO_TIDE,
-        max_length=200,
-        description="Where the level comes from, kept with the product",
-    )
-    sd_m: float = Field(
-        default=0.0,
-        ge=0,
-        le=10,
-        description="Standard deviation of the level; it counts in every cell's TVU estimate",
-    )
-    datum_epsg: int = Field(
-        default=LOWEST_ASTRONOMICAL_TIDE,
-        ge=1024,
-        le=999_999,
-        description="EPSG code of the depth datum that products state once a tide is applied, for example 5861 "
-        "(LAT depth) or 5715 (MSL depth)",
-    )
-    datum_offset_m: float = Field(
-        default=0.0,
-        ge=-100,
-        le=100,
-        description="How far that datum lies above the zero that levels count from; added to every depth",
-    )
-
-    @property
-    def is_unnamed(self) -> bool:
-        """Whether nobody said where the level comes from."""
-        return self.source == NO_TIDE
-
-    @property
-    def is_applied(self) -> bool:
-        """Whether a level was stated, be it zero."""
-        return self.level_m != 0.0 or self.datum_offset_m != 0.0 or not self.is_unnamed
-
-    @field_validator("datum_epsg")
-    @classmethod
-    def _is_a_depth_datum(cls, epsg: int) -> int:
-        check_depth_datum(epsg)
-        return epsg
-
-
-class SoundSpeed(Model):
-    """Sound speed correction: every beam is followed through the profile for the time that its sonar measured."""
-
-    assumed_mps: float = Field(default=1500.0, ge=1300, le=1700, description="Speed that is set in the sonars, m/s")
-    profile: Annotated[list[tuple[ProfileDepth, ProfileSpeed]], FailFast()] = Field(
-        min_length=1,
-        max_length=2000,
-        description="Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere",
-        examples=[[[0.0, 1512.3], [5.0, 1509.8], [20.0, 1506.1]]],
-    )
-    source: str = Field(default="", max_length=200, description="Where the profile comes from, kept with the product")
-
-    @field_validator("profile")
-    @classmethod
-    def _depths_ascend(cls, profile: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        for index, (above, below) in enumerate(pairwise(depth for depth, _ in profile)):
-            if below <= above:
-                raise ValueError(f"entry {index + 1} is at {below:g} m, not below the {above:g} m of the one before it")
-        return profile
-
-
-class CoverageSpec(Model):
-    """What full coverage by swath sonars is asked for, where the planner is `swath`."""
-
-    overlap_pct: float = Field(
-        default=6.0,
-        ge=0,
-        le=80,
-        description="Share of half a swath that the next one sounds again, at least; more where position is uncertain",
-    )
-    crosslines_pct: float = Field(
-        default=5.0,
-        ge=0,
-        le=50,
-        description="Length of lines across all others, flown last, as a share of those; by what both measured where "
-        "they cross a survey is judged. 0: none",
-    )
-    cell_of_depth: float | None = Field(
-        default=None,
-        gt=0,
-        le=1,
-        description="Cells by depth, in files with cells of several sizes: each depth has the smallest of cell_m, "
-        "twice and four times as much, and so on, that is at least this share of it, for example 0.05. null: one size",
-    )
 
 
 class MissionSpec(Model):

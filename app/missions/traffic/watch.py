@@ -11,8 +11,8 @@ import structlog
 from app.missions.clock import now
 from app.missions.settings import AisSettings
 from app.missions.traffic.own_ship import OwnShip
-from app.missions.traffic.roster import NEAR_M, Roster, Ship, distance_m
 from app.missions.traffic.sentences import SentenceError, SentenceReader, ShipPosition
+from app.missions.traffic.ship_list import NEAR_M, Ship, ShipList, distance_m
 from app.missions.traffic.sources import FileSource, Source, TcpSource, UdpSource
 
 TICK_S, MOST_PER_TICK = 0.05, 50
@@ -55,7 +55,7 @@ class Traffic:
 
     def __init__(self, settings: AisSettings, places: Callable[[], Sequence[tuple[float, float]]] = tuple) -> None:
         self.settings = settings
-        self.roster = Roster(settings.max_age_s)
+        self.ship_list = ShipList(settings.max_age_s)
         self.own_ship = OwnShip(settings.max_age_s)
         self.malformed = 0
         self.dropped = 0
@@ -103,7 +103,7 @@ class Traffic:
 
     def ships(self) -> list[Ship]:
         """Return the ships that were heard lately, the nearest to a mission first."""
-        return sorted(self.roster, key=lambda ship: (ship.distance_m, ship.position.mmsi))
+        return sorted(self.ship_list, key=lambda ship: (ship.distance_m, ship.position.mmsi))
 
     def near(self, lat_deg: float, lon_deg: float, within_m: float = NEAR_M) -> list[Ship]:
         """Return the ships within so far of a place."""
@@ -148,8 +148,8 @@ class Traffic:
                 self._take_some()
                 if self.now_s - looked_s >= FORGET_S:
                     looked_s = self.now_s
-                    self.roster.forget_silent(looked_s)
-                    self.roster.watch_over(self._places())
+                    self.ship_list.forget_silent(looked_s)
+                    self.ship_list.watch_over(self._places())
             except Exception:
                 log.exception("ships could not be told apart")
 
@@ -167,8 +167,8 @@ class Traffic:
             source.heard_s = self.now_s
             for one in told:
                 if isinstance(one, ShipPosition):
-                    self.roster.place(one, self.now_s)
+                    self.ship_list.place(one, self.now_s)
                     if one.own:
                         self.own_ship.place(one, source.name, self.now_s)
                 else:
-                    self.roster.describe(one)
+                    self.ship_list.describe(one)

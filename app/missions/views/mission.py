@@ -11,7 +11,8 @@ from app.missions.flown import Flown, Phase, efficiency_pct
 from app.missions.spec.base import Latitude, Longitude
 from app.missions.spec.budget import Budget
 from app.missions.spec.failsafes import Failsafe, Response
-from app.missions.spec.mission import MissionSpec, Sensor, VehicleKind
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import Sensor, VehicleKind
 from app.missions.states import Action, MissionState, allowed_actions
 from app.missions.views.base import View
 from app.missions.views.orders import OrderView

@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from app.missions.traffic.own_ship import OLD_S
-from app.missions.traffic.roster import Ship
+from app.missions.traffic.ship_list import Ship
 from app.missions.traffic.watch import SILENCE_S, Traffic
 from app.missions.views.base import View
 from imc_bridge.doctor.diagnosis import Severity
@@ -171,7 +171,7 @@ def traffic_findings(traffic: Traffic) -> list[TrafficFinding]:
             remedy = "Check the receiver, its aerial and where it sends sentences to; in empty waters it may be so"
             found.append(TrafficFinding(severity=Severity.NOTE, text=text, remedy=remedy))
         else:
-            text = f"AIS from {source.name}: {source.sentences} sentences, {len(traffic.roster)} ships"
+            text = f"AIS from {source.name}: {source.sentences} sentences, {len(traffic.ship_list)} ships"
             found.append(TrafficFinding(severity=Severity.OK, text=text))
     if traffic.malformed > sum(source.sentences for source in traffic.states()):
         text = f"{traffic.malformed} sentences of AIS could not be read"

@@ -7,7 +7,8 @@ from enum import Enum
 
 import imcpy
 
-from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
+from simulator.dune.maneuvers.ending import EndingManeuver, speed_mps
+from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S
 from simulator.geodesy import LocalFrame
 from simulator.vehicles.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
@@ -26,25 +27,14 @@ class _Phase(Enum):
     DONE = "done"
 
 
-class ElevatorManeuver:
-    """One execution of the maneuver.
-
-    Parameters
-    ----------
-    spec
-        Its IMC specification.
-    vehicle, frame
-        Whom it steers, and where the vehicle's local frame lies.
-    now_s
-        The vehicle's clock at the start.
-    """
+class ElevatorManeuver(EndingManeuver):
+    """One execution of Elevator, made of what :class:`EndingManeuver` names."""
 
     def __init__(self, spec: imcpy.Elevator, vehicle: SimulatedVehicle, frame: LocalFrame, now_s: float) -> None:
         self._vehicle = vehicle
         self._end_m = float(spec.end_z)
         self._radius_m = max(float(spec.radius), LEAST_RADIUS_M)
-        in_metres = int(spec.speed_units) == int(imcpy.SpeedUnits.METERS_PS)
-        self._speed_mps = float(spec.speed) if in_metres else DEFAULT_SPEED_MPS
+        self._speed_mps = speed_mps(spec)
         self._progress_s = now_s
         here = vehicle.position
         # Down it goes anticlockwise, up clockwise.

@@ -6,24 +6,15 @@ import math
 
 import imcpy
 
-from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
+from simulator.dune.maneuvers.ending import EndingManeuver, speed_mps
+from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S
 from simulator.geodesy import LocalFrame
 from simulator.vehicles.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
 
 
-class GotoManeuver:
-    """One execution of the maneuver.
-
-    Parameters
-    ----------
-    spec
-        Its IMC specification.
-    vehicle, frame
-        Whom it steers, and where the vehicle's local frame lies.
-    now_s
-        The vehicle's clock at the start.
-    """
+class GotoManeuver(EndingManeuver):
+    """One execution of Goto, made of what :class:`EndingManeuver` names."""
 
     def __init__(self, spec: imcpy.Goto, vehicle: SimulatedVehicle, frame: LocalFrame, now_s: float) -> None:
         self._vehicle = vehicle
@@ -31,8 +22,7 @@ class GotoManeuver:
         self._started_s = now_s
         self._east_m, self._north_m = frame.to_local(math.degrees(spec.lat), math.degrees(spec.lon))
         by_altitude = int(spec.z_units) == int(imcpy.ZUnits.ALTITUDE)
-        in_metres = int(spec.speed_units) == int(imcpy.SpeedUnits.METERS_PS)
-        speed = float(spec.speed) if in_metres else DEFAULT_SPEED_MPS
+        speed = speed_mps(spec)
         vehicle.vehicle.goto(SteeringTarget(self._east_m, self._north_m, float(spec.z), speed, by_altitude))
 
     def failure(self, now_s: float) -> tuple[str, bool] | None:

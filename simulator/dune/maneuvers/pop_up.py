@@ -8,7 +8,8 @@ from enum import Enum
 import imcpy
 
 from simulator.dune.maneuvers.elevator import ElevatorManeuver
-from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
+from simulator.dune.maneuvers.ending import EndingManeuver, speed_mps
+from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S
 from simulator.dune.maneuvers.station_keeping import StationKeepingManeuver
 from simulator.geodesy import LocalFrame
 from simulator.vehicles.navigation import SURFACE_DEPTH_M
@@ -29,18 +30,8 @@ class _Phase(Enum):
     DONE = "done"
 
 
-class PopUpManeuver:
-    """One execution of the maneuver.
-
-    Parameters
-    ----------
-    spec
-        Its IMC specification.
-    vehicle, frame
-        Whom it steers, and where the vehicle's local frame lies.
-    now_s
-        The vehicle's clock at the start.
-    """
+class PopUpManeuver(EndingManeuver):
+    """One execution of Pop Up, made of what :class:`EndingManeuver` names."""
 
     def __init__(self, spec: imcpy.PopUp, vehicle: SimulatedVehicle, frame: LocalFrame, now_s: float) -> None:
         self._spec = spec
@@ -49,8 +40,7 @@ class PopUpManeuver:
         bits = imcpy.PopUp.FlagsBits
         flags = int(spec.flags)
         self._waits = bool(flags & (int(bits.WAIT_AT_SURFACE) | int(bits.STATION_KEEP)))
-        in_metres = int(spec.speed_units) == int(imcpy.SpeedUnits.METERS_PS)
-        self._speed_mps = float(spec.speed) if in_metres else DEFAULT_SPEED_MPS
+        self._speed_mps = speed_mps(spec)
         self._part: ElevatorManeuver | StationKeepingManeuver | None = None
         self._until_s = math.inf
         self._place = frame.to_local(math.degrees(spec.lat), math.degrees(spec.lon))

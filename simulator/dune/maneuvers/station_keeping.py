@@ -6,7 +6,8 @@ import math
 
 import imcpy
 
-from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S, DEFAULT_SPEED_MPS
+from simulator.dune.maneuvers.ending import EndingManeuver, speed_mps
+from simulator.dune.maneuvers.follow_reference import ARRIVAL_TIME_S
 from simulator.geodesy import LocalFrame
 from simulator.vehicles.vehicle import SteeringTarget
 from simulator.world import SimulatedVehicle
@@ -16,17 +17,10 @@ AT_SURFACE_WITHIN = 2.5
 """A vehicle that drifted no farther than this many radii comes back at the surface."""
 
 
-class StationKeepingManeuver:
-    """One execution of the maneuver. A vehicle within the circle floats up, whatever depth was asked for.
+class StationKeepingManeuver(EndingManeuver):
+    """One execution of Station Keeping, made of what :class:`EndingManeuver` names.
 
-    Parameters
-    ----------
-    spec
-        Its IMC specification.
-    vehicle, frame
-        Whom it steers, and where the vehicle's local frame lies.
-    now_s
-        The vehicle's clock at the start.
+    A vehicle within the circle floats up, whatever depth was asked for.
     """
 
     def __init__(self, spec: imcpy.StationKeeping, vehicle: SimulatedVehicle, frame: LocalFrame, now_s: float) -> None:
@@ -34,8 +28,7 @@ class StationKeepingManeuver:
         self._place = frame.to_local(math.degrees(spec.lat), math.degrees(spec.lon))
         self._depth_m = float(spec.z)
         self._radius_m = max(float(spec.radius), LEAST_RADIUS_M)
-        in_metres = int(spec.speed_units) == int(imcpy.SpeedUnits.METERS_PS)
-        self._speed_mps = float(spec.speed) if in_metres else DEFAULT_SPEED_MPS
+        self._speed_mps = speed_mps(spec)
         self._duration_s = float(spec.duration)
         self._end_s: float | None = None
         self._inside = self._distance_m() < self._radius_m

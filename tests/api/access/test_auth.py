@@ -17,7 +17,7 @@ from app.api.mission import mission_of
 from app.main import Server, create_app
 from app.settings import Settings, StartupError
 from app.storage.database import Database
-from tests.support.rest import Guarded, make_client, mission_spec, new_mission, running, soundings
+from tests.support.api.rest import Guarded, make_client, mission_spec, new_mission, running, soundings
 
 
 async def test_once_a_token_exists_requests_need_one(guarded: Guarded) -> None:

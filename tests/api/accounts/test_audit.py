@@ -13,7 +13,7 @@ from app.api.accounts import audit_log
 from app.api.accounts.tokens import Role, TokenStore
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 
 @pytest.fixture

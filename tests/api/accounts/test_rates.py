@@ -17,7 +17,7 @@ from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
 from app.storage.upkeep.prepare import prepare_database
-from tests.support.rest import make_client, mission_spec, running
+from tests.support.api.rest import make_client, mission_spec, running
 
 
 def bearer(token: str) -> dict[str, str]:

@@ -9,7 +9,7 @@ from websockets.typing import Origin
 
 from app.api.access import auth
 from app.main import Server
-from tests.support.rest import Guarded, mission_spec, new_mission
+from tests.support.api.rest import Guarded, mission_spec, new_mission
 
 
 def own_page(guarded: Guarded) -> dict[str, str]:

@@ -20,7 +20,7 @@ from app.api.http import json_text, problems
 from app.main import Server, create_app
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 NOWHERE = "0197a3c8-6f2e-7c41-9d0f-5b2f6f0c1a2b"
 SIZE = 60_000_000

@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from app.main import Server
-from tests.support.contract import CONTRACT
+from tests.support.api.contract import CONTRACT
 
 
 @pytest.fixture

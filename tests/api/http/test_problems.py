@@ -9,8 +9,8 @@ import pytest
 
 from app.api.http.problems import TITLES, URN
 from app.main import Server
+from tests.support.api.rest import make_client, mission_spec
 from tests.support.missions.specs import AREA
-from tests.support.rest import make_client, mission_spec
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import pytest
 import shapely
 
 from app.settings import Settings
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.missions.specs import FRAME, lon_lat, rectangle
-from tests.support.rest import mission_spec, soundings
 
 SIDE_M, CELL_M, DEPTH_M = 60.0, 2.0, 10.0
 HOLE = shapely.box(10.0, 20.0, 18.0, 26.0)

@@ -17,7 +17,7 @@ from app.missions.maps import file_content
 from app.missions.settings import ProviderSettings
 from app.missions.views.maps.map import MapView
 from app.settings import Settings
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.missions.views.maps.profile import ProfileView
-from tests.support.rest import soundings
+from tests.support.api.rest import soundings
 
 LINE = "-8.70495,41.18503;-8.7041,41.1856"
 

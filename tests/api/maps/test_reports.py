@@ -20,9 +20,9 @@ from app.mapping.quality.crossovers import warm_up
 from app.missions.maps import snapshot
 from app.missions.report.texts import DECIMAL_POINTS, Language
 from app.settings import Settings
+from tests.support.api.rest import mission_spec, running, soundings
+from tests.support.mapping.tracks import flown, lawnmower, pinged
 from tests.support.missions.specs import rectangle
-from tests.support.rest import mission_spec, running, soundings
-from tests.support.tracks import flown, lawnmower, pinged
 from tests.support.waiting import until
 
 START_S = 1_795_225_140.0

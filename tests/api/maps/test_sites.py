@@ -11,8 +11,8 @@ import pytest
 import rasterio
 
 from app.settings import Settings
+from tests.support.api.rest import Guarded, make_client, mission_spec, running
 from tests.support.missions.specs import lon_lat, rectangle
-from tests.support.rest import Guarded, make_client, mission_spec, running
 from tests.support.waiting import until
 
 SIDE_M = 24.0

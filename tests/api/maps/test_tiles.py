@@ -7,8 +7,8 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.support.gis import mosaic, picture_of, tile_of
-from tests.support.rest import mission_spec, soundings
+from tests.support.api.rest import mission_spec, soundings
+from tests.support.mapping.gis import mosaic, picture_of, tile_of
 
 LAYERS = ("depth", "uncertainty", "density", "coverage")
 LAT, LON = 41.18515, -8.70480

@@ -15,7 +15,7 @@ from app.descriptors import allow_descriptors
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.rest import make_client, mission_spec, running
+from tests.support.api.rest import make_client, mission_spec, running
 from tests.support.waiting import until
 
 MOST = 40

@@ -9,7 +9,7 @@ from fastapi.routing import APIRoute
 from app.api.middleware.direct import DirectRoutes, plan_of
 from app.main import Server, create_app
 from app.settings import Settings
-from tests.support.rest import Guarded
+from tests.support.api.rest import Guarded
 
 ITEM = {"vehicle": "v", "time_s": 1.0, "lat_deg": 41.0, "lon_deg": -8.0, "depth_m": 2.0}
 REQUESTS: list[tuple[str, str, dict[str, Any]]] = [

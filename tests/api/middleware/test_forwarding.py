@@ -11,7 +11,7 @@ from app.api.http import spool
 from app.api.http.spool import Spool
 from app.main import Server
 from app.settings import Settings
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 KIB = 1024
 

@@ -21,7 +21,7 @@ from app.settings import Settings
 from app.storage.database import Database
 from app.storage.models import MissionOwnerRow, MissionRow, ProcessRow
 from app.storage.processes.process_lock import ProcessLock
-from tests.support.rest import Tokens, make_client, make_tokens, mission_spec, running, soundings
+from tests.support.api.rest import Tokens, make_client, make_tokens, mission_spec, running, soundings
 
 
 @dataclass(kw_only=True)

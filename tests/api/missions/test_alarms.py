@@ -13,8 +13,8 @@ from app.api.accounts.tokens import Role
 from app.main import Server
 from app.missions.alarm_kinds import AlarmKind
 from app.settings import Settings
-from tests.support.alarms import SECRET, hook, told_by
-from tests.support.rest import Guarded, make_client, running
+from tests.support.api.rest import Guarded, make_client, running
+from tests.support.missions.alarms import SECRET, hook, told_by
 from tests.support.waiting import until
 
 

@@ -7,8 +7,8 @@ import httpx
 import pytest
 
 from app.exploration.pcao.model import default_model
+from tests.support.api.rest import mission_spec, soundings
 from tests.support.missions.searches import search_json
-from tests.support.rest import mission_spec, soundings
 
 
 async def test_a_new_mission_is_found_where_the_answer_says(client: httpx.AsyncClient) -> None:

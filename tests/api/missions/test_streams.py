@@ -18,7 +18,7 @@ from app.missions.views.messages import LiveMessage
 from app.missions.views.mission import Level
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 LIST = {"Accept": "application/json"}
 

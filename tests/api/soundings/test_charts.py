@@ -7,9 +7,9 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support.enc import Cell
+from tests.support.api.rest import mission_spec
+from tests.support.mapping.enc import Cell
 from tests.support.missions.specs import AREA
-from tests.support.rest import mission_spec
 
 WEST, SOUTH = AREA["coordinates"][0][0]
 EAST, NORTH = AREA["coordinates"][0][2]

@@ -13,9 +13,9 @@ import httpx
 import pytest
 
 from app.missions.errors import FileTooLargeError, ImportUnavailableError, InvalidRequestError
-from app.missions.operations.imports import reading, uploads
+from app.missions.operations.imports import reader_process, uploads
+from tests.support.api.rest import make_client, mission_spec, prior_text, running
 from tests.support.faults.leading_out import grids, told
-from tests.support.rest import make_client, mission_spec, prior_text, running
 
 GRID: dict[str, Any] = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
 
@@ -133,7 +133,7 @@ async def test_who_waits_too_long_for_others_files_is_told_to_come_back(
 ) -> None:
     reader = server.config.app.state.edge.service.imports._reader
     path = f"/missions/{mission['id']}/imports"
-    monkeypatch.setattr(reading, "WAITING_TIMEOUT_S", 0.01)
+    monkeypatch.setattr(reader_process, "WAITING_TIMEOUT_S", 0.01)
     async with reader.turn():
         answer = await client.post(path, content=prior_text(), params={"filename": "a.csv"})
         assert (answer.status_code, answer.json()["type"]) == (503, "urn:bathyfleet:problem:import-unavailable")
@@ -165,7 +165,7 @@ async def test_an_upload_that_breaks_off_leaves_nothing(
 def test_the_reading_process_learns_nothing_of_the_service(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BATHYFLEET_DATABASE_URL", "postgresql://a:secret@b/c")
     monkeypatch.setenv("PGPASSWORD", "secret")
-    given = reading._environment()
+    given = reader_process._environment()
     assert "secret" not in " ".join(given.values())
     assert not [name for name in given if name.startswith(("BATHYFLEET", "PG", "HOME", "SSH"))]
 
@@ -178,7 +178,7 @@ def test_what_the_reading_process_hands_back_is_checked(break_: str, tmp_path: P
     with (tmp_path / "result").open("w+b") as file:
         file.write(table.tobytes())
         file.flush()
-        np.testing.assert_array_equal(reading._values(file, shape, None), table.T)
+        np.testing.assert_array_equal(reader_process._values(file, shape, None), table.T)
         if break_ == "short":
             file.truncate(63)
         elif break_ == "long":
@@ -193,7 +193,7 @@ def test_what_the_reading_process_hands_back_is_checked(break_: str, tmp_path: P
             file.seek(0)
             file.write(table.tobytes())
         with pytest.raises(InvalidRequestError, match="broke off"):
-            reading._values(file, shape, None)
+            reader_process._values(file, shape, None)
 
 
 @pytest.mark.parametrize(
@@ -201,4 +201,4 @@ def test_what_the_reading_process_hands_back_is_checked(break_: str, tmp_path: P
     [b"", b"{}", b"[]", b'{"confined": {}, "shape": ["4"]}', b'{"confined": {}, "notes": ["' + b"x" * 501 + b'"]}'],
 )
 def test_an_answer_of_another_form_is_none(said: bytes) -> None:
-    assert reading._answer(said) is None
+    assert reader_process._answer(said) is None

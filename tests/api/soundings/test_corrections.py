@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from app.mapping.coordinates.georeference import LocalFrame
-from tests.support.rest import mission_spec, soundings
+from tests.support.api.rest import mission_spec, soundings
 
 START_S = 1_795_225_140.0
 

@@ -14,10 +14,10 @@ from affine import Affine
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.settings import Settings
+from tests.support.api.rest import make_client, mission_spec, prior_text, running, soundings
 from tests.support.faults.hostile import sparse_tif
+from tests.support.mapping.multibeam import line, write_gsf, write_kmall
 from tests.support.missions.specs import AREA
-from tests.support.multibeam import line, write_gsf, write_kmall
-from tests.support.rest import make_client, mission_spec, prior_text, running, soundings
 
 FRAME = LocalFrame(AREA["coordinates"][0][0][1], AREA["coordinates"][0][0][0])
 

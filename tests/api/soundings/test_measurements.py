@@ -13,7 +13,7 @@ from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
 from app.storage.models import BatchRow
-from tests.support.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 
 
 async def test_every_item_has_its_own_verdict(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

@@ -15,8 +15,8 @@ from app.missions.operations import measurements
 from app.missions.pings import store
 from app.settings import Settings
 from app.storage.ping_files import PingFiles
+from tests.support.api.rest import make_client, mission_spec, running, soundings
 from tests.support.missions.pings import posted_ping
-from tests.support.rest import make_client, mission_spec, running, soundings
 
 VEHICLES = [{"name": "rover", "kind": "rest", "sensor": "multibeam"}, {"name": "plain", "kind": "rest"}]
 

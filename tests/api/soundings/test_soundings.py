@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support.rest import mission_spec, soundings
+from tests.support.api.rest import mission_spec, soundings
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from app.settings import Settings
+from tests.support.api.rest import mission_spec, soundings
+from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, pinged
 from tests.support.missions.specs import rectangle
-from tests.support.rest import mission_spec, soundings
-from tests.support.tracks import DEPTH_M, flown, lawnmower, pinged
 
 START_S = 1_795_225_140.0
 ROVER = [{"name": "rover", "kind": "rest", "sensor": "multibeam"}]

@@ -12,7 +12,7 @@ from app.exploration.core.problem import Situation
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from tests.support.situations import make_situation
+from tests.support.exploration.situations import make_situation
 
 LEFT_M = 700.0
 

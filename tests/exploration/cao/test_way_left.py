@@ -7,7 +7,7 @@ import numpy as np
 from app.estimation import SingleBeam
 from app.exploration.cao.planner import CaoPlanner
 from app.exploration.planner.options import PlannerOptions
-from tests.support.situations import make_belief, make_situation
+from tests.support.exploration.situations import make_belief, make_situation
 
 LEFT_M, MORE_M = 260.0, 200.0
 

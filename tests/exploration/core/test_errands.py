@@ -16,7 +16,7 @@ from app.exploration.core.problem import Belief
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import PLANNERS, create_planner
-from tests.support.situations import SQUARE, make_belief, make_situation
+from tests.support.exploration.situations import SQUARE, make_belief, make_situation
 
 NAMES = ("a", "b", "c")
 START = np.array([[20.0, 20.0, 4.0], [30.0, 20.0, 3.0], [40.0, 20.0, 4.0]])

@@ -33,7 +33,7 @@ from app.exploration.pcao.planner import linked
 from app.exploration.pcao.state import N_FIGURES, N_VECTORS, reduced_state
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from tests.support.situations import SQUARE, make_belief, make_situation
+from tests.support.exploration.situations import SQUARE, make_belief, make_situation
 
 UNIT = 0.1
 

@@ -13,7 +13,7 @@ from app.exploration.pcao.visits import HEIGHT, LOOKS, PATIENCE, no_visits, visi
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from simulator.floors.unseen_floors import unseen_floor
-from tests.support.situations import SQUARE, make_belief, make_situation
+from tests.support.exploration.situations import SQUARE, make_belief, make_situation
 
 UNIT = 0.1
 XY = np.array([[0.5, 0.0], [0.0, 0.9]])

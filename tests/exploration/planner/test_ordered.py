@@ -17,7 +17,7 @@ from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planner.ordered import OrderedPlanner
 from app.exploration.planners import create_planner
-from tests.support.situations import SQUARE, make_belief, make_situation
+from tests.support.exploration.situations import SQUARE, make_belief, make_situation
 
 HOLLOW = np.array([[0, 0], [100, 0], [100, 100], [60, 100], [60, 30], [40, 30], [40, 100], [0, 100]], dtype=float)
 ZONE = np.array([[70.0, 40.0], [85.0, 40.0], [85.0, 60.0], [70.0, 60.0]])

@@ -30,7 +30,7 @@ from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
 from app.exploration.rollout.tour import shortest_order, tour_of
 from app.exploration.rollout.unseen import deeper_than_presumed, look_in_vain
-from tests.support.situations import SQUARE, make_situation
+from tests.support.exploration.situations import SQUARE, make_situation
 
 CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 RULES = Rules(0.05, 0.3, -1.0, 1.0, 0.4, 0.1, cut_corners=True)

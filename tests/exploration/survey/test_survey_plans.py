@@ -20,7 +20,7 @@ from app.exploration.survey.error import MOST_DOUBTS, SECOND_LOOK, with_second_l
 from app.exploration.survey.local_search import DRAWS, PlanSearch, ViaPoints, improve, warm_up
 from app.exploration.survey.value import SurveyObjective, lower_to_route, lower_to_segment, make_nodes, plan_value
 from simulator.floors.seafloors import generate
-from tests.support.situations import make_belief, make_situation
+from tests.support.exploration.situations import make_belief, make_situation
 
 NO_TURNS = Turns(0.0, 0.0)
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imc_bridge.control.altitude_guard import AltitudeGuard, DepthLimit
-from imc_bridge.control.places import distance_m
+from imc_bridge.control.distances import distance_m
 from imc_bridge.control.seabed import CELL_M, Seabed
 from imc_bridge.events import BottomPoint
 

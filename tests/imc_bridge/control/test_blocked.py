@@ -36,14 +36,20 @@ async def test_a_late_vehicle_state_is_nobodys_abort(guidance: Guidance) -> None
         assert (await sea.bridge.stop(name)).acknowledged
 
 
+async def blocked_under_way(sea: Sea) -> str:
+    """Return the vehicle, which flies by references and has its plan control blocked."""
+    [name] = await sea.ready()
+    await sea.bridge.engage(name)
+    sea.bridge.goto(name, sea.waypoint(0, 50.0, 95.0, 1.0))
+    await until(lambda: ACKNOWLEDGED in sea.statuses(name, 0), "it is under way")
+    plan_of(sea).miss_vehicle_state()
+    await until(lambda: plan_state(sea, name) == "blocked", "it is heard of")
+    return name
+
+
 async def test_a_plan_by_references_is_brought_back_while_its_vehicle_goes_on() -> None:
     async with open_sea() as sea:
-        [name] = await sea.ready()
-        await sea.bridge.engage(name)
-        sea.bridge.goto(name, sea.waypoint(0, 50.0, 95.0, 1.0))
-        await until(lambda: ACKNOWLEDGED in sea.statuses(name, 0), "it is under way")
-        plan_of(sea).miss_vehicle_state()
-        await until(lambda: plan_state(sea, name) == "blocked", "it is heard of")
+        name = await blocked_under_way(sea)
         await until(lambda: plan_state(sea, name) == "executing", "its plan is in order again")
         assert REACHED not in sea.statuses(name, 0), "it did not have to end for that"
 
@@ -52,12 +58,7 @@ async def test_a_vehicle_that_takes_no_stop_is_stopped_by_an_abort(monkeypatch: 
     # As if it could not be brought back before the stop.
     monkeypatch.setattr("imc_bridge.control.follow.BLOCKED_S", 1e9)
     async with open_sea() as sea:
-        [name] = await sea.ready()
-        await sea.bridge.engage(name)
-        sea.bridge.goto(name, sea.waypoint(0, 50.0, 95.0, 1.0))
-        await until(lambda: ACKNOWLEDGED in sea.statuses(name, 0), "it is under way")
-        plan_of(sea).miss_vehicle_state()
-        await until(lambda: plan_state(sea, name) == "blocked", "it is heard of")
+        name = await blocked_under_way(sea)
         result = await sea.bridge.stop(name, timeout_s=20.0)
         assert result.acknowledged
         assert plan_of(sea).maneuver is None, "it is not only said to have stopped"

@@ -13,7 +13,8 @@ from imc_bridge.control.follow import Follower
 from imc_bridge.control.legs import LegFollower
 from imc_bridge.events import Waypoint, WaypointStatus
 from imc_bridge.network.discovery import Announcement
-from imc_bridge.nodes.node import Node, OperationMode, PlanState
+from imc_bridge.nodes.modes import OperationMode, PlanState
+from imc_bridge.nodes.node import Node
 from imc_bridge.settings import BridgeSettings
 
 ADDRESS = ("127.0.0.1", 6002)

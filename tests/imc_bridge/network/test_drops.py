@@ -10,7 +10,7 @@ from app.missions.fleet.links.imc import ImcFleetLink
 from imc_bridge import Bridge, BridgeSettings, PacketsDropped, PortInUseError
 from imc_bridge.doctor.doctor import Cause, judge
 from imc_bridge.network.drops import RECENT_WALL_S, DropMeter
-from imc_bridge.network.sieve import LOUD
+from imc_bridge.network.packet_filter import LOUD
 from tests.support.imc.sea import open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until

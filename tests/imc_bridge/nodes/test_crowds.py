@@ -22,7 +22,7 @@ from imc_bridge.network.discovery import Announcement
 from imc_bridge.nodes.capacity import MAX_NODES, MAX_UNANNOUNCED, MAX_UNANNOUNCED_OF_HOST, MAX_UNHEARD_OF_HOST
 from imc_bridge.nodes.newcomers import MAX_NEWCOMERS, MAX_NEWCOMERS_OF_HOST, Newcomers
 from imc_bridge.nodes.refusals import Refused
-from imc_bridge.nodes.roster import Roster
+from imc_bridge.nodes.registry import NodeRegistry
 from simulator.dune import default_specs
 from simulator.floors import seafloors
 from tests.support.imc.sea import open_sea
@@ -314,7 +314,7 @@ def _announcement() -> Announcement:
 
 def test_names_that_nobody_could_read_are_made_readable() -> None:
     now = 0.0
-    roster = Roster(BridgeSettings(loopback_only=True))
+    registry = NodeRegistry(BridgeSettings(loopback_only=True))
     message = imcpy.Announce()
     message.src, message.sys_type = 0x1E, imcpy.SystemType.UUV
     message.sys_name = "lauv\x1b[2J\x9b\n" + "x" * 1000
@@ -322,8 +322,8 @@ def test_names_that_nobody_could_read_are_made_readable() -> None:
     from imc_bridge.network.discovery import read_announce
 
     announcement = read_announce(message)
-    assert roster.find_place(announcement, "127.0.0.1", now)
-    arrival = roster.announced(announcement, "127.0.0.1", now)
+    assert registry.find_place(announcement, "127.0.0.1", now)
+    arrival = registry.announced(announcement, "127.0.0.1", now)
     assert arrival is not None
     assert arrival.node.name.startswith("lauv\\x1b[2J")
     assert len(arrival.node.name) == 64

@@ -13,7 +13,7 @@ from app.arrays import FloatArray
 from app.mapping.quality import crossovers
 from app.mapping.quality.crossovers import AWAY_M, Crossings, crossings
 from app.mapping.quality.tracks import GAP_M, GAP_S, Tracks, cut
-from tests.support.tracks import GMT, flown, gmt_crossings, lawnmower
+from tests.support.mapping.tracks import GMT, flown, gmt_crossings, lawnmower
 
 REFERENCE = Path(__file__).parent / "gmt_crossings.json"
 

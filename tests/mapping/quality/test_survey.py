@@ -12,7 +12,7 @@ from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.quality.tracks import Tracks
 from app.mapping.s44 import Order
-from tests.support.tracks import flown, lawnmower
+from tests.support.mapping.tracks import flown, lawnmower
 
 
 def floor(table: FloatArray, offset_m: float = 0.0) -> FloatArray:

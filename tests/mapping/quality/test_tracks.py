@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from app.mapping.quality.crossovers import crossings
 from app.mapping.quality.tracks import Lines, Tracks, crosslines, cut, dominant_rad
-from tests.support.tracks import flown, lawnmower
+from tests.support.mapping.tracks import flown, lawnmower
 
 
 def lines_of(*corners_m: tuple[float, float], spacing_m: float = 1.0) -> Lines:

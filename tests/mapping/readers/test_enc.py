@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.enc import NO_ZONE_POSITION_M, ZONES_OF_CONFIDENCE, Zone, read_enc, read_zones
 from app.mapping.readers.files import read_file
-from app.mapping.readers.placing import place_soundings
+from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
-from app.mapping.readers.warming import SMALL_CELL, SMALL_CELL_AT
+from app.mapping.readers.warm_up import SMALL_CELL, SMALL_CELL_AT
 from app.mapping.s44 import NORMAL_95
 from app.mapping.types import Grid
-from tests.support.enc import Cell
+from tests.support.mapping.enc import Cell
 
 LAT, LON = 41.18, -8.70
 FRAME = LocalFrame(LAT, LON)

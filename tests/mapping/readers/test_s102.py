@@ -10,7 +10,7 @@ import pytest
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.s102 import SurveyFacts, s102
-from app.mapping.readers.placing import place_soundings
+from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES, read_s102
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import BathymetricMap, Grid

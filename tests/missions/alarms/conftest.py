@@ -5,7 +5,7 @@ import pytest
 
 from app.missions.alarm_settings import AlarmSettings
 from app.storage.database import Database
-from tests.support.alarms import Clock, Watch, end_of_process, open_watch, with_mission
+from tests.support.missions.alarms import Clock, Watch, end_of_process, open_watch, with_mission
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from pydantic import SecretStr
 
 from app.missions.alarm_kinds import alarms_text
 from app.missions.alarm_settings import AlarmSettings
-from app.missions.alarms.ways import signature
-from tests.support.alarms import SECRET
+from app.missions.alarms.channels import signature
+from tests.support.missions.alarms import SECRET
 from tests.support.paths import PROJECT
 
 GUIDE = (PROJECT / "docs" / "alarms.md").read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import func, make_url, select
 
 from app.missions.alarm_kinds import AlarmKind
-from app.missions.alarms import desk
+from app.missions.alarms import dispatcher
 from app.missions.live.journals import db_retry
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import watched
@@ -18,7 +18,7 @@ from app.missions.views.alarms import AlarmState
 from app.missions.views.messages import AlarmMessage, SnapshotMessage
 from app.storage import database as storage
 from app.storage.models import AlarmRow
-from tests.support.alarms import hook, told_by
+from tests.support.missions.alarms import hook, told_by
 from tests.support.missions.harbour import Harbour, Rover, act
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
@@ -122,7 +122,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody waits long for the database."""
     monkeypatch.setattr(storage, "BUSY_TIMEOUT_MS", 20)
     monkeypatch.setattr(db_retry, "RETRY_S", 0.05)
-    monkeypatch.setattr(desk, "UNSTORED_S", 0.0)
+    monkeypatch.setattr(dispatcher, "UNSTORED_S", 0.0)
 
 
 async def test_a_locked_database_keeps_no_alarm_from_the_page_or_from_going_out(

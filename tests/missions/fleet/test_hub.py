@@ -19,7 +19,7 @@ from app.missions.fleet.interface import (
 from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import VehicleKind, VehicleSpec
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 from app.missions.team import Team
 from tests.support.missions.specs import LAT, LON
 

@@ -25,9 +25,10 @@ from app.missions.fleet.interface import (
 )
 from app.missions.fleet.links.imc import ImcFleetLink
 from app.missions.fleet.links.rest import RestFleetLink, horizontal_distance_m
-from app.missions.fleet.links.sim import Launch, SimFleetLink
+from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor
+from app.missions.spec.vehicle import Sensor
 from imc_bridge import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState
@@ -143,7 +144,7 @@ class SimBench(Bench):
         """It went with the link."""
 
     def follows(self) -> bool:
-        return self.link._swimmers[self.name].order is not None  # type: ignore[attr-defined]
+        return self.link._deployed[self.name].order is not None  # type: ignore[attr-defined]
 
 
 class RestBench(Bench):
@@ -357,7 +358,7 @@ async def test_soundings_tell_the_true_depth(make: type[Bench]) -> None:
     async with opened(make()) as bench:
         terrain: Terrain = FLOOR
         if isinstance(bench, SimBench):
-            terrain = bench.link._swimmers[bench.name].terrain  # type: ignore[attr-defined]
+            terrain = bench.link._deployed[bench.name].terrain  # type: ignore[attr-defined]
         await bench.link.engage(bench.name)
         await bench.give(bench.order(1, 50, 30))
         await bench.reached(1)

@@ -10,7 +10,7 @@ from app.missions.fleet.interface import Position, VehicleReport, WaypointOrder,
 from app.missions.live.ships import RELEASE, ShipsAbout
 from app.missions.settings import AisSettings
 from app.missions.spec.failsafes import Response
-from app.missions.spec.mission import VehicleSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import CommittedLeg, Member, Team, Withdrawal
 from app.missions.traffic.sentences import ShipParticulars, ShipPosition
 from app.missions.traffic.watch import Traffic
@@ -40,7 +40,7 @@ class Sea:
     def ship(self, east_m: float, north_m: float, mps: float = 0.0, course_deg: float = 0.0, mmsi: int = MMSI) -> None:
         at = place(east_m, north_m)
         told = ShipPosition(mmsi, False, at.lat_deg, at.lon_deg, mps, course_deg)
-        assert self.traffic.roster.place(told, asyncio.get_running_loop().time())
+        assert self.traffic.ship_list.place(told, asyncio.get_running_loop().time())
 
     def order(self, east_m: float, depth_m: float) -> None:
         self.member.set_order(
@@ -82,7 +82,7 @@ async def test_a_deep_vehicle_is_out_of_ships_way_unless_it_comes_up_or_the_ship
     sea.member.ahead.append(CommittedLeg(2, place(40.0, 0.0, 0.0), np.array([40.0, 0.0])))
     assert len(sea.close()) == 1, "its next leg leads up"
     sea.member.ahead.clear()
-    sea.traffic.roster.describe(ShipParticulars(MMSI, False, draught_m=12.0))
+    sea.traffic.ship_list.describe(ShipParticulars(MMSI, False, draught_m=12.0))
     assert len(sea.close()) == 1, "it draws more than the vehicle is deep"
 
 
@@ -97,7 +97,7 @@ async def test_the_hull_is_nearer_than_the_aerial() -> None:
     sea = Sea(0.0)
     sea.ship(0.0, 150.0)
     assert sea.close() == []
-    sea.traffic.roster.describe(ShipParticulars(MMSI, False, to_bow_m=60.0, to_stern_m=10.0))
+    sea.traffic.ship_list.describe(ShipParticulars(MMSI, False, to_bow_m=60.0, to_stern_m=10.0))
     assert sea.close() == pytest.approx([90.0], abs=0.5)
 
 

@@ -19,7 +19,7 @@ from app.storage.ping_files import PingFiles
 from app.storage.queries import pings as ping_queries
 from tests.support.missions.pings import CLOCK_S, open_store, ping, same, take, times_of
 from tests.support.missions.specs import LAT, LON
-from tests.support.rows import mission
+from tests.support.storage.rows import mission
 from tests.support.waiting import until
 
 CHUNK = 12

@@ -1,7 +1,7 @@
 """Files and reports of large maps are made by a process of their own, and are what they would be here."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from typing import Any
 
 import psutil
@@ -17,23 +17,14 @@ from app.missions.operations.reports import ReportOptions
 from app.missions.operations.work_processes import WorkProcess
 from app.missions.report.kinds import REPORTS
 from app.missions.report.texts import Language
-from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from tests.support.children import new_children
+from tests.support.mapping.tracks import flown, lawnmower, pinged
 from tests.support.missions.harbour import Harbour
 from tests.support.missions.specs import make_spec
-from tests.support.tracks import flown, lawnmower, pinged
 from tests.support.waiting import until
 
 FILES = ("tif", "s102", "geojson", "crossovers.csv")
-
-
-@pytest.fixture
-async def harbour(make_settings: Callable[..., ServiceSettings]) -> AsyncIterator[Harbour]:
-    harbour = Harbour(make_settings)
-    await harbour.open()
-    yield harbour
-    await harbour.close()
 
 
 @pytest.fixture

@@ -17,19 +17,20 @@ from app.missions.errors import MapNotReadyError
 from app.missions.live.mission import LiveMission
 from app.missions.operations.measurements import measure
 from app.missions.operations.reports import ReportOptions
-from app.missions.report import sections
+from app.missions.report import contents
 from app.missions.report.answers import Incident
 from app.missions.report.charts import ticks
 from app.missions.report.kinds import REPORTS
 from app.missions.report.listing import listing
 from app.missions.report.page import html
 from app.missions.report.print import pdf
+from app.missions.report.sections.maps import MOST_HOLIDAYS
 from app.missions.report.texts import Language, Texts
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
+from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.harbour import Harbour, act, sim_spec
 from tests.support.missions.specs import make_spec
-from tests.support.tracks import flown, lawnmower, measured
 from tests.support.waiting import until
 
 JAPANESE = "港湾測量 — порт \u202egnp.exe"
@@ -68,9 +69,9 @@ async def test_what_there_is_no_room_for_is_counted(harbour: Harbour, live: Live
         "2026-11-21T03:39:00+00:00", "alarm", "failsafe", "leak", "surface", "a: it reports: " + "w" * 2000
     )
     many = replace(answers, rest=rest, incidents=[storm] * 400)
-    document = sections.document_of(many, Texts(Language.EN))
+    document = contents.document_of(many, Texts(Language.EN))
     page = html(document).decode()
-    assert page.count('data-of="holidays.features.') == 4 * sections.MOST_HOLIDAYS
+    assert page.count('data-of="holidays.features.') == 4 * MOST_HOLIDAYS
     assert "400 more are in holidays.geojson." in page
     assert "250 more are not listed." in page
     printed = text_of(pdf(document))
@@ -99,7 +100,7 @@ async def test_a_report_is_made_once_for_all_who_ask_and_is_the_same_for_the_sam
     assert len(made) == 1
     assert len({product.content.whole() for product in found}) == 1
     answers = await harbour.service.reports.answers(live)
-    one, other = (pdf(sections.document_of(answers, Texts(Language.EN))) for _ in range(2))
+    one, other = (pdf(contents.document_of(answers, Texts(Language.EN))) for _ in range(2))
     assert one == other
 
 

@@ -15,7 +15,8 @@ from app.missions.operations.history import events_after
 from app.missions.recovery.berths import home_of
 from app.missions.running.homecoming import call_home, hold
 from app.missions.service import MissionService
-from app.missions.spec.mission import MissionSpec, VehicleKind
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleKind
 from app.missions.states import Action, MissionState
 from app.missions.team import Withdrawal
 from app.missions.views.mission import MissionView, VehicleView

@@ -12,9 +12,9 @@ from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.states import MissionState
 from app.missions.views.mission import Level
-from tests.support.databases import Databases, query
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
+from tests.support.storage.databases import Databases, query
 from tests.support.waiting import until
 
 

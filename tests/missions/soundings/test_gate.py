@@ -12,7 +12,7 @@ from shapely.geometry import Point, Polygon
 from app.missions.fleet.interface import Position, SoundingReport
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import JUMP_ALLOWANCE_M, MAX_VEHICLE_SPEED_MPS, Gate
-from app.missions.spec.mission import Tide
+from app.missions.spec.water import Tide
 from tests.support.missions.specs import FRAME, lon_lat
 
 AREA = Polygon([(0, 0), (100, 0), (100, 100), (0, 100)])

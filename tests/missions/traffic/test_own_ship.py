@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from app.missions.traffic.own_ship import OLD_S, OwnShip
 from app.missions.traffic.sentences import SentenceError, ShipPosition
-from tests.support.ais import nmea
+from tests.support.missions.ais import nmea
 
 RMC = "GNRMC,092750.000,A,4111.1000,N,00842.3000,W,4.0,031.66,280511,,,A"
 GGA = "GPGGA,092750.000,4111.1000,N,00842.3000,W,1,8,1.03,61.7,M,55.2,M,,"

@@ -14,7 +14,7 @@ from app.missions.traffic.sentences import (
     ShipParticulars,
     ShipPosition,
 )
-from tests.support.ais import CLASS_A, CLASS_B, RECORDED, STATIC, sentence
+from tests.support.missions.ais import CLASS_A, CLASS_B, RECORDED, STATIC, sentence
 
 
 def read(*lines: bytes) -> list[ShipPosition | ShipParticulars]:

@@ -14,7 +14,7 @@ from app.missions.traffic.sources import Lines, UdpSource
 from app.missions.traffic.watch import MOST_PER_TICK, MOST_WAITING, Traffic
 from app.missions.views.traffic import traffic_findings
 from imc_bridge.doctor.diagnosis import Severity
-from tests.support.ais import CLASS_A, RECORDED, STATIC, named, position
+from tests.support.missions.ais import CLASS_A, RECORDED, STATIC, named, position
 from tests.support.waiting import until
 
 
@@ -45,8 +45,8 @@ async def test_ships_are_heard_by_udp() -> None:
     async with listening(udp_address="127.0.0.1", udp_port=0) as traffic:
         port = await udp_port(traffic)
         send(port, CLASS_A + b"\r\n", b"\r\n".join(RECORDED) + b"\r\n", b"UdPbC\x00" + STATIC[0], STATIC[1], b"rubbish")
-        await until(lambda: traffic.malformed == 1 and len(traffic.roster) >= 5, "all were read")
-        assert traffic.roster.get(367380120) is not None
+        await until(lambda: traffic.malformed == 1 and len(traffic.ship_list) >= 5, "all were read")
+        assert traffic.ship_list.get(367380120) is not None
         [state] = traffic.states()
         assert (state.trouble, state.sentences) == ("", len(RECORDED) + 3)
         assert [found.severity for found in traffic_findings(traffic)] == [Severity.OK]
@@ -59,7 +59,7 @@ async def test_a_flood_is_read_at_a_pace_and_fills_no_memory() -> None:
             traffic._put(position(200_000_000 + number, 41.0, -8.0), source)
         assert traffic.dropped == 2 * MOST_WAITING
         traffic._take_some()
-        assert len(traffic.roster) == MOST_PER_TICK
+        assert len(traffic.ship_list) == MOST_PER_TICK
 
 
 async def test_a_port_that_is_taken_is_said_and_tried_again() -> None:
@@ -94,7 +94,7 @@ async def test_ships_are_heard_from_a_server_that_breaks_off_in_the_middle_of_a_
     async with server, listening(tcp_host="127.0.0.1", tcp_port=server.sockets[0].getsockname()[1]) as traffic:
 
         def is_named() -> bool:
-            ship = traffic.roster.get(211000001)
+            ship = traffic.ship_list.get(211000001)
             return ship is not None and ship.particulars.name == "EVA"
 
         await until(is_named, "it connected again, and was told the name")
@@ -116,12 +116,12 @@ async def test_a_file_is_read_on_from_its_end_and_anew_when_it_is_replaced(tmp_p
         await until(lambda: not traffic.states()[0].trouble, "it is open")
         with file.open("ab") as log:
             log.write(position(211000001, 41.0, -8.0) + b"\n")
-        await until(lambda: traffic.roster.get(211000001), "what was added is read")
-        assert traffic.roster.get(367380120) is None, "that was said before"
+        await until(lambda: traffic.ship_list.get(211000001), "what was added is read")
+        assert traffic.ship_list.get(367380120) is None, "that was said before"
         fresh = tmp_path / "fresh"
         fresh.write_bytes(position(211000002, 41.0, -8.0) + b"\n")
         fresh.replace(file)
-        await until(lambda: traffic.roster.get(211000002), "the new file is read")
+        await until(lambda: traffic.ship_list.get(211000002), "the new file is read")
 
 
 async def test_a_file_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:

@@ -24,10 +24,10 @@ from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from app.missions.views.measurements.adjustment import AdjustmentRequest
-from tests.support.cluster import DaskCluster, dask_cluster
+from tests.support.compute.cluster import DaskCluster, dask_cluster
+from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.harbour import Harbour, sim_spec
 from tests.support.missions.specs import make_spec
-from tests.support.tracks import flown, lawnmower, measured
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # what is killed leaves sockets behind

@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from app.missions.operations.history import events_after
 from app.missions.operations.imports.log_import import import_log
 from app.missions.settings import ImcSettings, ServiceSettings
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import MissionState
 from imc_bridge import NodeState, Sounding
 from imc_bridge.logs import VehicleLog

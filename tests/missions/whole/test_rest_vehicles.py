@@ -12,9 +12,9 @@ import rasterio
 from app.main import serve
 from app.missions.settings import ImcSettings
 from app.settings import Settings
-from tests.support.databases import query
 from tests.support.missions.polling import PollingVehicle
 from tests.support.missions.specs import FRAME, spec_json
+from tests.support.storage.databases import query
 
 SIDE_M = 50.0
 STEPS = 12

@@ -17,8 +17,9 @@ from app.missions.operations.maps.mission_maps import export
 from app.missions.preflight.survey import preflight
 from app.missions.running import vehicle_orders
 from app.missions.settings import ServiceSettings
-from app.missions.spec.mission import MissionSpec, Tide
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import GoOrder, OrderState
+from app.missions.spec.water import Tide
 from app.missions.states import ENDED, MissionState
 from app.missions.views.mission import CheckStatus
 from app.storage.models import TelemetryRow

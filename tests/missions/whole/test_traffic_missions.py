@@ -16,7 +16,7 @@ from app.missions.states import MissionState
 from app.missions.traffic.sources import UdpSource
 from app.missions.views.mission import Level, MissionView
 from app.missions.views.traffic import TrafficMessage
-from tests.support.ais import named, position
+from tests.support.missions.ais import named, position
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import FRAME, lon_lat
 from tests.support.waiting import until
@@ -42,7 +42,7 @@ async def ship_at(service: MissionService, place: Callable[[], tuple[float, floa
 
     telling = asyncio.create_task(tell())
     try:
-        await until(lambda: service.traffic.roster.get(MMSI), "the ship is heard")
+        await until(lambda: service.traffic.ship_list.get(MMSI), "the ship is heard")
         yield
     finally:
         telling.cancel()

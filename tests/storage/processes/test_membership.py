@@ -9,7 +9,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 import pytest
 
 from app.storage.processes.membership import Membership, MembershipLostError, make_membership
-from tests.support.databases import Databases
+from tests.support.storage.databases import Databases
 
 HOLDER = """
 import asyncio, sys

@@ -13,7 +13,7 @@ from app.storage.queries import events as event_queries
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import telemetry as telemetry_queries
-from tests.support.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
+from tests.support.storage.rows import TIME, mission, one_of_each, position, sounding, step, vehicle, waypoint
 
 
 async def _two_missions(database: Database) -> None:

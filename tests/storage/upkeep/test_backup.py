@@ -20,8 +20,8 @@ from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
-from tests.support.databases import Databases, query
-from tests.support.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
+from tests.support.storage.databases import Databases, query
+from tests.support.storage.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
 
 WRITER = """
 import sqlite3, sys

@@ -14,7 +14,7 @@ from app.storage.database import Database, make_engine
 from app.storage.models import Base, MissionRow
 from app.storage.upkeep import migrate
 from app.storage.upkeep.prepare import prepare_database
-from tests.support.rows import one_of_each
+from tests.support.storage.rows import one_of_each
 
 EARLIER = sorted(path.name.partition("_")[0] for path in Path(migrate.MIGRATIONS, "versions").glob("0*.py"))[:-1]
 

@@ -162,7 +162,7 @@ def read(reader: str, path: Path) -> str:
         except TerrainError as error:
             return str(error)
         return ""
-    from app.mapping.readers.endings import ending
+    from app.mapping.readers.file_extensions import ending
     from app.mapping.readers.files import read_file
     from app.mapping.readers.types import ReadError
 

@@ -9,7 +9,8 @@ import imcpy
 import numpy as np
 
 from simulator.clock import SimulationClock
-from simulator.dune.node import DuneOptions, FakeDune
+from simulator.dune.node import FakeDune
+from simulator.dune.options import DuneOptions
 from simulator.equipment import Equipment
 from simulator.floors import seafloors
 from simulator.floors.terrain import Terrain

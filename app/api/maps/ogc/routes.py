@@ -24,7 +24,7 @@ from app.api.maps.ogc.parameters import check_names, crs_of, items_query
 from app.api.maps.ogc.sources import enlarged, extent, extent_of_ways, feature, page
 from app.api.state import State
 from app.missions.operations.maps.features import Feature, Kind, period_of
-from app.missions.traffic.roster import NEAR_M
+from app.missions.traffic.ship_list import NEAR_M
 
 OGC = "/ogc"
 

@@ -24,7 +24,7 @@ from app.missions.errors import MissionElsewhereError, MissionNotFoundError
 from app.missions.maps.gis_layers import WEB_LAYERS, CellValues, Range, WebLayer
 from app.missions.operations.maps.map_pictures import MapPicture, PictureRequest
 from app.missions.running.ownership import Peer
-from app.missions.spec.mission import Limits
+from app.missions.spec.limits import Limits
 from app.storage.models import MissionRow
 
 MOST_MISSIONS = 8

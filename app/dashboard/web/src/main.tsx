@@ -3,7 +3,7 @@ import "./print.css";
 import "./ui/parts/common.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
-import { findCharts } from "./state/device/tiles";
+import { findCharts } from "./state/device/baseMap";
 import { startSession } from "./state/session";
 import { isDark, theme } from "./state/store";
 import { App } from "./ui/App";

@@ -2,7 +2,7 @@
 
 from typing import BinaryIO
 
-from app.mapping.readers.endings import GSF, KMALL
+from app.mapping.readers.file_extensions import GSF, KMALL
 from app.mapping.readers.multibeam.gsf import GsfFile
 from app.mapping.readers.multibeam.kmall import KmallFile
 from app.mapping.readers.multibeam.table import SwathTable

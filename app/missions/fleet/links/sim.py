@@ -4,7 +4,7 @@ import asyncio
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import structlog
@@ -12,7 +12,6 @@ import structlog
 from app.compiled.cache import RAYS, wait_for_compiling
 from app.missions.clock import now
 from app.missions.fleet.interface import (
-    BeamGeometry,
     Deployment,
     EventSink,
     FaultKind,
@@ -22,37 +21,29 @@ from app.missions.fleet.interface import (
     LinkCapabilities,
     LinkReport,
     LinkState,
-    PingReport,
     Position,
-    RangeReport,
-    ScanReport,
-    SoundingReport,
     StopReceipt,
     VehicleInfo,
     VehicleRefusedError,
-    VehicleReport,
     WaypointOrder,
     WaypointReport,
     WaypointStatus,
 )
+from app.missions.fleet.links.simulated.launch import Launch, Lookout, lay, target_in
+from app.missions.fleet.links.simulated.vehicle import DeployedVehicle, lived, ranges
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor
-from app.missions.spec.sonar import SwathSonarSpec
-from app.missions.spec.targets import TargetSpec
+from app.missions.spec.swath import SwathSonarSpec
+from app.missions.spec.vehicle import Sensor
 from simulator.equipment import Equipment
-from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
-from simulator.floors.terrain_files import load_terrain
-from simulator.obstacles.obstacles import ObstacleWorld
-from simulator.obstacles.scanning import Scan, Scanning
+from simulator.obstacles.scanning import Scanning
 from simulator.sonars.raycasting import warm_up
 from simulator.sonars.sensors import SensorKind, SonarNoise
-from simulator.sonars.swath import SwathSonar, SwathSounder
+from simulator.sonars.swath import SwathSonar
 from simulator.targets import Ranging, RangingNoise, Target
-from simulator.targets import TargetSpec as SimulatedTarget
-from simulator.vehicles.battery import Battery, BatterySpec
-from simulator.vehicles.vehicle import BOAT, STEP_S
-from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle, SwathPing
+from simulator.vehicles.battery import BatterySpec
+from simulator.vehicles.vehicle import BOAT
+from simulator.world import SimulatedVehicle
 
 TICK_S = 0.05
 PIECE_S = 2.0
@@ -61,14 +52,9 @@ PAUSE_S = 0.01
 """For so long at most others wait for that."""
 MOST_AT_ONCE_S = 0.5
 """Seconds of the wall clock that are made up for."""
-
 log = structlog.get_logger(__name__)
-
-PASSED_WITHIN_M = 8.0
-"""A vehicle that passes its waypoint at most this far to the side has arrived, as for those led over IMC."""
 REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
-
 LAUNCH_MARGIN_M = 2.0
 LAUNCH_SPACING_M = 6.0
 KEPT_TERRAINS = 32
@@ -81,131 +67,7 @@ SENSORS = {
     Sensor.DVL: SensorKind.DVL,
     Sensor.MULTIBEAM: SensorKind.MULTIBEAM,
 }
-
-
-@dataclass(frozen=True)
-class Lookout:
-    """What a vehicle that searches meets, in the frame of the area's south-western corner, and how it looks round."""
-
-    world: ObstacleWorld
-    reach_m: float
-    resolution_deg: float
-
-
 SCAN_NOISE_M = 0.02
-
-
-@dataclass(frozen=True)
-class Launch:
-    """Where and how a simulated vehicle comes into the world.
-
-    Attributes
-    ----------
-    vehicle, sensor
-        Its name and its sonar.
-    mission_id
-        Whose it is.
-    south_west
-        Latitude and longitude of the sea floor's corner.
-    width_m, height_m
-        Extent of a generated sea floor.
-    start
-        Latitude and longitude; None: in the south-western corner, beside those already there.
-    noise
-        Standard deviation of a range as a fraction of it; 0: without any error.
-    swath
-        What its sonar can do when that is a multibeam.
-    targets, ranging
-        What moves about there, and how well it ranges to that.
-    lookout
-        For a search: then it is a boat that can stop and turn on the spot.
-    battery
-    """
-
-    vehicle: str
-    mission_id: str
-    sensor: Sensor
-    south_west: tuple[float, float]
-    width_m: float
-    height_m: float
-    start: tuple[float, float] | None
-    noise: float
-    swath: SwathSonar = SwathSonar()  # noqa: RUF009 - frozen
-    targets: tuple[TargetSpec, ...] = ()
-    ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
-    lookout: Lookout | None = None
-    battery: BatterySpec = BatterySpec()  # noqa: RUF009 - frozen
-
-
-class _Swimmer:
-    def __init__(
-        self,
-        mission_id: str,
-        body: SimulatedVehicle,
-        terrain: Terrain,
-        ranging: Ranging,
-        scanning: Scanning | None = None,
-    ) -> None:
-        self.mission_id = mission_id
-        self.body = body
-        self.ranging = ranging
-        self.scanning = scanning
-        self.aground = False
-        self.silent_since_s: float | None = None
-        """Since when it is out of reach, by its clock."""
-        self.adrift = False
-        """Whether it gave its waypoint up meanwhile."""
-        self.terrain = terrain
-        self.state = LinkState.READY
-        self.order: WaypointOrder | None = None
-        self.reached = False
-        self.raised = False
-        self.reported_s = -math.inf
-        self.report: VehicleReport | None = None
-        self.faults: dict[FaultKind, FaultReport] = {}
-
-    @property
-    def battery(self) -> Battery:
-        if self.body.battery is None:
-            raise ValueError(f"{self.body.name} has no battery")
-        return self.body.battery
-
-    def position(self, place: LocalPosition) -> Position:
-        lat, lon = self.terrain.frame.to_geodetic(place.east_m, place.north_m)
-        return Position(lat, lon, place.depth_m)
-
-    def make_report(self) -> VehicleReport:
-        state = self.body.state
-        self.reported_s = state.time_s
-        self.report = VehicleReport(
-            vehicle=self.body.name,
-            time_s=state.time_s,
-            position=self.position(state.position),
-            heading_rad=state.heading_rad,
-            speed_mps=state.speed_mps,
-            altitude_m=state.altitude_m if math.isfinite(state.altitude_m) else None,
-            battery_pct=self.battery.level_pct,
-            battery_confidence_pct=self.battery.spec.confidence_pct,
-            energy_left_s=self.battery.time_left_s(),
-            position_sd_m=math.sqrt(state.position_variance_m2),
-            current_mps=self.body.vehicle.current,
-        )
-        return self.report
-
-    def begin(self, order: WaypointOrder) -> None:
-        self.order, self.reached, self.raised, self.adrift = order, False, False, False
-        self.head_for(order, order.position, order.position.depth_m)
-
-    def head_for(self, order: WaypointOrder, place: Position, depth_m: float) -> None:
-        east, north = self.terrain.frame.to_local(place.lat_deg, place.lon_deg)
-        self.body.go_to(
-            east,
-            north,
-            depth_m,
-            order.speed_mps,
-            arrival_radius_m=order.arrival_radius_m,
-            pass_within_m=None if order.lead is None else PASSED_WITHIN_M,
-        )
 
 
 class SimFleetLink(FleetLink):
@@ -235,7 +97,7 @@ class SimFleetLink(FleetLink):
         self._time_scale = time_scale
         self._told_of_pace = False
         self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
-        self._swimmers: dict[str, _Swimmer] = {}
+        self._deployed: dict[str, DeployedVehicle] = {}
         self._sink: EventSink = lambda _event: None
         self._task: asyncio.Task[None] | None = None
         self._ending = threading.Event()
@@ -249,7 +111,7 @@ class SimFleetLink(FleetLink):
     async def close(self) -> None:
         """Stop every vehicle and let time stand still."""
         self._ending.set()
-        for name in self._swimmers:
+        for name in self._deployed:
             await self.stop(name)
         if self._task is not None:
             self._task.cancel()
@@ -291,7 +153,7 @@ class SimFleetLink(FleetLink):
 
     def withdraw(self, deployment: Deployment) -> None:
         """Put a vehicle away, unless another mission has it."""
-        there = self._swimmers.get(deployment.vehicle.name)
+        there = self._deployed.get(deployment.vehicle.name)
         if there is not None and there.mission_id == deployment.mission_id:
             self.put_away(deployment.vehicle.name)
 
@@ -301,7 +163,7 @@ class SimFleetLink(FleetLink):
         One that another mission left there is put away: it is over that one's sea floor, with that one's sonar.
         Raises ValueError when the start lies outside of the sea floor.
         """
-        there = self._swimmers.get(launch.vehicle)
+        there = self._deployed.get(launch.vehicle)
         if there is not None and there.mission_id == launch.mission_id:
             return
         self.put_away(launch.vehicle)
@@ -309,7 +171,7 @@ class SimFleetLink(FleetLink):
         seed = [self._settings.seed, *launch.vehicle.encode()]
         started_s = now().timestamp()
         moving = [target for target in launch.targets if target.simulated is not None]
-        targets = [Target(_simulated(target, terrain), terrain, started_s) for target in moving]
+        targets = [Target(target_in(target, terrain), terrain, started_s) for target in moving]
         body = SimulatedVehicle(
             launch.vehicle,
             terrain,
@@ -332,64 +194,64 @@ class SimFleetLink(FleetLink):
             out = launch.lookout
             noise = np.random.default_rng([*seed, 2])
             scanning = Scanning(out.world, out.reach_m, out.resolution_deg, SCAN_NOISE_M, noise, started_s)
-        swimmer = _Swimmer(launch.mission_id, body, terrain, ranging, scanning)
-        swimmer.make_report()
-        self._swimmers[launch.vehicle] = swimmer
+        deployed = DeployedVehicle(launch.mission_id, body, terrain, ranging, scanning)
+        deployed.make_report()
+        self._deployed[launch.vehicle] = deployed
 
     def recharge(self, vehicle: str, level_pct: float = 100.0) -> None:
         """Fill a vehicle's battery up to a level."""
-        self._swimmers[vehicle].battery.recharge(level_pct)
+        self._deployed[vehicle].battery.recharge(level_pct)
 
     def fail(self, vehicle: str, kind: FaultKind, reason: str) -> None:
         """Let something break on board."""
-        swimmer = self._swimmers[vehicle]
-        fault = swimmer.faults[kind] = FaultReport(vehicle, swimmer.body.time_s, kind, reason)
+        deployed = self._deployed[vehicle]
+        fault = deployed.faults[kind] = FaultReport(vehicle, deployed.body.time_s, kind, reason)
         self._sink(fault)
 
     def mend(self, vehicle: str, kind: FaultKind) -> None:
         """Repair what is broken on board; nothing happens when that is not."""
-        swimmer = self._swimmers[vehicle]
-        fault = swimmer.faults.pop(kind, None)
+        deployed = self._deployed[vehicle]
+        fault = deployed.faults.pop(kind, None)
         if fault is not None:
-            self._sink(replace(fault, time_s=swimmer.body.time_s, over=True))
+            self._sink(replace(fault, time_s=deployed.body.time_s, over=True))
 
     def silence(self, vehicle: str) -> None:
         """Take a vehicle out of reach: what it tells meanwhile is lost, and it takes no orders."""
-        swimmer = self._swimmers[vehicle]
-        if swimmer.silent_since_s is None and not swimmer.aground:
-            swimmer.silent_since_s = swimmer.body.time_s
-            swimmer.state = LinkState.LOST
+        deployed = self._deployed[vehicle]
+        if deployed.silent_since_s is None and not deployed.aground:
+            deployed.silent_since_s = deployed.body.time_s
+            deployed.state = LinkState.LOST
             self._sink(LinkReport(vehicle, LinkState.LOST, SILENT))
 
     def reach(self, vehicle: str) -> None:
         """Bring a vehicle back within reach; nothing happens when it is."""
-        swimmer = self._swimmers[vehicle]
-        if swimmer.silent_since_s is not None and not swimmer.aground:
-            swimmer.silent_since_s = None
-            swimmer.state = LinkState.READY
-            self._sink(swimmer.make_report())
+        deployed = self._deployed[vehicle]
+        if deployed.silent_since_s is not None and not deployed.aground:
+            deployed.silent_since_s = None
+            deployed.state = LinkState.READY
+            self._sink(deployed.make_report())
             self._sink(LinkReport(vehicle, LinkState.READY))
 
     def swims(self, vehicle: str) -> bool:
         """Whether a vehicle is in the world."""
-        return vehicle in self._swimmers
+        return vehicle in self._deployed
 
     def is_adrift(self, vehicle: str) -> bool:
         """Whether a vehicle gave its waypoint up as nobody heard it, and has none yet: the current takes it along."""
-        return self._swimmers[vehicle].adrift
+        return self._deployed[vehicle].adrift
 
     def true_position(self, vehicle: str) -> Position:
         """Return where a vehicle is, whatever it takes itself to be."""
-        swimmer = self._swimmers[vehicle]
-        return swimmer.position(swimmer.body.true_position)
+        deployed = self._deployed[vehicle]
+        return deployed.position(deployed.body.true_position)
 
     def battery_pct(self, vehicle: str) -> float:
         """Return what a vehicle's battery really holds."""
-        return self._swimmers[vehicle].battery.level_pct
+        return self._deployed[vehicle].battery.level_pct
 
     def put_away(self, vehicle: str) -> None:
         """Take a vehicle out of the world; nothing happens when it is not there."""
-        self._swimmers.pop(vehicle, None)
+        self._deployed.pop(vehicle, None)
 
     def _terrain(self, launch: Launch) -> Terrain:
         """Return the sea floor of a mission's area; its vehicles share one, which takes a while to lay."""
@@ -397,13 +259,13 @@ class SimFleetLink(FleetLink):
         if key not in self._terrains:
             while len(self._terrains) >= KEPT_TERRAINS:
                 del self._terrains[next(iter(self._terrains))]
-            self._terrains[key] = _lay(self._settings, launch)
+            self._terrains[key] = lay(self._settings, launch)
         return self._terrains[key]
 
     def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
         if launch.start is not None:
             return terrain.frame.to_local(*launch.start)
-        there = sum(1 for s in self._swimmers.values() if s.terrain.frame.definition == terrain.frame.definition)
+        there = sum(1 for s in self._deployed.values() if s.terrain.frame.definition == terrain.frame.definition)
         spacing = min(LAUNCH_SPACING_M, terrain.width_m / 4)
         return LAUNCH_MARGIN_M + (there * spacing) % (terrain.width_m - LAUNCH_MARGIN_M), LAUNCH_MARGIN_M
 
@@ -419,41 +281,41 @@ class SimFleetLink(FleetLink):
                 report=s.report,
                 faults=tuple(s.faults.values()),
             )
-            for name, s in self._swimmers.items()
+            for name, s in self._deployed.items()
         ]
 
     async def engage(self, vehicle: str) -> None:
         """Let a vehicle follow. Raises VehicleRefusedError when it was not launched."""
-        swimmer = self._swimmers.get(vehicle)
-        if swimmer is None:
+        deployed = self._deployed.get(vehicle)
+        if deployed is None:
             raise VehicleRefusedError(vehicle, "is not in the water", "add it to a mission as a vehicle of kind sim")
-        if swimmer.aground:
+        if deployed.aground:
             raise VehicleRefusedError(vehicle, AGROUND, "take it out of the mission")
-        if swimmer.silent_since_s is not None:
+        if deployed.silent_since_s is not None:
             raise VehicleRefusedError(vehicle, f"is {SILENT}", "wait until it is heard again")
-        if swimmer.state is not LinkState.ENGAGED:
-            swimmer.state = LinkState.ENGAGED
+        if deployed.state is not LinkState.ENGAGED:
+            deployed.state = LinkState.ENGAGED
             self._sink(LinkReport(vehicle, LinkState.ENGAGED))
 
     async def order(self, order: WaypointOrder) -> None:
         """Send a vehicle to a waypoint."""
-        swimmer = self._swimmers.get(order.vehicle)
-        if swimmer is None or swimmer.state is not LinkState.ENGAGED:
+        deployed = self._deployed.get(order.vehicle)
+        if deployed is None or deployed.state is not LinkState.ENGAGED:
             raise VehicleRefusedError(order.vehicle, "does not follow this service", "engage it first")
-        swimmer.begin(order)
+        deployed.begin(order)
         for status in (WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED):
             self._sink(WaypointReport(order.vehicle, order.mission_id, order.step, status))
 
     async def stop(self, vehicle: str, *, timeout_s: float = 3.0) -> StopReceipt:
         """Switch a vehicle's motor off."""
-        swimmer = self._swimmers.get(vehicle)
-        if swimmer is not None and swimmer.silent_since_s is not None:
+        deployed = self._deployed.get(vehicle)
+        if deployed is not None and deployed.silent_since_s is not None:
             return StopReceipt(vehicle, acknowledged=False, detail=f"it is {SILENT}")
-        if swimmer is None or swimmer.state is not LinkState.ENGAGED:
+        if deployed is None or deployed.state is not LinkState.ENGAGED:
             return StopReceipt(vehicle, acknowledged=True, detail="was not following")
-        swimmer.body.stop()
-        swimmer.order = None
-        swimmer.state = LinkState.READY
+        deployed.body.stop()
+        deployed.order = None
+        deployed.state = LinkState.READY
         self._sink(LinkReport(vehicle, LinkState.READY))
         return StopReceipt(vehicle, acknowledged=True, detail="motor off")
 
@@ -471,173 +333,63 @@ class SimFleetLink(FleetLink):
             now_s = loop.time()
             # What this machine cannot simulate in time is left out: vehicles live slower then, and hold nobody up.
             late_s = now_s - then_s - MOST_AT_ONCE_S
-            if late_s > 0 and self._swimmers and not self._told_of_pace:
+            if late_s > 0 and self._deployed and not self._told_of_pace:
                 self._told_of_pace = True
                 log.warning("simulated vehicles live slower than asked for", late_s=round(late_s, 2))
             left_s = min(now_s - then_s, MOST_AT_ONCE_S) * self._time_scale
             then_s = now_s
             while left_s > 0.0:
-                for swimmer in list(self._swimmers.values()):
-                    for event in self._advance(swimmer, min(left_s, PIECE_S)):
+                for deployed in list(self._deployed.values()):
+                    for event in self._advance(deployed, min(left_s, PIECE_S)):
                         self._sink(event)
                     if loop.time() - now_s > PAUSE_S:
                         await asyncio.sleep(0)
                         now_s = loop.time()
                 left_s -= PIECE_S
 
-    def _advance(self, swimmer: _Swimmer, passed_s: float) -> list[FleetEvent]:
+    def _advance(self, deployed: DeployedVehicle, passed_s: float) -> list[FleetEvent]:
         events: list[FleetEvent] = []
-        soundings, scans = _lived(swimmer, passed_s)
+        soundings, scans = lived(deployed, passed_s)
         events += scans
-        if swimmer.scanning is not None and swimmer.scanning.collided and not swimmer.aground:
-            swimmer.aground = True
-            swimmer.body.stop()
-            swimmer.order = None
-            swimmer.state = LinkState.HEARD
-            events.append(LinkReport(swimmer.body.name, LinkState.HEARD, AGROUND))
-        if swimmer.silent_since_s is not None:
-            self._live_unheard(swimmer, swimmer.silent_since_s)
+        if deployed.scanning is not None and deployed.scanning.collided and not deployed.aground:
+            deployed.aground = True
+            deployed.body.stop()
+            deployed.order = None
+            deployed.state = LinkState.HEARD
+            events.append(LinkReport(deployed.body.name, LinkState.HEARD, AGROUND))
+        if deployed.silent_since_s is not None:
+            self._live_unheard(deployed, deployed.silent_since_s)
             return []
-        order = swimmer.order
+        order = deployed.order
         if order is not None:
             events += soundings
-            self._keep_clear_of_bottom(swimmer, order)
-        events += _ranges(swimmer)
-        if swimmer.body.time_s - swimmer.reported_s >= REPORT_PERIOD_S:
-            events.append(swimmer.make_report())
-        if order is not None and not swimmer.reached and swimmer.body.arrived:
-            swimmer.reached = True
+            self._keep_clear_of_bottom(deployed, order)
+        events += ranges(deployed)
+        if deployed.body.time_s - deployed.reported_s >= REPORT_PERIOD_S:
+            events.append(deployed.make_report())
+        if order is not None and not deployed.reached and deployed.body.arrived:
+            deployed.reached = True
             if order.lead is not None:
                 # Until it is sent on it flies straight ahead, as far as there is room.
-                swimmer.head_for(order, order.lead, order.lead.depth_m)
+                deployed.head_for(order, order.lead, order.lead.depth_m)
             # The loop plans from the last report: it must be the place of arrival.
-            events.append(swimmer.make_report())
+            events.append(deployed.make_report())
             events.append(WaypointReport(order.vehicle, order.mission_id, order.step, WaypointStatus.REACHED))
         return events
 
-    def _live_unheard(self, swimmer: _Swimmer, since_s: float) -> None:
+    def _live_unheard(self, deployed: DeployedVehicle, since_s: float) -> None:
         """Let a vehicle that is out of reach go on with its waypoint for a while."""
-        _ranges(swimmer)
-        if swimmer.order is not None:
-            self._keep_clear_of_bottom(swimmer, swimmer.order)
-            if swimmer.body.time_s - since_s >= FORSAKEN_S:
-                swimmer.body.stop()
-                swimmer.order = None
-                swimmer.adrift = True
+        ranges(deployed)
+        if deployed.order is not None:
+            self._keep_clear_of_bottom(deployed, deployed.order)
+            if deployed.body.time_s - since_s >= FORSAKEN_S:
+                deployed.body.stop()
+                deployed.order = None
+                deployed.adrift = True
 
-    def _keep_clear_of_bottom(self, swimmer: _Swimmer, order: WaypointOrder) -> None:
-        state = swimmer.body.state
+    def _keep_clear_of_bottom(self, deployed: DeployedVehicle, order: WaypointOrder) -> None:
+        state = deployed.body.state
         too_low = state.altitude_m < order.min_altitude_m
-        if too_low and not swimmer.raised and not swimmer.reached:
-            swimmer.raised = True
-            swimmer.head_for(order, order.position, max(0.0, swimmer.body.bottom_m - order.min_altitude_m))
-
-
-def _lay(settings: SimulationSettings, launch: Launch) -> Terrain:
-    if settings.terrain is not None:
-        terrain = load_terrain(settings.terrain)
-        return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
-    # Whole cells that cover the area to its border and a little more.
-    return generate(
-        settings.family,
-        settings.seed,
-        width_m=math.ceil(launch.width_m + 1e-3),
-        height_m=math.ceil(launch.height_m + 1e-3),
-        origin=launch.south_west,
-    )
-
-
-def _simulated(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
-    asked = target.simulated
-    if asked is None:
-        raise ValueError(f"target {target.name} is a real one")
-    lon, lat = asked.start
-    place = (*terrain.frame.to_local(lat, lon), asked.depth_m)
-    return SimulatedTarget(target.called, place, math.radians(asked.course_deg), asked.speed_mps)
-
-
-def _lived(swimmer: _Swimmer, passed_s: float) -> tuple[list[FleetEvent], list[FleetEvent]]:
-    """Let time pass, and return what was sounded and scanned.
-
-    One that looks round does so on its way, and not only where it is in the end.
-    """
-    scanning, body = swimmer.scanning, swimmer.body
-    if scanning is None:
-        return _sounded(swimmer, passed_s), []
-    soundings: list[FleetEvent] = []
-    scans: list[FleetEvent] = []
-    while passed_s > 0.0 and not scanning.collided:
-        soundings += _sounded(swimmer, min(passed_s, STEP_S))
-        passed_s -= STEP_S
-        scan = scanning.step(body.time_s, body.true_position)
-        if scan is not None:
-            scans.append(_scan(swimmer, scan, scanning))
-    return soundings, scans
-
-
-def _sounded(swimmer: _Swimmer, passed_s: float) -> list[FleetEvent]:
-    body = swimmer.body
-    if isinstance(body.sonar, SwathSounder):
-        return [_ping(swimmer, ping) for ping in body.advance_swath(passed_s)]
-    return [_sounding(swimmer, m) for m in body.advance(passed_s) if m.valid]
-
-
-def _scan(swimmer: _Swimmer, scan: Scan, scanning: Scanning) -> ScanReport:
-    return ScanReport(
-        vehicle=swimmer.body.name,
-        time_s=scan.time_s,
-        position=swimmer.position(swimmer.body.position),
-        first_bearing_deg=0.0,
-        bearing_step_deg=scanning.resolution_deg,
-        reach_m=scanning.reach_m,
-        ranges_m=tuple(scan.ranges_m.tolist()),
-        source="sim",
-    )
-
-
-def _ranges(swimmer: _Swimmer) -> list[FleetEvent]:
-    body = swimmer.body
-    return [
-        RangeReport(
-            vehicle=body.name,
-            time_s=body.time_s,
-            target=target,
-            range_m=range_m,
-            position=swimmer.position(body.position),
-            source="sim",
-            position_sd_m=math.sqrt(body.state.position_variance_m2),
-        )
-        for target, range_m in swimmer.ranging.step(body.time_s, body.true_position)
-    ]
-
-
-def _sounding(swimmer: _Swimmer, measurement: BeamReturn) -> SoundingReport:
-    if measurement.footprint is None:
-        raise ValueError("a measurement without a return has no footprint")
-    sonar = swimmer.position(measurement.position)
-    return SoundingReport(
-        vehicle=measurement.vehicle,
-        time_s=measurement.time_s,
-        footprint=swimmer.position(measurement.footprint),
-        vehicle_depth_m=measurement.position.depth_m,
-        range_m=measurement.range_m,
-        source=measurement.source,
-        beam=measurement.beam,
-        position_sd_m=math.sqrt(swimmer.body.state.position_variance_m2),
-        beam_geometry=BeamGeometry(sonar.lat_deg, sonar.lon_deg),
-    )
-
-
-def _ping(swimmer: _Swimmer, ping: SwathPing) -> PingReport:
-    return PingReport(
-        vehicle=ping.vehicle,
-        time_s=ping.time_s,
-        position=swimmer.position(ping.position),
-        roll_rad=ping.roll_rad,
-        pitch_rad=ping.pitch_rad,
-        heading_rad=ping.heading_rad,
-        angles_rad=ping.angles_rad.astype(np.float32),
-        ranges_m=ping.ranges_m.astype(np.float32),
-        source=ping.source,
-        position_sd_m=math.sqrt(swimmer.body.state.position_variance_m2),
-    )
+        if too_low and not deployed.raised and not deployed.reached:
+            deployed.raised = True
+            deployed.head_for(order, order.position, max(0.0, deployed.body.bottom_m - order.min_altitude_m))

@@ -25,9 +25,11 @@ from app.missions.flight.decisions.zone_clearance import room_around
 from app.missions.safety import free_space, travel_depth, waypoint_check
 from app.missions.safety.tide_and_bottom import BottomNow
 from app.missions.search.course import hold_before_hazards
-from app.missions.spec import mission
-from app.missions.spec.mission import MissionSpec, SurfacePolicy, VehicleSpec
-from app.missions.spec.sonar import SwathSonarSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.surface_policy import SurfacePolicy
+from app.missions.spec.swath import SwathSonarSpec
+from app.missions.spec.vehicle import Sensor as SensorName
+from app.missions.spec.vehicle import VehicleSpec
 
 REACTS_WITHIN_M = 0.5
 """So far a vehicle goes on past the radius in which it arrives until its next leg is sent."""
@@ -225,7 +227,7 @@ def _cells_in(
 
 def swath_sonar(vehicle: VehicleSpec) -> SwathSonar | None:
     """Return the swath sonar of a vehicle; None where it has none."""
-    if vehicle.sensor is not mission.Sensor.MULTIBEAM:
+    if vehicle.sensor is not SensorName.MULTIBEAM:
         return None
     sonar = vehicle.sonar or SwathSonarSpec()
     return SwathSonar(math.radians(sonar.aperture_deg), sonar.beams, sonar.rate_hz, sonar.range_m, equidistant=False)

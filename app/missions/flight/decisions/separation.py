@@ -10,7 +10,8 @@ from app.missions.flight.decisions.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.energy import ASCENT_MPS
 from app.missions.safety import free_space
-from app.missions.spec.mission import Limits, MissionSpec
+from app.missions.spec.limits import Limits
+from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 
 DIRECTIONS = 16

@@ -16,12 +16,14 @@ from app.missions import metrics
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
 from app.missions.flight.decisions.decision import Decision, Leg, turn_radius_m
-from app.missions.live.mission import RISES, LiveMission
+from app.missions.live.journals.journal import RISES
+from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.safety import free_space, travel_depth
 from app.missions.safety.tide_and_bottom import FallingTide
-from app.missions.spec.mission import Guidance, MissionSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import Guidance
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end

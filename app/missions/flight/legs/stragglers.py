@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.missions.live.mission import LiveMission
-from app.missions.spec.mission import Guidance
+from app.missions.spec.vehicle import Guidance
 from app.missions.team import Member
 from app.missions.views.mission import Level
 from imc_bridge.control.plans import leg_time_s

@@ -14,7 +14,8 @@ from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
-from app.missions.live.mission import LiveMission, phase_of
+from app.missions.live.mission import LiveMission
+from app.missions.live.vehicle_reports import phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
 from app.missions.recovery.berths import home_of, is_home, point_of, room_of_m
 from app.missions.recovery.failsafes import LINK_LOST_S

@@ -54,6 +54,9 @@ Noted = SoundingReport | PingReport | ScanReport | VehicleReport | WaypointRepor
 
 T = TypeVar("T")
 
+RISES = "rises"
+"""Marks events that tell of a vehicle sent up for a fix."""
+
 log = structlog.get_logger(__name__)
 
 

@@ -14,8 +14,9 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.safety.free_space import CIRCLE_M
-from app.missions.spec.mission import MissionSpec, SurfacePolicy
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import OrderKind
+from app.missions.spec.surface_policy import SurfacePolicy
 from app.missions.team import Member, Swath, Team
 from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView, WaitingCircle
 from app.missions.views.orders import OrderView

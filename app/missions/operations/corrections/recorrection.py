@@ -19,8 +19,9 @@ from app.missions.live.mission import LiveMission
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import NO_LEVEL, Corrections
 from app.missions.soundings.gate import Gate
-from app.missions.spec.mission import MissionSpec, SoundSpeed, Tide
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.systematic_errors import SystematicErrors
+from app.missions.spec.water import SoundSpeed, Tide
 from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection, TideTableView
 from app.missions.views.measurements.soundings import Ruling, Verdict
 from app.missions.views.mission import Level

@@ -17,13 +17,13 @@ from sqlalchemy.orm import defer
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.kriging.supersoundings import merge_soundings
-from app.mapping.readers.endings import ending
+from app.mapping.readers.file_extensions import ending
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid, SoundingRows, Soundings
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
 from app.missions.live.mission import LiveMission
-from app.missions.operations.imports.reading import ChartedZone, Reader
+from app.missions.operations.imports.reader_process import ChartedZone, Reader
 from app.missions.operations.imports.uploads import Upload
 from app.missions.running.final_maps import FinalMaps
 from app.missions.spec.base import PolygonGeometry

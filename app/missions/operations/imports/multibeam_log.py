@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.mapping.readers.endings import MULTIBEAM
+from app.mapping.readers.file_extensions import MULTIBEAM
 from app.mapping.readers.multibeam.beams import beams_of
 from app.mapping.readers.multibeam.points import open_multibeam
 from app.mapping.readers.multibeam.types import FilePing, MultibeamFile

@@ -4,8 +4,8 @@ from datetime import datetime
 
 from pydantic import Field
 
-from app.missions.spec.mission import SoundSpeed, Tide
 from app.missions.spec.systematic_errors import SystematicErrors
+from app.missions.spec.water import SoundSpeed, Tide
 from app.missions.views.base import View
 
 

@@ -15,11 +15,11 @@ from app.api.accounts.tokens import Role, TokenStore
 from app.missions.settings import AisSettings, ImcSettings
 from app.settings import Settings
 from app.storage.database import Database
-from tests.support.ais import position
-from tests.support.databases import Databases
+from tests.support.api.rest import mission_spec, running_in_thread
+from tests.support.missions.ais import position
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.ports import free_ports
-from tests.support.rest import mission_spec, running_in_thread
+from tests.support.storage.databases import Databases
 
 START_S = 1_795_225_140.0
 SOUNDINGS = 60

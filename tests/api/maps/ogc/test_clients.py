@@ -22,7 +22,7 @@ from PIL import Image
 from rasterio.warp import transform_bounds
 
 from tests.api.maps.ogc.conftest import SOUNDINGS, Gis
-from tests.support.gis import picture_of
+from tests.support.mapping.gis import picture_of
 from tests.support.missions.specs import FRAME
 
 DRIVER = "OAPIF"

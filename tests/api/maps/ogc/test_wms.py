@@ -17,9 +17,9 @@ from PIL import Image
 from app.main import Server
 from app.settings import Settings
 from tests.api.maps.ogc.conftest import Gis, depth_m
-from tests.support.gis import Pixels, picture_of, tile_of
+from tests.support.api.rest import make_client, mission_spec, running, soundings
+from tests.support.mapping.gis import Pixels, picture_of, tile_of
 from tests.support.missions.specs import FRAME
-from tests.support.rest import make_client, mission_spec, running, soundings
 
 LAYERS = ("depth", "uncertainty", "density", "coverage")
 ZOOM, WORLD_M = 19, 2 * np.pi * 6_378_137.0

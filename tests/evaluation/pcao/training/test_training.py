@@ -13,8 +13,8 @@ from app.cli import app
 from app.estimation import Landmarks, landmark_sets
 from app.estimation.beams import Attitude, Multibeam
 from app.evaluation.pcao.simulation.kernel import KnownLandmarks, floor_at, fly, meets, unknown
+from app.evaluation.pcao.simulation.oracles import FDSA, SE, SPSA, _credits, _progress, fly_tried, tries_per_step
 from app.evaluation.pcao.simulation.task import TrainingTask
-from app.evaluation.pcao.simulation.tried import FDSA, SE, SPSA, _credits, _progress, fly_tried, tries_per_step
 from app.evaluation.pcao.simulation.world import SONAR, SeaFloor
 from app.evaluation.pcao.terrains import sea_floor, sea_floors_of
 from app.evaluation.pcao.training.optimisers import METHODS, regressors, step_size

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.files import read_file
+from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.multibeam.gsf import PING, SINGLE_BEAM, GsfFile
-from app.mapping.readers.placing import place_soundings
 from app.mapping.readers.types import MapExtent, Points, ReadError, ReadOptions
 from app.mapping.s44 import NORMAL_95
 from app.mapping.types import Grid
-from tests.support.multibeam import floor, line, write_gsf
+from tests.support.mapping.multibeam import floor, line, write_gsf
 
 FRAME = LocalFrame(41.1850, -8.7040)
 PLACE = MapExtent(FRAME, Grid(-40.0, -40.0, 2.0, 40, 40), margin_m=10.0)

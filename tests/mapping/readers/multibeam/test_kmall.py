@@ -14,11 +14,11 @@ from KMALL.kmall import kmall
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.files import read_file
+from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.multibeam.kmall import KmallFile
-from app.mapping.readers.placing import place_soundings
 from app.mapping.readers.types import MapExtent, Points, ReadError, ReadOptions
 from app.mapping.types import Grid
-from tests.support.multibeam import floor, line, write_kmall
+from tests.support.mapping.multibeam import floor, line, write_kmall
 
 FRAME = LocalFrame(41.1850, -8.7040)
 PLACE = MapExtent(FRAME, Grid(-40.0, -40.0, 2.0, 40, 40), margin_m=10.0)

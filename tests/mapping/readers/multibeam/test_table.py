@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.readers.georeferencing import place_reference, place_soundings
 from app.mapping.readers.multibeam import table
 from app.mapping.readers.multibeam.table import SwathTable
 from app.mapping.readers.multibeam.types import FilePing
-from app.mapping.readers.placing import place_reference, place_soundings
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid
-from tests.support.multibeam import floor
+from tests.support.mapping.multibeam import floor
 
 FRAME = LocalFrame(41.1850, -8.7040)
 PLACE = MapExtent(FRAME, Grid(-20.0, -20.0, 2.0, 20, 20), margin_m=5.0)

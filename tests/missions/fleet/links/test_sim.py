@@ -21,10 +21,11 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.sim import FORSAKEN_S, Launch, SimFleetLink
+from app.missions.fleet.links.sim import FORSAKEN_S, SimFleetLink
+from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
-from app.missions.spec.mission import Sensor, VehicleSpec
-from app.missions.spec.sonar import SwathSonarSpec
+from app.missions.spec.swath import SwathSonarSpec
+from app.missions.spec.vehicle import Sensor, VehicleSpec
 from simulator.floors import seafloors
 from simulator.sonars.swath import SwathSonar
 from simulator.vehicles.battery import BatterySpec

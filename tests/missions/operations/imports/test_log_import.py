@@ -22,10 +22,10 @@ from app.missions.views.measurements.soundings import LogImportView
 from app.storage.database import Database
 from app.storage.queries import missions as mission_queries
 from tests.support.commands import COMMAND, environment
-from tests.support.databases import query
 from tests.support.imc import log_writer as writer
 from tests.support.missions.harbour import view_of
 from tests.support.missions.specs import make_spec, rectangle
+from tests.support.storage.databases import query
 
 PINGS = 300
 """90 m of track, of which the area with its margin holds the first 46 m."""

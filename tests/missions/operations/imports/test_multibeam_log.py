@@ -15,11 +15,11 @@ from app.missions.operations.imports.log_import import import_log
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.spec.mission import SoundSpeed
+from app.missions.spec.water import SoundSpeed
 from app.missions.views.measurements.soundings import LogImportView
 from app.storage.database import Database
+from tests.support.mapping.multibeam import floor, line, write_gsf, write_kmall
 from tests.support.missions.specs import FRAME, make_spec
-from tests.support.multibeam import floor, line, write_gsf, write_kmall
 
 MIDDLE = LocalFrame(*(float(value) for value in FRAME.to_geographic(15.0, 15.0)))
 """Of a mission's area, 30 m wide."""

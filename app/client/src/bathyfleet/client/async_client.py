@@ -31,7 +31,7 @@ from bathyfleet.client.files import Arriving
 from bathyfleet.client.maps import dataset
 from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, MeasurementBatch, MissionView, Order
 from bathyfleet.client.operations import AsyncOperations
-from bathyfleet.client.patience import Attempts
+from bathyfleet.client.retry import Attempts
 from bathyfleet.client.streams import (
     LARGEST_MESSAGE,
     LogPlace,

@@ -1,4 +1,4 @@
-import { kept } from "../kept";
+import { kept } from "../persistentSignal";
 import { language, locale, say } from "../words/say";
 
 /** Numbers as an operator reads them. An en dash stands for "not known". */

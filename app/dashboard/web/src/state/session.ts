@@ -9,6 +9,7 @@ import { withTiles } from "../map/picture/seafloor";
 import { type Key, say } from "../words/say";
 import { identify, me, signedOut, whyNotCommand } from "./access";
 import { EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
+import { isAllowed } from "./stateNames";
 import {
   abortDialogOpen,
   abortOne,
@@ -31,7 +32,6 @@ import {
   telemetry,
   view,
 } from "./store";
-import { isAllowed } from "./words";
 
 const LIST_PERIOD_MS = 5000;
 const LEAST_MAP_PERIOD_MS = 300;

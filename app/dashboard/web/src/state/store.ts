@@ -18,7 +18,6 @@ import type {
   VehicleView,
   WaypointView,
 } from "../api/types";
-import { kept } from "../kept";
 import type { Bounds } from "../map/geo";
 import type { PlaceMark } from "../map/marks/marks";
 import type { Site } from "../map/marks/site";
@@ -27,6 +26,7 @@ import { NORTH_WEST_DEG } from "../map/picture/hillshade";
 import { fittingRange, type Range } from "../map/picture/layerColours";
 import { type DepthPalette, vehicleColour } from "../map/picture/palette";
 import type { SeaFloor } from "../map/picture/seafloor";
+import { kept } from "../persistentSignal";
 import type { CoordinateFormat } from "./format";
 import { ageSeconds, EMPTY_VIEW, type LiveView } from "./live";
 

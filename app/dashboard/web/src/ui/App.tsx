@@ -1,15 +1,24 @@
 import "./App.css";
 import { useEffect, useRef } from "preact/hooks";
 import { signedOut } from "../state/access";
-import { dialogOpen, in3d, mission, panelOpen, stripHeight } from "../state/store";
+import { describing, dialogOpen, in3d, mission, panelOpen, stripHeight } from "../state/store";
 import { AccountDialog } from "./Account";
 import { VehicleCards } from "./cards/VehicleCards";
 import { DenserQuestion } from "./cards/VehicleOrders";
 import { ChartPane } from "./chart/ChartPane";
 import { Legend } from "./chart/Legend";
+import {
+  cardsWidth,
+  legendReach,
+  mapFirst,
+  paneHeight,
+  panelWidth,
+  shownFolded,
+  watchRoom,
+} from "./chart/layout";
 import { MapMenu } from "./chart/MapMenu";
+import { MapPrompt } from "./chart/MapPrompt";
 import { Readout } from "./chart/Readout";
-import { cardsWidth, legendReach, paneHeight, panelWidth, shownFolded, watchRoom } from "./chart/room";
 import { AbortDialog } from "./dialogs/AbortDialog";
 import { FinishDialog } from "./dialogs/FinishDialog";
 import { FleetDialog } from "./dialogs/FleetDialog";
@@ -22,7 +31,7 @@ import { MissionPanel } from "./MissionPanel";
 import { Attention } from "./notices/Attention";
 import { Heard, Others } from "./notices/Heard";
 import { Notices } from "./notices/Notices";
-import { watchPrinting } from "./parts/printing";
+import { watchPrinting } from "./parts/printMap";
 import { SpaceView } from "./space/SpaceView";
 import { BottomStrip } from "./strip/BottomStrip";
 import { TopBar } from "./TopBar";
@@ -59,6 +68,7 @@ export function App() {
     panelOpen.value && !signedOut.value ? "with-missions" : "",
     mission.value ? "with-mission" : "",
     shownFolded.value ? "folded-cards" : "",
+    mapFirst.value ? "map-first" : "",
   ];
   const { top, bottom } = legendReach.value;
   const sizes = {
@@ -77,6 +87,7 @@ export function App() {
         {in3d.value ? <SpaceView /> : <Readout />}
         <Legend />
         <div class="over-map">
+          <MapPrompt />
           <Attention />
           <Others />
           <Tour />
@@ -85,7 +96,7 @@ export function App() {
         </div>
       </main>
       <div class="around" inert={covered}>
-        {panelOpen.value && !signedOut.value ? <MissionPanel /> : null}
+        {(panelOpen.value || describing.value) && !signedOut.value ? <MissionPanel /> : null}
         <VehicleCards />
         <BottomStrip />
       </div>

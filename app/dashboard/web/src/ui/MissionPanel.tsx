@@ -6,26 +6,40 @@ import { fileNameOf, missionFile } from "../state/form/missionFile";
 import { dayAndTime } from "../state/format";
 import { deleteMission, selectMission } from "../state/session";
 import {
+  capital,
+  hasEnded,
+  lengthWords,
+  measuredWords,
+  missionSign,
+  missionWords,
+} from "../state/stateNames";
+import {
   copied,
   describing,
   editedMission,
   fleetOpen,
   mission,
   missions,
+  panelOpen,
   selectedId,
   serviceFault,
 } from "../state/store";
-import { capital, hasEnded, lengthWords, measuredWords, missionSign, missionWords } from "../state/words";
 import { say, sayWith } from "../words/say";
-import { panelWidth } from "./chart/room";
+import { panelWidth } from "./chart/layout";
 import { NewMissionForm } from "./form/NewMissionForm";
 import { Button, sets } from "./parts/Controls";
+import { saveText } from "./parts/download";
 import { Grip } from "./parts/Grip";
-import { saveText } from "./parts/saving";
 
 export function MissionPanel() {
   return (
-    <aside class="panel missions" id="missions" aria-label={say("missions.missions")}>
+    <aside
+      class="panel missions"
+      id="missions"
+      aria-label={say("missions.missions")}
+      // What is being described is kept.
+      hidden={!panelOpen.value}
+    >
       <div class="panel-scroll">{describing.value ? <NewMissionForm /> : <MissionList />}</div>
       <Grip
         what={say("missions.theMissions")}

@@ -5,6 +5,7 @@ import { decidingFor } from "../state/alarms/waiting";
 import { age, clock, duration } from "../state/format";
 import { elapsedThen } from "../state/past/replay";
 import { act, askAbort, busyWith } from "../state/session";
+import { isAllowed, MISSION_WORDS, missionSign, missionWords, type Tone } from "../state/stateNames";
 import {
   abortDialogOpen,
   abortOne,
@@ -20,7 +21,6 @@ import {
   vehicles,
   view,
 } from "../state/store";
-import { isAllowed, MISSION_WORDS, missionSign, missionWords, type Tone } from "../state/words";
 import { say } from "../words/say";
 import { AccountButton } from "./Account";
 import { Button, flips, sets } from "./parts/Controls";

@@ -1,7 +1,7 @@
 import "./Tour.css";
 import { signal, useSignalEffect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { kept } from "../kept";
+import { kept } from "../persistentSignal";
 import { emptyDraft, toMission } from "../state/form/draft";
 import { createMission } from "../state/session";
 import {

@@ -2,8 +2,9 @@
 
 import { signal } from "@preact/signals";
 import { whyNotCommand } from "../state/access";
-import { themeAfter } from "../state/device/looks";
+import { themeAfter } from "../state/device/themes";
 import { act, askAbort, busyWith } from "../state/session";
+import { isAllowed } from "../state/stateNames";
 import {
   describing,
   dialogOpen,
@@ -22,9 +23,8 @@ import {
   tab,
   theme,
 } from "../state/store";
-import { isAllowed } from "../state/words";
 import type { Key } from "../words/say";
-import { takeAlarms } from "./notices/taking";
+import { takeAlarms } from "./notices/acknowledge";
 
 /** Grows when the whole area is asked for: the map follows. */
 export const fitAsked = signal(0);

@@ -104,8 +104,8 @@ const NO_WORDS = new Set([
   "state/form/draft.ts: the draft has faults",
   "map/canvas/chart.ts: mark",
   "map/canvas/chart.ts: target",
-  "map/canvas/sheets.ts: sheet",
-  "map/canvas/sheets.ts: px) scale(",
+  "map/canvas/canvasLayers.ts: sheet",
+  "map/canvas/canvasLayers.ts: px) scale(",
   "map/marks/site.ts: cells came for",
 ]);
 

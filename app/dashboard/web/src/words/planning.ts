@@ -33,6 +33,14 @@ export const PLANNING = {
     en: "Click one corner on the map, then the opposite one. Escape ends drawing.",
     pt: "Clique num canto no mapa, depois no oposto. Escape termina o desenho.",
   },
+  "area.tapCorners": {
+    en: "Tap corner after corner; tap the first one again to close.",
+    pt: "Toque canto a canto; toque de novo no primeiro para fechar.",
+  },
+  "area.tapTwoCorners": {
+    en: "Tap one corner, then the opposite one.",
+    pt: "Toque num canto, depois no oposto.",
+  },
   "area.dragACornerOnTheMap": {
     en: "Drag a corner on the map to move it, a point between two corners to add one; right-click takes a corner away.",
     pt: "Arraste um canto no mapa para o mover, um ponto entre dois cantos para acrescentar outro; o botão direito retira um canto.",

@@ -2,7 +2,7 @@
 
 import { computed, effect } from "@preact/signals";
 import { type ComponentChild, cloneElement, isValidElement } from "preact";
-import { kept } from "../kept";
+import { kept } from "../persistentSignal";
 import { CATALOGUE } from "./catalogue";
 
 export const LANGUAGES = ["en", "pt"] as const;

@@ -15,9 +15,11 @@ import { type Site, sitePicture } from "../marks/site";
 import type { SwathLine } from "../marks/swath";
 import type { TargetMark } from "../marks/targets";
 import type { PictureResult } from "../picture/picture.worker";
+import { Sheets } from "./canvasLayers";
 import { coasts, showsCoast } from "./coast";
 import { imageOf, paintStill, type StillContent } from "./fixedMarks";
 import { type Box, type Label, placed, type Side } from "./labels";
+import { type Look, PAPER } from "./mapColours";
 import {
   type LivelyContent,
   NOTHING,
@@ -28,10 +30,8 @@ import {
   WORDS_FONT,
   WORDS_HEIGHT_PX,
 } from "./movingMarks";
-import { type Look, PAPER } from "./paper";
+import type { Pixel } from "./polylines";
 import { moved, type Projection } from "./projection";
-import { Sheets } from "./sheets";
-import type { Pixel } from "./strokes";
 
 setWorkerUrl(workerUrl);
 

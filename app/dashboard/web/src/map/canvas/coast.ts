@@ -9,9 +9,9 @@ import type { GeometryCollection, Topology } from "topojson-specification";
 import address from "world-atlas/land-50m.json?url";
 import type { LngLat } from "../../api/types";
 import { type Bounds, boundsOf } from "../geo";
-import type { Paper } from "./paper";
-import { stroke, trace } from "./pen";
+import type { Paper } from "./mapColours";
 import type { Projection } from "./projection";
+import { stroke, trace } from "./shapes";
 
 /** From this zoom on a coast would be off by more than is seen. */
 const GONE_ZOOM = 11;

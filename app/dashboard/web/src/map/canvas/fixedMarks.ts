@@ -5,10 +5,10 @@ import { graticule, graticuleStep } from "../geo";
 import type { Track } from "../marks/marks";
 import type { Contour } from "../picture/contours";
 import { type Land, paintCoasts, showsCoast } from "./coast";
-import { type Paper, striped } from "./paper";
-import { line, stroke, trace, way } from "./pen";
+import { type Paper, striped } from "./mapColours";
+import { labelPlaces, type Pixel, simplified } from "./polylines";
 import type { Projection } from "./projection";
-import { labelPlaces, type Pixel, simplified } from "./strokes";
+import { line, stroke, trace, way } from "./shapes";
 
 const INK = "#0b1b24";
 const HALO = "rgba(255,255,255,0.85)";

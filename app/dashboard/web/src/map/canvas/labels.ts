@@ -1,6 +1,6 @@
 /** On which side of its sign each label is written, so that labels cover neither each other nor what lies over the map. Pure. */
 
-import type { Pixel } from "./strokes";
+import type { Pixel } from "./polylines";
 
 export interface Box {
   left: number;

@@ -7,9 +7,9 @@ import type { ShipMark } from "../marks/ships";
 import type { SwathLine } from "../marks/swath";
 import type { TargetMark } from "../marks/targets";
 import { boxOf, type Side } from "./labels";
-import type { Paper } from "./paper";
-import { dot, line, stroke, trace, way } from "./pen";
+import type { Paper } from "./mapColours";
 import type { Projection } from "./projection";
+import { dot, line, stroke, trace, way } from "./shapes";
 
 const SKETCH = "#1d5c94";
 

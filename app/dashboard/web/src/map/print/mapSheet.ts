@@ -1,7 +1,7 @@
 /** The map as one sheet of paper: what is on the screen, in a frame with title, legend, scale, north and degrees. */
 
 import type { LngLat } from "../../api/types";
-import type { Paper } from "../canvas/paper";
+import type { Paper } from "../canvas/mapColours";
 import { Projection } from "../canvas/projection";
 import { graticule, graticuleStep } from "../geo";
 

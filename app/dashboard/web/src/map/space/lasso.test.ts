@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { Pixel } from "../canvas/strokes";
+import type { Pixel } from "../canvas/polylines";
 import { frameRing, within } from "./lasso";
 
 const SQUARE: Pixel[] = [

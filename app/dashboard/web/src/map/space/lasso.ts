@@ -1,6 +1,6 @@
 /** Which points on the screen lie within a line drawn round them. Pure. */
 
-import type { Pixel } from "../canvas/strokes";
+import type { Pixel } from "../canvas/polylines";
 
 /** Places in `screen` (x, y, x, y, …; NaN: not on it) that lie within a ring, by how often it winds past them. */
 export function within(screen: Float32Array, ring: readonly Pixel[]): number[] {

@@ -26,7 +26,7 @@ import { type Certainty, isMeasured } from "../picture/certainty";
 import type { Range } from "../picture/layerColours";
 import { colourAt, type Palette } from "../picture/palette";
 import { cellOf, gridPlace, type SeaFloor, valueAt } from "../picture/seafloor";
-import { Pace, shuffled } from "./pace";
+import { Pace, shuffled } from "./levelOfDetail";
 
 export interface SceneVehicle {
   name: string;

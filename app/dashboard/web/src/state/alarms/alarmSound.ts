@@ -1,7 +1,7 @@
 /** The sound of alarms that nobody has taken; this device can be kept quiet. */
 
 import { effect } from "@preact/signals";
-import { kept } from "../../kept";
+import { kept } from "../../persistentSignal";
 import { openAlarms } from "../store";
 
 export const alarmSound = kept("alarm-sound", true);

@@ -1,8 +1,8 @@
 /** What changed with the mission as a whole, as a screen reader tells it. */
 
 import { computed } from "@preact/signals";
+import { missionWords } from "../stateNames";
 import { mission, socketStatus } from "../store";
-import { missionWords } from "../words";
 
 export const missionAnnounced = computed(() => {
   const present = mission.value;

@@ -1,7 +1,7 @@
 /** Maps cut along a line: what a chart of them shows, and the same as a table. Pure. */
 
 import type { LngLat, ProfileView } from "../../api/types";
-import { placeOf, typedPlace } from "../place";
+import { placeOf, typedPlace } from "../coordinates";
 
 /** One survey along the line; `name` tells it from others in words. */
 export interface Cut {

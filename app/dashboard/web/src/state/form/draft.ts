@@ -5,7 +5,7 @@ import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSp
 import { areaFault, polygonOf, ringOf, sizeOf } from "../../map/area";
 import { rectangle, wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
-import { placeOf, placeSample, typedPlace } from "../place";
+import { placeOf, placeSample, typedPlace } from "../coordinates";
 import {
   FIELDS,
   type FieldName,

@@ -1,4 +1,5 @@
 import "./CrosslinesCard.css";
+import type { ComponentChildren } from "preact";
 import type { AgreementView, AngleAgreementView, CrossingView, CrossoversView } from "../../api/types";
 import { aboutCrossing, barsOf, outliersOf, placeOf } from "../../map/marks/crossings";
 import { count, distance, fixed, metres, percent, place } from "../../state/format";
@@ -19,26 +20,7 @@ const MOST_LISTED = 100;
 /** Pixels of the card's pictures. */
 const [WIDTH, HEIGHT] = [260, 56];
 
-/** How well a survey agrees with itself where its lines cross. */
-export function CrosslinesCard() {
-  const found = crossovers.value;
-  if (crossoversWanted.value === null) {
-    return (
-      <article
-        class="card target crosslines"
-        data-testid="crosslines-card"
-        aria-label={say("crosslines.crosslines")}
-      >
-        <header>
-          <h2>{say("crosslines.crosslines")}</h2>
-        </header>
-        <Button id="check-crosslines" onClick={askForCrossovers}>
-          {say("crosslines.compareLinesWhereTheyCross")}
-        </Button>
-      </article>
-    );
-  }
-  if (!found?.statistics) return null;
+function Frame({ children }: { children: ComponentChildren }) {
   return (
     <article
       class="card target crosslines"
@@ -48,6 +30,26 @@ export function CrosslinesCard() {
       <header>
         <h2>{say("crosslines.crosslines")}</h2>
       </header>
+      {children}
+    </article>
+  );
+}
+
+/** How well a survey agrees with itself where its lines cross. */
+export function CrosslinesCard() {
+  const found = crossovers.value;
+  if (crossoversWanted.value === null) {
+    return (
+      <Frame>
+        <Button id="check-crosslines" onClick={askForCrossovers}>
+          {say("crosslines.compareLinesWhereTheyCross")}
+        </Button>
+      </Frame>
+    );
+  }
+  if (!found?.statistics) return null;
+  return (
+    <Frame>
       <Figures found={found} all={found.statistics} />
       <Differences found={found} />
       <ByAngle bins={found.by_angle} />
@@ -72,7 +74,7 @@ export function CrosslinesCard() {
       </details>
       <Outliers found={found} />
       <SystematicErrors />
-    </article>
+    </Frame>
   );
 }
 

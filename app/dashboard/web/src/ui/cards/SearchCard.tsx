@@ -1,6 +1,6 @@
 import { duration, percent } from "../../state/format";
+import { hasEnded, type Tone } from "../../state/stateNames";
 import { mission } from "../../state/store";
-import { hasEnded, type Tone } from "../../state/words";
 import { say } from "../../words/say";
 
 /** Time is short below this share of the window. */

@@ -1,7 +1,7 @@
 import type { TargetState, TargetView } from "../../api/types";
 import { age, fixed, metres, speed } from "../../state/format";
+import type { Tone } from "../../state/stateNames";
 import { mission } from "../../state/store";
-import type { Tone } from "../../state/words";
 import { say } from "../../words/say";
 
 const WORDS: Record<TargetState, { words: string; sign: string; tone: Tone }> = {

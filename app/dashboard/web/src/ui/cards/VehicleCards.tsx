@@ -9,17 +9,6 @@ import { typingFor } from "../../state/orders/orders";
 import { replayed } from "../../state/past/replay";
 import { bringHome, holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../../state/session";
 import {
-  abortDialogOpen,
-  abortOne,
-  mission,
-  now,
-  replayStep,
-  socketStatus,
-  unstopped,
-  type Vehicle,
-  vehicles,
-} from "../../state/store";
-import {
   batteryWords,
   capital,
   failsafeTone,
@@ -33,9 +22,20 @@ import {
   type Tone,
   vehicleState,
   WAYPOINT_WORDS,
-} from "../../state/words";
+} from "../../state/stateNames";
+import {
+  abortDialogOpen,
+  abortOne,
+  mission,
+  now,
+  replayStep,
+  socketStatus,
+  unstopped,
+  type Vehicle,
+  vehicles,
+} from "../../state/store";
 import { say, sayWith } from "../../words/say";
-import { cardsFolded, cardsWidth, shownFolded } from "../chart/room";
+import { cardsFolded, cardsWidth, shownFolded } from "../chart/layout";
 import { Button, flips } from "../parts/Controls";
 import { Grip } from "../parts/Grip";
 import { WaypointShape } from "../parts/marks";

@@ -1,6 +1,7 @@
 import "./VehicleOrders.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import type { VehicleView } from "../../api/types";
+import { placeOf, placeSample } from "../../state/coordinates";
 import { distance } from "../../state/format";
 import {
   denserRing,
@@ -12,7 +13,6 @@ import {
   typingFor,
 } from "../../state/orders/orders";
 import { lengthOf, orderWords, takesOrders } from "../../state/orders/orderWords";
-import { placeOf, placeSample } from "../../state/place";
 import { resumeVehicle } from "../../state/session";
 import { describing, drawing, drawingReady, mission, picking, vehicles } from "../../state/store";
 import { say } from "../../words/say";

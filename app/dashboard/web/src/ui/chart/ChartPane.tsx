@@ -18,10 +18,10 @@ import {
 } from "../../state/store";
 import { say } from "../../words/say";
 import { fitAsked } from "../keys";
+import { overlaid } from "./layout";
 import { MapTools } from "./MapTools";
 import { shownChart } from "./mapPicture";
 import { follow } from "./mapUpdates";
-import { overlaid } from "./room";
 
 // Most of the page's code: it is read while the service is asked, not before.
 const charting = import("../../map/canvas/chart");

@@ -16,6 +16,7 @@ import {
 import { colourAt, DEPTH_PALETTES, type Palette, type Rgb } from "../../map/picture/palette";
 import type { SeaFloor } from "../../map/picture/seafloor";
 import { fixed, pointed } from "../../state/format";
+import { PHASE_WORDS } from "../../state/stateNames";
 import {
   depthPalette,
   fixedRanges,
@@ -34,7 +35,6 @@ import {
   showSite,
   site,
 } from "../../state/store";
-import { PHASE_WORDS } from "../../state/words";
 import { named, say } from "../../words/say";
 import { Button, Choice, flips, into, titles } from "../parts/Controls";
 import { STAGES, VehicleShape } from "../parts/marks";

@@ -4,9 +4,9 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../../api/types";
 import { wayBetween } from "../../map/geo";
-import { followOwn, ownFault, whyNoPosition } from "../../state/device/own";
+import { placeOf, placeSample } from "../../state/coordinates";
+import { followOwn, ownFault, whyNoPosition } from "../../state/device/geolocation";
 import { distance } from "../../state/format";
-import { placeOf, placeSample } from "../../state/place";
 import {
   coordinateFormat,
   crossovers,

@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import type { Chart } from "../../map/canvas/chart";
-import { PAPER } from "../../map/canvas/paper";
+import { PAPER } from "../../map/canvas/mapColours";
 import { drawingOf, drawnBy } from "../../map/picture/drawings";
 import { paletteOf, symbolOf } from "../../map/picture/layerColours";
 import { colourAt, type Rgb } from "../../map/picture/palette";
@@ -10,6 +10,7 @@ import { drawSheet, fitted, type SheetLegend, type SheetVehicle, sheetFor } from
 import { pdfOf } from "../../map/print/pdf";
 import { dayAndTime, distance, latitude, longitude, plain, units } from "../../state/format";
 import { replayed } from "../../state/past/replay";
+import { missionWords } from "../../state/stateNames";
 import {
   depthPalette,
   mission,
@@ -20,10 +21,9 @@ import {
   shownRange,
   vehicles,
 } from "../../state/store";
-import { missionWords } from "../../state/words";
 import { named, say } from "../../words/say";
+import { overlaid } from "./layout";
 import { look } from "./mapUpdates";
-import { overlaid } from "./room";
 
 /** The map that is on the page, once it is. */
 export const shownChart = signal<Chart | null>(null);

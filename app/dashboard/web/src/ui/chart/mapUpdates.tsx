@@ -6,8 +6,8 @@ import SPEC from "../../api/mission.json";
 import type { LngLat, MissionView, Place, PolygonGeometry, WaypointView } from "../../api/types";
 import { ringOf } from "../../map/area";
 import type { Chart, Pin } from "../../map/canvas/chart";
+import type { Look } from "../../map/canvas/mapColours";
 import type { PlanLines } from "../../map/canvas/movingMarks";
-import type { Look } from "../../map/canvas/paper";
 import { outliersOf, placeOf } from "../../map/marks/crossings";
 import type { PlaceMark, Route, Track } from "../../map/marks/marks";
 import { cutAt } from "../../map/marks/plan";
@@ -22,8 +22,8 @@ import { paletteOf } from "../../map/picture/layerColours";
 import { Painter } from "../../map/picture/painter";
 import { lookupTable, vehicleColour } from "../../map/picture/palette";
 import { gridPlace, type SeaFloor } from "../../map/picture/seafloor";
-import { ownPosition } from "../../state/device/own";
-import { tilesAddress } from "../../state/device/tiles";
+import { tilesAddress } from "../../state/device/baseMap";
+import { ownPosition } from "../../state/device/geolocation";
 import { place, units } from "../../state/format";
 import { replayed } from "../../state/past/replay";
 import {
@@ -75,7 +75,7 @@ import {
 } from "../../state/store";
 import { say } from "../../words/say";
 import { TurnBackMark, VehicleMark, WaypointMark } from "../parts/marks";
-import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./room";
+import { cardsWidth, covers, legendReach, overlaid, panelWidth, shownFolded } from "./layout";
 
 /** For measurements: when something was shown for the first time. */
 function markOnce(name: string): void {

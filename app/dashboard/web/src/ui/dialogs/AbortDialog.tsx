@@ -1,6 +1,6 @@
 import { abortVehicle, act, actionWords } from "../../state/session";
+import { canReturn, hasEnded } from "../../state/stateNames";
 import { abortDialogOpen, abortOne, mission, type Vehicle, vehicles } from "../../state/store";
-import { canReturn, hasEnded } from "../../state/words";
 import { say, sayWith } from "../../words/say";
 import { Button } from "../parts/Controls";
 import { StopDialog } from "./StopDialog";

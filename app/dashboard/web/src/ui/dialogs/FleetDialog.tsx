@@ -1,8 +1,8 @@
 import "./FleetDialog.css";
 import type { VehicleView } from "../../api/types";
 import { age, metres, place, speed } from "../../state/format";
+import { batteryWords, vehicleState } from "../../state/stateNames";
 import { coordinateFormat, fleet, fleetOpen, missions } from "../../state/store";
-import { batteryWords, vehicleState } from "../../state/words";
 import { say } from "../../words/say";
 import { sets } from "../parts/Controls";
 import { Dialog } from "../parts/Dialog";

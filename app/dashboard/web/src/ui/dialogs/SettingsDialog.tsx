@@ -1,4 +1,4 @@
-import { THEMES, themeWords } from "../../state/device/looks";
+import { THEMES, themeWords } from "../../state/device/themes";
 import { type CoordinateFormat, type Units, units } from "../../state/format";
 import { coordinateFormat, keysOpen, settingsOpen, theme } from "../../state/store";
 import { chosenLanguage, LANGUAGES, type Language, OWN_NAMES, say } from "../../words/say";

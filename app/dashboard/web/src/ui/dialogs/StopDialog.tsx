@@ -4,7 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { ActionView, StopView } from "../../api/types";
 import { refusal, said } from "../../state/session";
-import { MISSION_WORDS } from "../../state/words";
+import { MISSION_WORDS } from "../../state/stateNames";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
 import { Dialog } from "../parts/Dialog";

@@ -2,10 +2,10 @@
 
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
+import { typedPlace } from "../../state/coordinates";
 import type { Draft, Faults } from "../../state/form/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../../state/form/missionFields";
 import { pointed } from "../../state/format";
-import { typedPlace } from "../../state/place";
 import { picking } from "../../state/store";
 import { named, say } from "../../words/say";
 import { OwnShip } from "../OwnShip";

@@ -1,11 +1,11 @@
 import { useSignal } from "@preact/signals";
 import type { NewMission } from "../../api/types";
-import { kept } from "../../kept";
+import { kept } from "../../persistentSignal";
 import { allBlocks, type Draft, faultsOf, toMission } from "../../state/form/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
 import { type Key, say } from "../../words/say";
 import { Button, Choice, FileButton, same, Trouble } from "../parts/Controls";
-import { saveText } from "../parts/saving";
+import { saveText } from "../parts/download";
 
 /** Templates that were kept on this device. */
 const templates = kept<readonly Template[]>("templates", []);

@@ -7,6 +7,7 @@ import { polygonOf } from "../../map/area";
 import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
 import { recoveryMarks } from "../../map/marks/recovery";
+import { placeOf } from "../../state/coordinates";
 import { blockTitle, toMissions } from "../../state/form/blocks";
 import {
   allBlocks,
@@ -20,7 +21,6 @@ import {
   turnedInto,
   vehicleNames,
 } from "../../state/form/draft";
-import { placeOf } from "../../state/place";
 import { createMissions, describeMission, said } from "../../state/session";
 import {
   copied,

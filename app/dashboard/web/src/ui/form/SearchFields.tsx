@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
 import { areasIn } from "../../map/area";
 import { say } from "../../words/say";
-import { Button, FileButton } from "../parts/Controls";
+import { Button, FileButton, Hint } from "../parts/Controls";
 import { Fault, Part, PlaceField, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
@@ -42,11 +42,7 @@ export function SearchFields() {
           </Button>
         </span>
       ) : null}
-      {note.value ? (
-        <p class="hint" role="status">
-          {note.value}
-        </p>
-      ) : null}
+      <Hint text={note.value} />
       <Fault field="obstacles" />
     </fieldset>
   );

@@ -7,7 +7,7 @@ import { areaOf } from "../../state/form/draft";
 import { day, fixed } from "../../state/format";
 import { said } from "../../state/session";
 import { say, sayWith } from "../../words/say";
-import { Button, Choice } from "../parts/Controls";
+import { Button, Choice, Hint } from "../parts/Controls";
 import { Fault, useForm } from "./Fields";
 
 /** Which site a survey belongs to, and what is known of it: its surveys, and what changed between the last two. */
@@ -62,11 +62,7 @@ export function SiteFields() {
           {say("site.makeASiteOfThisArea")}
         </Button>
       </div>
-      {note.value ? (
-        <p class="hint" role="status">
-          {note.value}
-        </p>
-      ) : null}
+      <Hint text={note.value} />
       <Fault field="site" />
       {draft.site ? <Known key={draft.site} site={draft.site} /> : null}
     </details>
@@ -134,11 +130,7 @@ function Known({ site }: { site: string }) {
           ) : null}
         </div>
       ) : null}
-      {note.value ? (
-        <p class="hint" role="status">
-          {note.value}
-        </p>
-      ) : null}
+      <Hint text={note.value} />
     </>
   );
 }

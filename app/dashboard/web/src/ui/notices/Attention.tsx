@@ -9,7 +9,7 @@ import { showWhere } from "../../state/past/whereabouts";
 import { mission, now, openAlarms, replayStep, takenAlarm } from "../../state/store";
 import { say, sayWith } from "../../words/say";
 import { Button, flips } from "../parts/Controls";
-import { take, takeAlarms, takeFault } from "./taking";
+import { take, takeAlarms, takeFault } from "./acknowledge";
 
 const TOLD_PERIOD_MS = 10_000;
 const SHOWN = 2;

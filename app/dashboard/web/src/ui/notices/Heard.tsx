@@ -1,5 +1,5 @@
 import { missionAnnounced } from "../../state/alarms/announced";
-import { othersWords } from "../../state/orders/others";
+import { othersWords } from "../../state/orders/otherUsers";
 import { openAlarms } from "../../state/store";
 import { say } from "../../words/say";
 

@@ -20,6 +20,15 @@ export const into =
     signal.value = value;
   };
 
+/** What came of something that was asked for, said to those who see and to those who hear the page. */
+export function Hint({ text }: { text: string }) {
+  return text ? (
+    <p class="hint" role="status">
+      {text}
+    </p>
+  ) : null;
+}
+
 interface ButtonProps extends AriaAttributes {
   id?: string;
   /** Its class. */

@@ -7,7 +7,7 @@ import { csvOf, digits, fileNameOf, lineWords } from "../../state/analysis/plotF
 import { clock, plain } from "../../state/format";
 import { language, say } from "../../words/say";
 import { Button, flips } from "./Controls";
-import { save } from "./saving";
+import { save } from "./download";
 
 export interface Line {
   label: string;

@@ -4,8 +4,8 @@ import "./marks.css";
 import type { LngLat, VehicleView, WaypointStatus, WaypointView } from "../../api/types";
 import { wayBetween } from "../../map/geo";
 import { age } from "../../state/format";
+import { PHASE_WORDS, WAYPOINT_WORDS } from "../../state/stateNames";
 import type { Vehicle } from "../../state/store";
-import { PHASE_WORDS, WAYPOINT_WORDS } from "../../state/words";
 import { say } from "../../words/say";
 
 /** A vehicle as it was: its heading is that of its last way. */

@@ -25,7 +25,7 @@ import {
 } from "../../state/store";
 import { named, say } from "../../words/say";
 import { Button, Choice, into, Trouble } from "../parts/Controls";
-import { save } from "../parts/saving";
+import { save } from "../parts/download";
 import { ProfileChart } from "./ProfileChart";
 
 const INKS = ["#1d5c94", "#b8442b", "#2e7d6e", "#8c50b8"];

@@ -2,7 +2,7 @@ import "./SoundingsInSpace.css";
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { SoundingState } from "../../api/types";
-import type { Pixel } from "../../map/canvas/strokes";
+import type { Pixel } from "../../map/canvas/polylines";
 import { colourAt, DEPTH_PALETTES, type Palette } from "../../map/picture/palette";
 import { frameRing, within } from "../../map/space/lasso";
 import type { SeaFloorScene } from "../../map/space/scene";

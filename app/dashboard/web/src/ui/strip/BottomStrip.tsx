@@ -5,7 +5,7 @@ import { count, distance, metres, percent, plain } from "../../state/format";
 import { shownStep } from "../../state/past/replay";
 import { mission, replayStep, stripHeight, type Tab, tab, view } from "../../state/store";
 import { say } from "../../words/say";
-import { paneHeight } from "../chart/room";
+import { paneHeight } from "../chart/layout";
 import { Button } from "../parts/Controls";
 import { Grip } from "../parts/Grip";
 import { ProfilePane } from "../profile/ProfilePane";

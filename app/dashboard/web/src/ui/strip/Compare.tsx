@@ -6,8 +6,8 @@ import { differenceOf, type SeaFloor, withTiles } from "../../map/picture/seaflo
 import { count, distance, duration, metres, percent } from "../../state/format";
 import { figuresOf } from "../../state/past/history";
 import { fetchSteps, noteFault, said } from "../../state/session";
+import { lengthWords, MISSION_WORDS } from "../../state/stateNames";
 import { mission, missions, seaFloor, steps } from "../../state/store";
-import { lengthWords, MISSION_WORDS } from "../../state/words";
 import { say } from "../../words/say";
 import { Choice } from "../parts/Controls";
 import { Plot } from "../parts/Plot";

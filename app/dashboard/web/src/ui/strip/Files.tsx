@@ -7,7 +7,7 @@ import { now, selectedId, view } from "../../state/store";
 import { say } from "../../words/say";
 import { mapPicture, type PictureKind, shownChart } from "../chart/mapPicture";
 import { Button } from "../parts/Controls";
-import { save } from "../parts/saving";
+import { save } from "../parts/download";
 
 /** A file that is on its way. */
 interface Making {

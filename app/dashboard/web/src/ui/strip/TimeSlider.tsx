@@ -1,8 +1,8 @@
 import "./TimeSlider.css";
 import { clock } from "../../state/format";
 import { pace, playing, replay, showPresent } from "../../state/past/replay";
+import { flownWords, hasEnded, isAllowed } from "../../state/stateNames";
 import { finishOpen, mission, replayStep, steps } from "../../state/store";
-import { flownWords, hasEnded, isAllowed } from "../../state/words";
 import { say, sayWith } from "../../words/say";
 import { Button, sets } from "../parts/Controls";
 

@@ -1,0 +1,79 @@
+"""What commands share. Heavy imports stay inside functions, so that ``--help`` answers at once."""
+
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+M = TypeVar("M", bound="BaseModel")
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from app.settings import Settings
+
+Database = Annotated[
+    str | None,
+    typer.Option(help="Database URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME"),
+]
+
+
+class CommandError(Exception):
+    """A command failed for a reason that the user can do something about."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+def command_settings(**overrides: Any) -> "Settings":
+    """Read the settings, with the command line's options; only warnings are logged."""
+    from app.api import logs
+    from app.settings import load_settings
+
+    settings = load_settings(**overrides)
+    logs.configure("warning", settings.log_format)
+    return settings
+
+
+def this_user() -> str:
+    """Return the user who gives a command on this machine."""
+    import getpass
+    import os
+
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"
+
+
+async def noted(
+    settings: "Settings", action: str, target: str, mission_id: str | None = None, *, refused: str | None = None
+) -> None:
+    """Write a command that was given on this machine into the audit log; ``refused`` is why it was not carried out."""
+    from app.storage.database import Database as Store
+    from app.storage.queries import audit
+    from app.storage.upkeep.prepare import prepare_database
+
+    await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+    store = Store(settings.database_url)
+    result = "done" if refused is None else "refused"
+    try:
+        async with store.writing() as session:
+            audit.add(
+                session,
+                audit.Command(this_user(), "", "command line", action, target, result, refused or "", mission_id),
+            )
+    finally:
+        await store.close()
+
+
+def checked(model: "type[M]", values: dict[str, Any]) -> "M":
+    """Return the values as a model; what is wrong is named by its option."""
+    from pydantic import ValidationError
+
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise CommandError(f"{field} is {first['input']!r}: {first['msg'].removeprefix('Value error, ')}") from None

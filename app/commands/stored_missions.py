@@ -1,0 +1,70 @@
+"""Missions of a database that no service has to run for."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, TypeVar
+
+from app.commands.command import CommandError, noted
+
+T = TypeVar("T")
+
+if TYPE_CHECKING:
+    from app.missions.live.mission import LiveMission
+    from app.missions.service import MissionService
+    from app.settings import Settings
+
+
+def with_missions(
+    settings: "Settings",
+    run: "Callable[[MissionService], Awaitable[T]]",
+    *,
+    changing: str = "",
+    mission: str = "",
+) -> "T":
+    """Run something with the missions of a database; nothing is started, the links stay closed.
+
+    A command that is ``changing`` a mission is named by that for the audit log, which it goes into with its result.
+    """
+    from app.missions.errors import MissionError
+    from app.missions.service import MissionService
+    from app.storage.database import Database as Store
+    from app.storage.upkeep.prepare import prepare_database
+
+    async def use() -> "T":
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        store = Store(settings.database_url)
+        closed = settings.model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
+        service = MissionService(closed, store)
+        try:
+            done = await run(service)
+        except (CommandError, MissionError) as error:
+            if changing:
+                await noted(settings, changing, mission, refused=str(error))
+            raise
+        finally:
+            await service.shutdown()
+            await store.close()
+        if changing:
+            await noted(settings, changing, mission)
+        return done
+
+    return asyncio.run(use())
+
+
+async def resting_mission(service: "MissionService", begin: str) -> "LiveMission":
+    """Return a mission that no service is running. Raises CommandError."""
+    mission = await meant_mission(service, begin)
+    state = mission.header.state
+    if state in ("running", "paused"):
+        raise CommandError(f"the mission is {state} in a service that would not notice", "Name that service with --url")
+    return mission
+
+
+async def meant_mission(service: "MissionService", begin: str) -> "LiveMission":
+    """Return the one mission whose id begins so. Raises CommandError."""
+    every = await service.missions()
+    meant = [summary.id for summary in every if summary.id.startswith(begin)]
+    if len(meant) != 1:
+        ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
+        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
+    return await service.get(meant[0])

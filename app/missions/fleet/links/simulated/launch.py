@@ -1,0 +1,92 @@
+"""Where and how a simulated vehicle comes into the world, and the sea floor that it comes to."""
+
+import math
+from dataclasses import dataclass
+
+from app.missions.settings import SimulationSettings
+from app.missions.spec.targets import TargetSpec
+from app.missions.spec.vehicle import Sensor
+from simulator.floors.seafloors import generate
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import load_terrain
+from simulator.obstacles.obstacles import ObstacleWorld
+from simulator.sonars.swath import SwathSonar
+from simulator.targets import RangingNoise
+from simulator.targets import TargetSpec as SimulatedTarget
+from simulator.vehicles.battery import BatterySpec
+
+
+@dataclass(frozen=True)
+class Lookout:
+    """What a vehicle that searches meets, in the frame of the area's south-western corner, and how it looks round."""
+
+    world: ObstacleWorld
+    reach_m: float
+    resolution_deg: float
+
+
+@dataclass(frozen=True)
+class Launch:
+    """Where and how a simulated vehicle comes into the world.
+
+    Attributes
+    ----------
+    vehicle, sensor
+        Its name and its sonar.
+    mission_id
+        Whose it is.
+    south_west
+        Latitude and longitude of the sea floor's corner.
+    width_m, height_m
+        Extent of a generated sea floor.
+    start
+        Latitude and longitude; None: in the south-western corner, beside those already there.
+    noise
+        Standard deviation of a range as a fraction of it; 0: without any error.
+    swath
+        What its sonar can do when that is a multibeam.
+    targets, ranging
+        What moves about there, and how well it ranges to that.
+    lookout
+        For a search: then it is a boat that can stop and turn on the spot.
+    battery
+    """
+
+    vehicle: str
+    mission_id: str
+    sensor: Sensor
+    south_west: tuple[float, float]
+    width_m: float
+    height_m: float
+    start: tuple[float, float] | None
+    noise: float
+    swath: SwathSonar = SwathSonar()  # noqa: RUF009 - frozen
+    targets: tuple[TargetSpec, ...] = ()
+    ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
+    lookout: Lookout | None = None
+    battery: BatterySpec = BatterySpec()  # noqa: RUF009 - frozen
+
+
+def lay(settings: SimulationSettings, launch: Launch) -> Terrain:
+    """Return the sea floor for a launch: the file that settings name, or a generated one under the area."""
+    if settings.terrain is not None:
+        terrain = load_terrain(settings.terrain)
+        return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
+    # Whole cells that cover the area to its border and a little more.
+    return generate(
+        settings.family,
+        settings.seed,
+        width_m=math.ceil(launch.width_m + 1e-3),
+        height_m=math.ceil(launch.height_m + 1e-3),
+        origin=launch.south_west,
+    )
+
+
+def target_in(target: TargetSpec, terrain: Terrain) -> SimulatedTarget:
+    """Return a moving target as it is simulated over a sea floor."""
+    asked = target.simulated
+    if asked is None:
+        raise ValueError(f"target {target.name} is a real one")
+    lon, lat = asked.start
+    place = (*terrain.frame.to_local(lat, lon), asked.depth_m)
+    return SimulatedTarget(target.called, place, math.radians(asked.course_deg), asked.speed_mps)

@@ -1,0 +1,224 @@
+"""What a mission's vehicles report, and what follows from it for the mission."""
+
+import asyncio
+import math
+
+import structlog
+
+from app.arrays import FloatArray
+from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.alarm_kinds import AlarmKind
+from app.missions.clock import now
+from app.missions.fleet.interface import (
+    FleetEvent,
+    LinkReport,
+    LinkState,
+    PingReport,
+    RangeReport,
+    RestartReport,
+    ScanReport,
+    SoundingReport,
+    VehicleReport,
+    WaypointReport,
+    WaypointStatus,
+)
+from app.missions.flown import Phase
+from app.missions.live.boundaries import Boundaries
+from app.missions.live.header import MissionHeader
+from app.missions.live.journals.journal import Journal
+from app.missions.live.journals.range_journal import RangeJournal
+from app.missions.live.watchers.vehicles import local_place
+from app.missions.live.watchers.waypoints import WaypointViews
+from app.missions.spec.failsafes import Response
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.surface_policy import SurfacePolicy
+from app.missions.states import AT_SEA, ENDED
+from app.missions.team import Member, Team, Withdrawal
+from app.missions.views.mission import Level
+
+LONGEST_GAP_S = 60.0
+"""What a vehicle flew in a longer silence is not known."""
+FASTEST_MPS = 10.0
+"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
+SURFACE_M = 0.7
+"""Who is not deeper can receive satellites."""
+LONGEST_SILENCE_S = 6 * 3600.0
+"""A vehicle was under way, and used energy, in a silence that was not longer."""
+PACE_MEMORY = 0.9
+"""Weight of the past in the running mean of a leg's duration."""
+
+log = structlog.get_logger(__name__)
+
+
+class VehicleReports:
+    """What a mission's vehicles report, on its way to team, journal and boundaries."""
+
+    def __init__(
+        self,
+        mission_id: str,
+        frame: LocalFrame,
+        team: Team,
+        header: MissionHeader,
+        journal: Journal,
+        ranges: RangeJournal,
+        boundaries: Boundaries,
+        waypoints: WaypointViews,
+        changed: asyncio.Event,
+    ) -> None:
+        self._mission_id = mission_id
+        self._frame = frame
+        self._team = team
+        self._header = header
+        self._journal = journal
+        self._ranges = ranges
+        self._boundaries = boundaries
+        self._waypoints = waypoints
+        self._changed = changed
+        self.leg_s: float | None = None
+        """How long a leg takes, running mean on the wall clock."""
+
+    def take(self, event: FleetEvent, spec: MissionSpec, *, running: bool) -> None:
+        """Take an event from one of the mission's vehicles; called from the event loop, never blocks.
+
+        ``running``: whether the mission's flight goes on in this process.
+        """
+        member = self._team.get(event.vehicle)
+        if member is None:
+            return
+        match event:
+            case VehicleReport():
+                place = local_place(self._frame, event.position)
+                if place is None:
+                    log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
+                    return
+                if running:
+                    self._count_way(member, event, place, spec)
+                self._count_energy(member, event, spec.surface_policy)
+                member.report, member.heard_s = event, now().timestamp()
+                self._journal.position(event)
+                self._hold_against_boundaries(event, place)
+                if spec.targets:
+                    self._ranges.times.heard(event.vehicle, event.time_s)
+            case SoundingReport():
+                self._journal.sounding(event)
+                return
+            case PingReport():
+                self._journal.ping(event)
+                return
+            case ScanReport():
+                self._journal.scan(event)
+                return
+            case RangeReport():
+                self._ranges.note(event, member.report.time_s if member.report else None)
+                return
+            case LinkReport():
+                member.link = event.state
+                if event.state in (LinkState.HEARD, LinkState.READY):
+                    # It can be reached but follows nothing of ours (any more): the loop engages it again.
+                    member.engaged = False
+            case RestartReport():
+                words = f"{event.vehicle}: {event.reason}"
+                line = self._journal.alarm_line(AlarmKind.VEHICLE_RESTARTED, words, vehicle=event.vehicle)
+                self._journal.note_line(line)
+            case WaypointReport():
+                self._receive_waypoint(member, event)
+        self._changed.set()
+
+    def _count_way(self, member: Member, report: VehicleReport, place: tuple[float, float], spec: MissionSpec) -> None:
+        """Add what a vehicle has flown since its last report, if that can have been."""
+        flown = member.flown
+        before = None if member.report is None else local_place(self._frame, member.report.position)
+        if member.report is None or before is None:
+            return
+        passed_s = report.time_s - member.report.time_s
+        if not 0.0 < passed_s <= LONGEST_GAP_S or math.dist(before, place) > FASTEST_MPS * passed_s:
+            return
+        leg = None
+        if member.ordered and member.leg_start_m is not None and member.target_m is not None:
+            leg = place_of(member.leg_start_m), place_of(member.target_m)
+        flown.add_way(before, place, leg)
+        way_left_m = member.way_left_m(spec)
+        flown.left_m = way_left_m + member.way_ahead_m(self._frame)
+        if not member.ordered and member.legs and way_left_m > 0.0:
+            flown.idle_s += passed_s
+        flown.phase = self._phase(member, way_left_m)
+
+    def _count_energy(self, member: Member, report: VehicleReport, policy: SurfacePolicy | None) -> None:
+        """Count what a vehicle has used since its last report."""
+        energy, before = member.energy, member.report
+        energy.take_level(report.battery_pct, report.battery_confidence_pct, report.energy_left_s)
+        if self._header.state not in AT_SEA:
+            energy.begin()
+            return
+        passed_s = 0.0 if before is None else report.time_s - before.time_s
+        if 0.0 < passed_s <= LONGEST_SILENCE_S:
+            energy.pass_time(passed_s, report.speed_mps)
+            _count_submersion(member, report.position.depth_m, passed_s, policy)
+        member.flown.used_s = energy.used_s
+
+    def _phase(self, member: Member, way_left_m: float) -> Phase:
+        if member.withdrawal is not None:
+            return phase_of(member.withdrawal)
+        if member.surfacing:
+            return Phase.SURFACING
+        if member.legs == 0 or self._boundaries.breach(member.name):
+            return Phase.TRANSIT
+        return Phase.SURVEY if member.ordered or member.ahead or way_left_m > 0.0 else Phase.STOPPED
+
+    def _hold_against_boundaries(self, report: VehicleReport, place: tuple[float, float]) -> None:
+        if self._header.state in ENDED:
+            return
+        member = self._team.get(report.vehicle)
+        on_its_way_home = member is not None and member.withdrawal is not None
+        for crossing in self._boundaries.judge(
+            report.vehicle,
+            place,
+            report.position.depth_m,
+            asyncio.get_running_loop().time(),
+            may_leave=on_its_way_home,
+        ):
+            journal, words, data = self._journal, crossing.message, crossing.data
+            if crossing.begins:
+                journal.note_line(journal.alarm_line(crossing.alarm, words, **data))
+            elif crossing.ends:
+                journal.note_line(journal.end_line([crossing.alarm], words, **data))
+            else:
+                journal.note_line(journal.line(Level.INFO, "boundary", words, **data))
+
+    def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
+        if event.mission_id != self._mission_id or member.order is None or event.step != member.order.step:
+            return
+        member.status = event.status
+        member.reason = event.reason
+        if event.status is WaypointStatus.REACHED:
+            member.misses = 0
+            took_s = asyncio.get_running_loop().time() - member.leg_began_s
+            before_s = took_s if self.leg_s is None else self.leg_s
+            self.leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
+        elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
+            member.misses += 1
+        self._journal.waypoint(event)
+        self._waypoints.take(event)
+
+
+def _count_submersion(member: Member, depth_m: float, passed_s: float, policy: SurfacePolicy | None) -> None:
+    """Count how long a vehicle has been under water, or up again; what counts as a fix the policy says."""
+    if depth_m > SURFACE_M:
+        member.surfaced_s = 0.0
+        member.submerged_s += passed_s
+        return
+    member.surfaced_s += passed_s
+    if policy is None or member.surfaced_s >= policy.stay_s:
+        member.submerged_s = 0.0
+
+
+def phase_of(withdrawal: Withdrawal) -> Phase:
+    """Return what a vehicle is at that does not survey any more."""
+    if withdrawal.response is Response.RETURN:
+        return Phase.HOME if withdrawal.over else Phase.RETURNING
+    return Phase.STOPPED if withdrawal.over or withdrawal.response is Response.HOLD else Phase.SURFACING
+
+
+def place_of(place_m: FloatArray) -> tuple[float, float]:
+    """Return an array (2,) as a pair."""
+    return float(place_m[0]), float(place_m[1])

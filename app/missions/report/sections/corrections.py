@@ -1,0 +1,104 @@
+"""What soundings were corrected by, and what was taken in from elsewhere."""
+
+from app.missions.report.document import Block, Facts, Paragraph, Table, Text
+from app.missions.report.writer import Writer
+
+
+def _adjustment(w: Writer) -> list[tuple[str, Text]]:
+    t, source = w.t, "adjustment"
+    facts: list[tuple[str, Text]] = [
+        (t("fact_adjustment"), w.moment(f"{source}.made_at")),
+        (t("fact_ties"), w.number(f"{source}.ties_used")),
+        (t("fact_fixes"), w.number(f"{source}.fixes")),
+    ]
+    if w.answers.at(f"{source}.after_m") is not None:
+        facts += [
+            (t("fact_ties_before"), w.number(f"{source}.before_m", 2, "m")),
+            (t("fact_ties_after"), w.number(f"{source}.after_m", 2, "m")),
+        ]
+    return facts
+
+
+def _offsets(w: Writer) -> Table:
+    """Return by how much the positions of each vehicle were changed."""
+    tracks = [f"adjustment.tracks.{index}" for index in range(len(w.answers.at("adjustment.tracks")))]
+    rows = [
+        [
+            w.string(f"{track}.vehicle"),
+            w.number(f"{track}.mean_m", 2, "m"),
+            w.number(f"{track}.max_m", 2, "m"),
+            w.number(f"{track}.sd_m", 2, "m"),
+        ]
+        for track in tracks
+    ]
+    columns = [w.t(f"column_{name}") for name in ("vehicle", "moved_mean", "moved_most", "sd")]
+    return Table(columns, rows, numbers=(1, 2, 3), caption=w.t("caption_offsets"))
+
+
+def corrections(w: Writer) -> list[Block]:
+    """Return water level, sound speed, systematic errors, the adjustment of tracks, and imports."""
+    t, answers = w.t, w.answers
+    tide = "corrections.tide"
+    facts: list[tuple[str, Text]] = []
+    if answers.at("corrections.tide_table") is not None:
+        table = "corrections.tide_table"
+        facts += [
+            (t("fact_tide_table"), w.string(f"{table}.name")),
+            (t("fact_tide_from"), w.moment(f"{table}.first")),
+            (t("fact_tide_until"), w.moment(f"{table}.last")),
+            (t("fact_tide_entries"), w.number(f"{table}.entries")),
+            (t("fact_tide_sha256"), w.string(f"{table}.sha256", mono=True)),
+        ]
+    else:
+        facts.append((t("fact_tide_level"), w.number(f"{tide}.level_m", 2, "m", signed=True)))
+    facts += [
+        (t("fact_tide_source"), w.string(f"{tide}.source")),
+        (t("fact_tide_sd"), w.number(f"{tide}.sd_m", 2, "m")),
+        (t("fact_datum"), w.string("corrections.vertical_datum")),
+        (t("fact_datum_offset"), w.number(f"{tide}.datum_offset_m", 2, "m", signed=True)),
+    ]
+    if answers.at("corrections.sound_speed") is None:
+        facts.append((t("fact_sound_speed"), t("sound_speed_none")))
+    else:
+        speed = "corrections.sound_speed"
+        profile = answers.at(f"{speed}.profile")
+        facts += [
+            (t("fact_sound_speed"), w.string(f"{speed}.source") if answers.at(f"{speed}.source") else t("profile")),
+            (t("fact_profile"), t("profile_of", count=t.number(len(profile)))),
+            (t("fact_profile_top"), w.number(f"{speed}.profile.0.1", 1, "m/s")),
+            (t("fact_profile_bottom"), w.number(f"{speed}.profile.{len(profile) - 1}.1", 1, "m/s")),
+            (t("fact_assumed"), w.number(f"{speed}.assumed_mps", 1, "m/s")),
+        ]
+    systematic = "corrections.systematic_errors"
+    for name, errors in answers.at(f"{systematic}.vehicles").items():
+        for key, digits, unit in (("depth_m", 3, "m"), ("roll_offset_deg", 2, "°"), ("sound_speed_mps", 1, "m/s")):
+            if errors[key]:
+                value = w.number(f"{systematic}.vehicles.{name}.{key}", digits, unit, signed=True)
+                facts.append((t(f"fact_{key}", vehicle=name), value))
+    if answers.at(f"{systematic}.water_level"):
+        facts.append((t("fact_residual"), t("residual", count=t.number(len(answers.at(f"{systematic}.water_level"))))))
+    facts += [
+        (t("fact_draught"), t("draught")),
+        (t("fact_waterline"), w.number("mission.spec.uncertainty.waterline_m", 3, "m")),
+        (t("fact_attitude"), t("attitude")),
+    ]
+    adjusted = bool(answers.at("adjustment.applied"))
+    facts += _adjustment(w) if adjusted else [(t("fact_adjustment"), t("adjustment_none"))]
+    blocks: list[Block] = [Facts(facts), Paragraph(t("raw_stays"))]
+    if adjusted:
+        blocks.append(_offsets(w))
+    imports = answers.at("imports")
+    if imports:
+        rows = [
+            [
+                w.string(f"imports.{index}.filename"),
+                w.string(f"imports.{index}.source"),
+                w.number(f"imports.{index}.taken"),
+                w.number(f"imports.{index}.median_sd_m", 2, "m"),
+                w.string(f"imports.{index}.sha256", mono=True),
+            ]
+            for index in range(len(imports))
+        ]
+        columns = [t(f"column_{name}") for name in ("file", "source", "taken", "median_sd", "sha256")]
+        blocks.append(Table(columns, rows, numbers=(2, 3), caption=t("caption_imports")))
+    return blocks

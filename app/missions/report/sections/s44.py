@@ -1,0 +1,49 @@
+"""What orders of S-44 the survey meets, and what it does not show."""
+
+from app.missions.report.document import Block, Paragraph, Points, Table, Text
+from app.missions.report.writer import Writer
+
+
+def s44(w: Writer) -> list[Block]:
+    """Return how much of the map meets each order of S-44, and what cannot be said."""
+    t, answers = w.t, w.answers
+    rows: list[list[Text]] = []
+    for index, one in enumerate(answers.at("quality.tvu")):
+        own = f"quality.tvu.{index}"
+        rows.append(
+            [
+                w.order(one["order"]),
+                w.number(f"{own}.cells_pct", 1, "%"),
+                w.number(f"{own}.sounded_pct", 1, "%"),
+                w.number(f"{own}.horizontal_pct", 1, "%"),
+            ]
+        )
+    columns = [t(f"column_{name}") for name in ("order", "tvu_cells", "tvu_sounded", "thu_cells")]
+    return [
+        Paragraph(t("s44_words")),
+        Table(columns, rows, (1, 2, 3), caption=t("caption_s44")),
+        Paragraph(t("cannot_be_said"), note=True),
+        Points(_not_said(w)),
+    ]
+
+
+def _not_said(w: Writer) -> list[Text]:
+    """Return what the survey does not show."""
+    t, answers = w.t, w.answers
+    said: list[Text] = [t("cannot_order"), t("cannot_features"), t("cannot_model")]
+    said.append(t("cannot_coverage_swath" if w.is_swath else "cannot_coverage_single"))
+    if all(one["horizontal_pct"] is None for one in answers.at("quality.tvu")):
+        said.append(t("cannot_horizontal"))
+    if not answers.snapshot.facts.spec.tide.is_applied and answers.at("corrections.tide_table") is None:
+        said.append(t("cannot_tide"))
+    if answers.at("corrections.sound_speed") is None:
+        said.append(t("cannot_sound_speed"))
+    if answers.at("crosslines.statistics") is None:
+        said.append(t("cannot_crossings"))
+    elif answers.at("crosslines.at_crosslines") is None:
+        said.append(t("cannot_crosslines"))
+    adjusted = w.answers.at("adjustment.applied")
+    said += [t("cannot_adjusted" if adjusted else "cannot_positions"), t("cannot_calibration")]
+    if answers.at("imports"):
+        said.append(t("cannot_imports"))
+    return said

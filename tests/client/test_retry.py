@@ -1,0 +1,68 @@
+import httpx
+import pytest
+
+from bathyfleet.client.problems import BusyError, ConflictError, UnreachableError
+from bathyfleet.client.retry import LONGEST_S, Attempts
+
+LOST = httpx.ReadError("lost")
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.s = 0.0
+
+    def __call__(self) -> float:
+        return self.s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def answer(status: int, **headers: str) -> httpx.Response:
+    return httpx.Response(status, headers=headers, request=httpx.Request("GET", "http://service/x"))
+
+
+def test_waits_grow_up_to_a_limit_and_end_with_patience(clock: Clock) -> None:
+    attempts = Attempts("x", 60.0, repeatable=True, now=clock)
+    waits: list[float] = []
+
+    def go_on() -> None:
+        while True:
+            waits.append(attempts.after_error(LOST))
+            clock.s += waits[-1]
+
+    with pytest.raises(UnreachableError, match="x: nobody answered in 60 s"):
+        go_on()
+    assert waits[:4] == [0.2, 0.4, 0.8, 1.6]
+    assert max(waits) == LONGEST_S
+    assert 60.0 - LONGEST_S < clock.s <= 60.0
+
+
+def test_an_answer_renews_patience(clock: Clock) -> None:
+    attempts = Attempts("x", 1.0, repeatable=True, now=clock)
+    for _ in range(20):
+        clock.s += attempts.after_error(LOST)
+        attempts.reached()
+        clock.s += 100.0
+    assert attempts.after_error(LOST) == 0.2
+
+
+def test_what_may_have_been_done_is_not_repeated(clock: Clock) -> None:
+    attempts = Attempts("POST /missions", 60.0, repeatable=False, now=clock)
+    assert attempts.after_error(httpx.ConnectError("refused")) == 0.2
+    with pytest.raises(UnreachableError, match="whether it was done has to be looked up"):
+        attempts.after_error(LOST)
+    assert attempts.after_answer(answer(503)) is None
+
+
+def test_the_service_says_how_long_to_wait(clock: Clock) -> None:
+    attempts = Attempts("x", 60.0, repeatable=True, now=clock)
+    assert attempts.after_answer(answer(503, **{"retry-after": "5"})) == 5.0
+    assert attempts.after_answer(answer(429, **{"retry-after": "soon"})) == 0.4
+    assert attempts.after_answer(answer(200)) is None
+    with pytest.raises(BusyError):
+        attempts.after_refusal(answer(429, **{"retry-after": "61"}))
+    with pytest.raises(ConflictError):
+        attempts.after_refusal(answer(409))

@@ -1,0 +1,105 @@
+"""E-mail and MQTT, against a real mail server and a real broker."""
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import aiomqtt
+import orjson
+import pytest
+
+from app.missions.alarm_kinds import AlarmKind
+from app.missions.alarm_settings import AlarmSettings
+from app.missions.views.alarms import DeliveryState
+from tests.support.missions.alarms import PASSWORD, Watch, broker, mail_server, make_certificate
+
+pytestmark = pytest.mark.filterwarnings("ignore:Session.login_data is deprecated")
+
+Keep = Callable[[AlarmSettings], Awaitable[Watch]]
+
+
+def by_mail(port: int, certificate: Path | None, **server: Any) -> AlarmSettings:
+    return AlarmSettings.model_validate(
+        {
+            "routes": [{"to": ["captain"]}],
+            "emails": [{"name": "captain", "to": ["captain@ship.example", "mate@ship.example"]}],
+            "smtp": {
+                "host": "127.0.0.1",
+                "port": port,
+                "user": "ship",
+                "password": PASSWORD,
+                "sender": "survey@ship.example",
+            }
+            | server,
+            "ca_file": certificate,
+        }
+    )
+
+
+async def test_an_email_goes_by_starttls_with_a_login(keep_watch: Keep, tmp_path: Path) -> None:
+    certificate = make_certificate(tmp_path)
+    with mail_server(certificate) as (box, port):
+        watch = await keep_watch(by_mail(port, certificate))
+        alarm = await watch.raise_alarm(AlarmKind.LEAK)
+        await watch.look()
+        [delivery] = (await watch.report(alarm)).deliveries
+        assert (delivery.state, delivery.error) == (DeliveryState.DELIVERED, "")
+        await watch.dispatcher.acknowledge(alarm.id, "Ana")
+        await watch.look()
+    first, second = box.mails
+    assert box.encrypted == [True, True]
+    assert str(first["Subject"]).startswith("[CRITICAL] a is lost: silent (")
+    assert first["To"] == "captain@ship.example, mate@ship.example"
+    assert first["Message-ID"] == f"<{delivery.id}@bathyfleet.invalid>"
+    assert "To do:     recover it where it comes up" in first.get_payload()
+    assert "acknowledged: a is lost" in second["Subject"]
+    assert "Acknowledged by Ana" in second.get_payload()
+
+
+async def test_no_email_goes_to_a_server_that_nobody_vouches_for_or_with_a_wrong_password(
+    keep_watch: Keep, tmp_path: Path
+) -> None:
+    certificate = make_certificate(tmp_path)
+    with mail_server(certificate) as (box, port):
+        for settings, why in (
+            (by_mail(port, None), "certificate verify failed"),
+            (by_mail(port, certificate, password="a wrong one"), "5.7.8"),  # noqa: S106
+        ):
+            watch = await keep_watch(settings)
+            alarm = await watch.raise_alarm(vehicle=why)
+            await watch.look()
+            [delivery] = (await watch.report(alarm)).deliveries
+            assert delivery.state is DeliveryState.WAITING
+            assert why in delivery.error
+            assert "a wrong one" not in delivery.error
+    assert box.mails == []
+
+
+async def test_mqtt_takes_it_at_least_once_and_no_broker_is_tried_again(keep_watch: Keep) -> None:
+    def by_broker(port: int) -> AlarmSettings:
+        return AlarmSettings.model_validate(
+            {
+                "routes": [{"to": ["wall"]}],
+                "topics": [{"name": "wall", "topic": "ship/alarms/{severity}/{kind}"}],
+                "mqtt": {"host": "127.0.0.1", "port": port, "tls": False},
+            }
+        )
+
+    async with broker() as port:
+        watch = await keep_watch(by_broker(port))
+        async with aiomqtt.Client("127.0.0.1", port) as screen:
+            await screen.subscribe("ship/alarms/#", qos=1)
+            alarm = await watch.raise_alarm(AlarmKind.LEAK)
+            await watch.look()
+            message = await anext(screen.messages)
+    [delivery] = (await watch.report(alarm)).deliveries
+    assert delivery.state is DeliveryState.DELIVERED
+    assert (str(message.topic), message.qos) == ("ship/alarms/critical/leak", 1)
+    content = orjson.loads(bytes(message.payload))
+    assert (content["type"], content["id"], content["data"]["id"]) == ("alarm.raised", delivery.id, alarm.id)
+
+    later = await watch.raise_alarm(AlarmKind.TOO_DEEP)
+    await watch.look()
+    [delivery] = (await watch.report(later)).deliveries
+    assert delivery.state is DeliveryState.WAITING
+    assert delivery.error

@@ -1,0 +1,1 @@
+"""What the tests of REST share: its operations, measurements as vehicles post them, a line that can be cut."""

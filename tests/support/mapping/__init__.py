@@ -1,0 +1,1 @@
+"""Files and tracks of soundings that tests make, and what other programs say of them."""

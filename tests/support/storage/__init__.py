@@ -1,0 +1,1 @@
+"""Databases for tests, and rows to fill them with."""
