@@ -10,7 +10,8 @@ from app.exploration.planner.base import PlannerBase
 from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m
 from app.missions.flight.legs.commit import STILL_M
 from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
-from app.missions.spec.mission import MissionSpec, VehicleSpec
+from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import Member
 
 LEAST_RADIUS_M = 0.5
