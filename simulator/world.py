@@ -230,9 +230,13 @@ class SimulatedVehicle:
     @property
     def position(self) -> LocalPosition:
         """Where it believes to be (depth comes from a pressure sensor and is true)."""
-        m = self.vehicle.motion
-        de, dn = self.navigation.error_m
-        return LocalPosition(m.east_m + de, m.north_m + dn, m.depth_m)
+        return LocalPosition(*self.en_m, self.vehicle.motion.depth_m)
+
+    @property
+    def en_m(self) -> tuple[float, float]:
+        """Where it believes to be, east and north: most steps ask for no more."""
+        m, (de, dn) = self.vehicle.motion, self.navigation.error_m
+        return m.east_m + de, m.north_m + dn
 
     @property
     def bottom_m(self) -> float:
@@ -269,8 +273,8 @@ class SimulatedVehicle:
 
     def _passed(self, target: SteeringTarget) -> bool:
         """Whether it is beyond its target, as seen from where it set out, and not too far to the side."""
-        here, (from_e, from_n) = self.position, self._set_out_m
-        off_e, off_n = here.east_m - target.east_m, here.north_m - target.north_m
+        (east, north), (from_e, from_n) = self.en_m, self._set_out_m
+        off_e, off_n = east - target.east_m, north - target.north_m
         beyond = off_e * (target.east_m - from_e) + off_n * (target.north_m - from_n) >= 0.0
         return beyond and math.hypot(off_e, off_n) <= self._pass_within_m
 
@@ -306,7 +310,7 @@ class SimulatedVehicle:
             raise ValueError(f"{self.name}: target {values} holds a value that is not finite")
         self._arrival_radius_m = arrival_radius_m
         self._pass_within_m = -1.0 if pass_within_m is None else pass_within_m
-        self._set_out_m = (self.position.east_m, self.position.north_m)
+        self._set_out_m = self.en_m
         self.vehicle.loiter_radius_m = loiter_radius_m or self.vehicle.limits.loiter_radius_m
         self.vehicle.goto(SteeringTarget(east_m, north_m, depth_m, speed_mps, by_altitude))
 
@@ -360,13 +364,10 @@ class SimulatedVehicle:
         self._touching = hit
         self.navigation.step(m.depth_m, STEP_S)
         target = vehicle.target
-        if (
-            target is not None
-            and vehicle.guidance is Guidance.GOTO
-            and self._arrival_radius_m > 0.0
-            and self.position.horizontal_distance_m(target.east_m, target.north_m) <= self._arrival_radius_m
-        ):
-            vehicle.loiter(vehicle.loiter_radius_m)
+        if target is not None and vehicle.guidance is Guidance.GOTO and self._arrival_radius_m > 0.0:
+            east, north = self.en_m
+            if math.hypot(east - target.east_m, north - target.north_m) <= self._arrival_radius_m:
+                vehicle.loiter(vehicle.loiter_radius_m)
         due = int((self._steps * STEP_S + 1e-9) / self.sonar.ping_period_s)
         if due > self._pings:
             self._pings = due

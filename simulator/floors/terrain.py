@@ -156,10 +156,16 @@ class Terrain:
             i -= 1
         u, v = x - j, y - i
         item, depth = self.z_m.item, 0.0
-        for row, wy in ((i, 1.0 - v), (i + 1, v)):
-            if wy > 0.0:
-                if u < 1.0:
-                    depth += (1.0 - u) * wy * item(row, j)
-                if u > 0.0:
-                    depth += u * wy * item(row, j + 1)
+        # A corner without weight must not spread its NaN.
+        if v < 1.0:
+            south = 1.0 - v
+            if u < 1.0:
+                depth += (1.0 - u) * south * item(i, j)
+            if u > 0.0:
+                depth += u * south * item(i, j + 1)
+        if v > 0.0:
+            if u < 1.0:
+                depth += (1.0 - u) * v * item(i + 1, j)
+            if u > 0.0:
+                depth += u * v * item(i + 1, j + 1)
         return depth

@@ -67,7 +67,7 @@ class _Craft:
 
     @property
     def place_m(self) -> FloatArray:
-        return np.array(_en(self.body))
+        return np.array(self.body.en_m)
 
     @property
     def last_end_m(self) -> FloatArray:
@@ -108,14 +108,14 @@ class _Craft:
 
     def advance(self, log: Log, relative_noise: float) -> None:
         """Live for a tick, sound, and go on with the next leg where one was reached."""
-        before = _en(self.body)
+        before = self.body.en_m
         for echo in self.body.advance(TICK_S):
             if echo.footprint is not None:
                 place = echo.footprint
                 log.add(place.east_m, place.north_m, place.depth_m, max(relative_noise * echo.range_m, LEAST_SD_M))
         if not self.ends:
             return
-        after = _en(self.body)
+        after = self.body.en_m
         if along_leg(before, after, self._leg):
             self.on_plan_m += math.hypot(after[0] - before[0], after[1] - before[1])
         if self.body.arrived:
@@ -265,11 +265,6 @@ def _track(crafts: list[_Craft], log: Log, plan_s: list[float]) -> SeaTrack:
         np.array(plan_s),
         not any(craft.ends for craft in crafts),
     )
-
-
-def _en(body: SimulatedVehicle) -> Place:
-    here = body.position
-    return here.east_m, here.north_m
 
 
 def _pair(place_m: FloatArray) -> Place:

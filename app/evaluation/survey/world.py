@@ -138,6 +138,8 @@ class Log:
     north_m: list[FloatArray] = field(default_factory=list)
     depth_m: list[FloatArray] = field(default_factory=list)
     sd_m: list[FloatArray] = field(default_factory=list)
+    single: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Soundings that came one by one since somebody asked for all of them, after those in the columns."""
 
     def sound(self, points: FloatArray, headings_rad: FloatArray | None = None) -> None:
         """Sound from vehicle positions (n, 3); there is no echo where the terrain is unknown.
@@ -161,10 +163,7 @@ class Log:
 
     def add(self, east_m: float, north_m: float, depth_m: float, sd_m: float) -> None:
         """Take in one sounding that a vehicle took by itself."""
-        for column, value in zip(
-            (self.east_m, self.north_m, self.depth_m, self.sd_m), (east_m, north_m, depth_m, sd_m), strict=True
-        ):
-            column.append(np.array([value]))
+        self.single.append((east_m, north_m, depth_m, sd_m))
 
     def _ping(self, beams: Multibeam, point: FloatArray, heading_rad: float) -> None:
         def floor(en_m: FloatArray) -> FloatArray:
@@ -180,6 +179,10 @@ class Log:
     def soundings(self) -> Soundings:
         """All of them."""
         columns = (self.east_m, self.north_m, self.depth_m, self.sd_m)
+        if self.single:
+            for column, values in zip(columns, np.array(self.single).T, strict=True):
+                column.append(values)
+            self.single.clear()
         for column in columns:
             column[:] = [np.concatenate(column)] if column else [np.zeros(0)]
         return Soundings(*(column[0] for column in columns))

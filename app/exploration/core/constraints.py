@@ -17,7 +17,7 @@ from shapely import Polygon
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import LEG_CHECKS, Bottom
-from app.exploration.core.geometry import convex, enters, leaves, signed_distance
+from app.exploration.core.geometry import boundary_distance, convex, enters, inside, leaves, signed_distance
 
 TOLERANCE_M = 1e-6
 
@@ -137,7 +137,7 @@ class Constraints:
         """Height above the sea floor below which vehicles never are."""
         return self.min_altitude_m if self.held_altitude_m is None else self.held_altitude_m
 
-    @property
+    @cached_property
     def region(self) -> Region:
         """Where vehicles may be."""
         area = np.ascontiguousarray(self.area, dtype=np.float64)
@@ -163,7 +163,6 @@ class Constraints:
         (n_candidates, n_vehicles, len(Limit))
             Metres; 0 where the limit is kept, inf for a leg across a forbidden zone.
         """
-        region = self.region
         floor = _Floor(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), bottom.depth_m)
         limits = _Limits(
             float(self.max_step_m),
@@ -176,8 +175,7 @@ class Constraints:
         )
         ends = np.ascontiguousarray(candidates, dtype=np.float64)
         excess = np.zeros((*ends.shape[:2], len(Limit)))
-        outside_now = np.empty((len(origin), len(region.starts)))
-        _excess(np.ascontiguousarray(origin, dtype=np.float64), ends, region, floor, limits, outside_now, excess)
+        _excess(np.ascontiguousarray(origin, dtype=np.float64), ends, self.region, floor, limits, excess)
         return excess
 
     def feasible(self, origin: FloatArray, candidates: FloatArray, bottom: Bottom | None = None) -> BoolArray:
@@ -271,26 +269,48 @@ class _Limits(NamedTuple):
     vertical_separation: float
 
 
-@njit(cache=True, nogil=True)
-def _region_excess(a: FloatArray, b: FloatArray, region: Region, outside_now: FloatArray, excess: FloatArray) -> None:
-    """Write what the leg a -> b breaks of area and zones; ``outside_now`` is how far ``a`` is outside each."""
-    outside = signed_distance(region.area, b[0], b[1])
-    if outside > 0.0:
-        excess[AREA] = outside
-    may_leave = outside_now[0] <= TOLERANCE_M and outside <= TOLERANCE_M and not region.area_is_convex
-    if may_leave and leaves(region.area, a[0], a[1], b[0], b[1], TOLERANCE_M):
-        excess[AREA_LEG] = np.inf
-    for z in range(len(region.starts) - 1):
-        zone = region.keep_out[region.starts[z] : region.starts[z + 1]]
-        within = -signed_distance(zone, b[0], b[1])
-        if within > excess[KEEP_OUT]:
-            excess[KEEP_OUT] = within
-        if outside_now[z + 1] >= -TOLERANCE_M and enters(zone, a[0], a[1], b[0], b[1], TOLERANCE_M):
-            excess[KEEP_OUT_LEG] = np.inf
+Point = tuple[float, float, float]
 
 
 @njit(cache=True, nogil=True)
-def _clearance(a: FloatArray, b: FloatArray, floor: _Floor) -> float:
+def _point(points: FloatArray, i: int) -> Point:
+    """Return a row of (n, 3) as numbers: every view of an array that is passed on is counted, which takes its time."""
+    return points[i, 0], points[i, 1], points[i, 2]
+
+
+@njit(cache=True, nogil=True)
+def _area_excess(origin: FloatArray, candidates: FloatArray, region: Region, excess: FloatArray) -> None:
+    """Write by how much the area is left."""
+    area = region.area
+    for i in range(len(origin)):
+        a = _point(origin, i)
+        may_leave = not region.area_is_convex and signed_distance(area, a[0], a[1]) <= TOLERANCE_M
+        for candidate in range(len(candidates)):
+            x, y = candidates[candidate, i, 0], candidates[candidate, i, 1]
+            outside = 0.0 if inside(area, x, y) else boundary_distance(area, x, y)
+            if outside > 0.0:
+                excess[candidate, i, AREA] = outside
+            if may_leave and outside <= TOLERANCE_M and leaves(area, a[0], a[1], x, y, TOLERANCE_M):
+                excess[candidate, i, AREA_LEG] = np.inf
+
+
+@njit(cache=True, nogil=True)
+def _zone_excess(origin: FloatArray, candidates: FloatArray, zone: FloatArray, excess: FloatArray) -> None:
+    """Write by how much a keep-out zone is entered, where that is more than is written for others."""
+    for i in range(len(origin)):
+        a = _point(origin, i)
+        may_enter = signed_distance(zone, a[0], a[1]) >= -TOLERANCE_M
+        for candidate in range(len(candidates)):
+            x, y = candidates[candidate, i, 0], candidates[candidate, i, 1]
+            if inside(zone, x, y):
+                row = excess[candidate, i]
+                row[KEEP_OUT] = max(row[KEEP_OUT], boundary_distance(zone, x, y))
+            if may_enter and enters(zone, a[0], a[1], x, y, TOLERANCE_M):
+                excess[candidate, i, KEEP_OUT_LEG] = np.inf
+
+
+@njit(cache=True, nogil=True)
+def _clearance(a: Point, b: Point, floor: _Floor) -> float:
     """Return the least height of the leg a -> b above the floor, inf where that is unknown."""
     least = np.inf
     for k in range(1, LEG_CHECKS + 1):
@@ -305,7 +325,7 @@ def _clearance(a: FloatArray, b: FloatArray, floor: _Floor) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _approach(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, limits: _Limits) -> float:
+def _approach(a: Point, b: Point, c: Point, d: Point, limits: _Limits) -> float:
     """Return how close vehicles that go a -> b and c -> d in the same time come, horizontally; inf above each other."""
     gap_now = a[2] - c[2]
     gap = b[2] - d[2]
@@ -332,22 +352,17 @@ def _excess(
     region: Region,
     floor: _Floor,
     limits: _Limits,
-    outside_now: FloatArray,
     excess: FloatArray,
 ) -> None:
-    """Write the excess of every candidate into ``excess``, zeros before; ``outside_now`` is scratch space."""
+    """Write the excess of every candidate into ``excess``, zeros before."""
     n = len(origin)
-    for i in range(n):
-        a = origin[i]
-        outside_now[i, 0] = signed_distance(region.area, a[0], a[1])
-        for z in range(len(region.starts) - 1):
-            zone = region.keep_out[region.starts[z] : region.starts[z + 1]]
-            outside_now[i, z + 1] = signed_distance(zone, a[0], a[1])
+    _area_excess(origin, candidates, region, excess)
+    for z in range(len(region.starts) - 1):
+        _zone_excess(origin, candidates, region.keep_out[region.starts[z] : region.starts[z + 1]], excess)
     for candidate in range(len(candidates)):
         ends = candidates[candidate]
         for i in range(n):
-            a, b, row = origin[i], ends[i], excess[candidate, i]
-            _region_excess(a, b, region, outside_now[i], row)
+            a, b, row = _point(origin, i), _point(ends, i), excess[candidate, i]
             step = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
             row[STEP] = max(0.0, step - limits.step)
             row[MIN_DEPTH] = max(0.0, limits.min_depth - b[2])
@@ -357,13 +372,13 @@ def _excess(
             for k in range(n):
                 if k == i:
                     continue
-                other = ends[k]
+                other = _point(ends, k)
                 nearest = min(
                     nearest, np.sqrt((b[0] - other[0]) ** 2 + (b[1] - other[1]) ** 2 + (b[2] - other[2]) ** 2)
                 )
                 if limits.separation > 0.0:
                     row[SEPARATION] = max(
-                        row[SEPARATION], limits.separation - _approach(a, b, origin[k], other, limits)
+                        row[SEPARATION], limits.separation - _approach(a, b, _point(origin, k), other, limits)
                     )
             if n > 1 and nearest > limits.com_range:
                 row[COM_RANGE] = nearest - limits.com_range
@@ -372,10 +387,10 @@ def _excess(
 def inside_area(constraints: Constraints, en_m: FloatArray) -> BoolArray:
     """Return which positions (n, 2) lie in the area and in no keep-out zone."""
     east, north = np.asarray(en_m, dtype=np.float64).T
-    inside: BoolArray = shapely.contains_xy(Polygon(constraints.area), east, north)
+    free: BoolArray = shapely.contains_xy(Polygon(constraints.area), east, north)
     for zone in constraints.keep_out:
-        inside &= ~shapely.contains_xy(Polygon(zone), east, north)
-    return inside
+        free &= ~shapely.contains_xy(Polygon(zone), east, north)
+    return free
 
 
 def warm_up() -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numba import njit
 from scipy import linalg, optimize
 from scipy.spatial import cKDTree
 
@@ -70,13 +71,30 @@ def scaled_distances(points: FloatArray, metric: FloatArray) -> tuple[FloatArray
     prefactor : (..., n, n)
         ``|A|^(1/4) |B|^(1/4) |(A + B) / 2|^(-1/2)``.
     """
-    one, other = points[..., :, None, :], points[..., None, :, :]
-    a, b = metric[..., :, None, :], metric[..., None, :, :]
-    dx, dy = one[..., 0] - other[..., 0], one[..., 1] - other[..., 1]
-    xx, xy, yy = (0.5 * (a[..., i] + b[..., i]) for i in range(3))
-    det = xx * yy - xy * xy
-    squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det
-    return np.sqrt(squared), a[..., 3] * b[..., 3] / np.sqrt(det)
+    shape = (*points.shape[:-1], points.shape[-2])
+    distance, prefactor = np.empty(shape), np.empty(shape)
+    n = points.shape[-2]
+    _scaled_distances(
+        points.reshape(-1, n, 2), metric.reshape(-1, n, 4), distance.reshape(-1, n, n), prefactor.reshape(-1, n, n)
+    )
+    return distance, prefactor
+
+
+@njit(cache=True, nogil=True)
+def _scaled_distances(points: FloatArray, metric: FloatArray, distance: FloatArray, prefactor: FloatArray) -> None:
+    """Write :func:`scaled_distances` for groups of points, (k, n, 2); quicker than whole arrays that numpy makes."""
+    for g in range(len(points)):
+        for i in range(points.shape[1]):
+            for j in range(i + 1):
+                dx = points[g, i, 0] - points[g, j, 0]
+                dy = points[g, i, 1] - points[g, j, 1]
+                xx = 0.5 * (metric[g, i, 0] + metric[g, j, 0])
+                xy = 0.5 * (metric[g, i, 1] + metric[g, j, 1])
+                yy = 0.5 * (metric[g, i, 2] + metric[g, j, 2])
+                det = xx * yy - xy * xy
+                squared = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det
+                distance[g, i, j] = distance[g, j, i] = np.sqrt(squared)
+                prefactor[g, i, j] = prefactor[g, j, i] = metric[g, i, 3] * metric[g, j, 3] / np.sqrt(det)
 
 
 class RestrictedLikelihood:

@@ -33,7 +33,6 @@ from app.missions.flight.team_steps import TeamSteps
 from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
 from app.missions.flight.way_home.onboard_way import OnboardWays
 from app.missions.flight.way_home.withdrawals import Withdrawals
-from app.missions.flown import Phase
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
 from app.missions.spec.recovery import Homecoming
@@ -85,8 +84,7 @@ class Runner:
     async def run(self) -> str:
         """Fly to the mission's end. Returns why nobody goes on; raises whatever went wrong."""
         live = self._live
-        live.running_since_s = asyncio.get_running_loop().time()
-        live.call_everybody_home()
+        live.flight_begins()
         metrics.RUNNING.inc()
         keepers = [
             asyncio.create_task(self._engagement.keep()),
@@ -112,10 +110,7 @@ class Runner:
             await asyncio.gather(*keepers, return_exceptions=True)
             await self._maps.end()
             await to_the_end(save_elapsed(live))
-            live.running_since_s = None
-            live.standstill = ""
-            for member in live.team:
-                member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
+            live.flight_ends()
 
     def _flight(self) -> OwnLegs | TeamSteps:
         shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)

@@ -18,6 +18,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetEvent
+from app.missions.flown import Phase
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
@@ -157,8 +158,7 @@ class LiveMission:
             self.waypoints,
             self.changed,
         )
-        self.measured_late: Callable[[], None] = _nothing
-        """Called when what was measured changes after the mission has ended."""
+        self._measured_late: Callable[[], None] = _nothing
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
         """Ships near the mission."""
         self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ships.message)
@@ -204,7 +204,7 @@ class LiveMission:
 
     def _note_late_change(self) -> None:
         if self.header.state in ENDED:
-            self.measured_late()
+            self._measured_late()
 
     @property
     def has_swath_sonars(self) -> bool:
@@ -216,6 +216,39 @@ class LiveMission:
     def running(self) -> bool:
         """Whether its flight goes on in this process."""
         return self.running_since_s is not None
+
+    def flight_begins(self) -> None:
+        """Note that its flight goes on in this process from now on."""
+        self.running_since_s = asyncio.get_running_loop().time()
+        self.call_everybody_home()
+
+    def count_elapsed(self, seconds: float) -> None:
+        """Count seconds of its flight that are stored now."""
+        if self.running_since_s is not None:
+            self.running_since_s += seconds
+        self.header.elapsed_s += seconds
+
+    def flight_ends(self) -> None:
+        """Note that nobody flies it here any more."""
+        self.running_since_s = None
+        self.standstill = ""
+        for member in self.team:
+            member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
+
+    def stand_still(self, why: str) -> None:
+        """Note why no vehicle may be sent anywhere; empty: at least one may again."""
+        self.standstill = why
+        if why:
+            self.publish_summary()
+
+    def survey_late_changes(self, survey: Callable[[], None]) -> None:
+        """Have this called when what was measured changes after the mission has ended."""
+        self._measured_late = survey
+
+    def end_as(self, ending: Ending) -> None:
+        """Call all vehicles home, and end so when they are there; the caller has stored that."""
+        self.ending = ending
+        self.call_everybody_home()
 
     def set_off(self) -> None:
         """Let the flight begin: it engages every vehicle anew."""

@@ -135,7 +135,7 @@ class MissionRegistry:
             self._left.pop(mission_id, None)
             self._maps.take_up(live)
             if self._ownership is not None:
-                live.measured_late = partial(self._maps.survey, live)
+                live.survey_late_changes(partial(self._maps.survey, live))
                 self._maps.survey(live)
             await self._taken_up(live)
             return live

@@ -180,8 +180,7 @@ class MissionSupervisor:
         # What a killed service forgets, nobody would bring home.
         async with live.database.writing() as session:
             await mission_queries.keep_ending(session, live.id, ending.remember())
-        live.ending = ending
-        live.call_everybody_home()
+        live.end_as(ending)
         words = f"everybody returns; {ending.state} then"
         await live.journal.log(Level.INFO, "recovery", words, actor=ending.actor, state=ending.state)
         if live.header.state is MissionState.PAUSED:

@@ -116,7 +116,7 @@ class Decider:
         if len(refusals) < len(decisions[0].legs) or not decisions[0].legs:
             self._told = {}
             if self._live.standstill:
-                self._live.standstill = ""
+                self._live.stand_still("")
                 await self._live.journal.end([AlarmKind.NO_WAYPOINT], "a vehicle can be sent on again")
             return decisions
         self.planner.restore(memory)
@@ -132,8 +132,7 @@ class Decider:
             message = f"no leg can be given to {words}; they stay where theirs end, and it is tried again"
             await live.journal.log(Level.WARNING, "waiting", message, vehicles=list(refusals))
             return
-        live.standstill = words
-        live.publish_summary()
+        live.stand_still(words)
         message = f"no vehicle can be sent anywhere: {words}; they stay, and the step does not count"
         await live.journal.alarm(AlarmKind.NO_WAYPOINT, message, vehicles=list(refusals))
 

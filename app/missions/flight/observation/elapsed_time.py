@@ -38,8 +38,7 @@ async def save_elapsed(live: LiveMission) -> None:
     except Exception as error:
         live.journal.storage.note(error)
         return
-    live.running_since_s += seconds
-    live.header.elapsed_s += seconds
+    live.count_elapsed(seconds)
 
 
 async def _tell_of_clock(live: LiveMission, by_s: float) -> None:
