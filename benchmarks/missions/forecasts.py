@@ -280,7 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     result["processor_s"] = round(time.process_time(), 1)
     result["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     print(json.dumps(result, indent=2))
-    title = "Forecasts, and what came"
+    title = f"Forecasts, and what came: {len(done)} missions from seed {options.first}"
     write_section(options.write, FLIGHT, title, result, seeds=seeds[: len(done)], hidden={options.terrains: "TERRAINS"})
 
 

@@ -5,12 +5,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import LinearNDInterpolator
 from scipy.ndimage import distance_transform_edt
+from scipy.spatial import Delaunay, cKDTree
 from shapely.geometry import Polygon
 
 from app.arrays import FloatArray
 from app.mapping.gaussian_process.fusion import prior_map
-from app.mapping.types import Soundings
+from app.mapping.types import Grid, Soundings
 from app.missions.maps.builder import make_grid
 from app.missions.spec.mission import MissionSpec
 from simulator.floors.seafloors import generate
@@ -39,11 +41,11 @@ as a share of the depth, and how much deeper it is than the usual guess where no
 DEPTH_SD = 0.4
 """Of the logarithm of a depth that is guessed."""
 
-USUAL_RELIEF = 0.1
-"""Between soundings a floor that is this high differs from their map as that map's deviation says."""
-
 CELLS = 2500
 """Cells of a forecast's map at most: more make it slower, hardly other."""
+
+FLOOR_CELLS = 40_000
+"""Cells of a floor at most: what is sounded of one with larger cells is smoother than the sea is."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ def forecast_cell_m(spec: MissionSpec) -> float:
     return float(max(spec.cell_m, np.sqrt(Polygon(spec.local_area()).area / CELLS)))
 
 
+def floor_cell_m(spec: MissionSpec) -> float:
+    """Return the side of the cells of the floors that are guessed."""
+    return float(max(spec.cell_m, np.sqrt(Polygon(spec.local_area()).area / FLOOR_CELLS)))
+
+
 def thinned(rows: FloatArray, side_m: float) -> FloatArray:
     """Return the last of the soundings (n, 4) in each square of this side."""
     squares = np.floor(rows[::-1, :2] / side_m).astype(np.int64)
@@ -74,7 +81,8 @@ def thinned(rows: FloatArray, side_m: float) -> FloatArray:
 def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: float | None) -> Iterator[Floor]:
     """Return floors of different roughness that may lie under a mission's area, made as they are asked for.
 
-    Where soundings are all are alike; the farther from them, the more they differ.
+    Where soundings are all are alike; the farther from them, the more they differ. Between soundings they are as rough
+    as the map of those has it: the next lines would know a smoother floor better than the real one.
 
     Parameters
     ----------
@@ -85,13 +93,14 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
     depth_m
         Depth of the guessed part; None: a guess, too.
     """
-    cell_m = forecast_cell_m(spec)
+    cell_m = floor_cell_m(spec)
     grid, mask = make_grid(spec.local_area(), cell_m)
     guess = max(LEAST_GUESS_M, deepest_m + spec.limits.min_altitude_m + ROOM_M)
-    known, doubt, share = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan), 0.0
+    known, doubt, share, between = np.full(mask.shape, np.nan), np.full(mask.shape, np.nan), 0.0, None
     if len(rows):
-        imported = prior_map(Soundings.of_rows(thinned(rows, 0.5 * cell_m)), grid, mask)
-        known, doubt = imported.depth_m, imported.sd_m
+        used = thinned(rows, 0.5 * forecast_cell_m(spec))
+        imported = prior_map(Soundings.of_rows(used), grid, mask)
+        known, doubt, between = imported.depth_m, imported.sd_m, Between(grid, used)
         share = float(np.mean(imported.prior[mask])) if imported.prior is not None else 0.0
     has = np.isfinite(known)
     usual_m = depth_m if depth_m is not None else float(np.median(known[has])) if has.any() else guess
@@ -106,14 +115,47 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
         unit = np.clip((shape - shape.mean()) / max(float(shape.std()), 1e-9), -3, 3)
         z = middle + relief * middle * unit
         words = f"{kind}, about {middle:.0f} m deep" + ("" if depth_m is not None else ", which is a guess")
-        if has.any():
+        if between is not None and has.any():
             # Outside of the area, and where no map reaches, it goes on from the nearest place that is known.
             near = tuple(distance_transform_edt(~has, return_distances=False, return_indices=True))
             inner, hills = z[: grid.rows, : grid.cols], unit[: grid.rows, : grid.cols]
             # Early maps of smooth floors doubt too much, those of rough ones do not: every other floor bounds it.
             most_m = relief * middle if number % 2 == 0 else math.inf
-            between_m = np.minimum(doubt * math.sqrt(relief / USUAL_RELIEF), most_m)
-            apart_m = np.where(has, between_m, relief * middle) * hills
-            inner[:] = known[near] + apart_m - np.where(has, 0.0, relief * middle * hills[near])
+            rough_m = np.minimum(doubt, most_m)
+            left = between(hills)
+            apart_m = left * math.sqrt(np.mean(rough_m[has] ** 2) / max(float(np.mean(left[has] ** 2)), 1e-12))
+            inner[:] = known[near] + np.where(has, apart_m, relief * middle * (hills - hills[near]))
             words = f"as soundings have it, in {100 * share:.0f} % of the cells, and {kind} between them"
         yield Floor(Terrain(np.maximum(z, 0.2), cell_m, name="forecast"), words, kind, share)
+
+
+class Between:
+    """Tells what of a relief does not show at places that were sounded.
+
+    Parameters
+    ----------
+    rows : (n, 4)
+        Soundings: east, north, depth, deviation.
+    """
+
+    def __init__(self, grid: Grid, rows: FloatArray) -> None:
+        self._grid = grid
+        south_west_m, sides_m = np.array([grid.west_m, grid.south_m]), grid.cell_m * np.array([grid.cols, grid.rows])
+        col, row = np.floor((rows[:, :2] - south_west_m) / grid.cell_m).astype(np.int64).T
+        inside = (row >= 0) & (row < grid.rows) & (col >= 0) & (col < grid.cols)
+        cells = np.unique(row[inside] * grid.cols + col[inside])
+        self._mesh: Delaunay | None = None
+        if not len(cells):
+            return
+        places = grid.centres_m[cells]
+        # Beyond the outermost ones it goes on as at the nearest.
+        corners = south_west_m + [(i * sides_m[0], j * sides_m[1]) for i in (-0.01, 1.01) for j in (-0.01, 1.01)]
+        self._cells = np.concatenate([cells, cells[cKDTree(places).query(corners)[1]]])
+        self._mesh = Delaunay(np.vstack([places, corners]))
+
+    def __call__(self, relief: FloatArray) -> FloatArray:
+        """Return a relief (rows, cols) less what lines straight from one sounding to the next have of it."""
+        if self._mesh is None:
+            return relief
+        straight = LinearNDInterpolator(self._mesh, relief.ravel()[self._cells])
+        return relief - np.asarray(straight(self._grid.centres_m), dtype=np.float64).reshape(relief.shape)

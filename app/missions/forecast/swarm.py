@@ -7,10 +7,11 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.planner.base import PlannerBase
-from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m, turn_radius_m
+from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m
 from app.missions.flight.legs.commit import STILL_M
 from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
 from app.missions.spec.mission import MissionSpec
+from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import Member
 
 LEAST_RADIUS_M = 0.5
@@ -19,6 +20,13 @@ STEP_M = 1.0
 """A vehicle's way is made of pieces that are at most so long,"""
 STEPS_OF_RADIUS = 4.0
 """and of so many on its turning circle's radius."""
+
+TURN_RADPS = 0.35
+"""How fast a vehicle turns that does not say how wide its circles are, as LAUVs do. Planners allow for wider ones."""
+
+TOO_CLOSE, LEFT_BEHIND = 0.98, 1.4
+"""A place that is nearer to the centre of a turning circle than the first share of its radius cannot be turned to: a
+vehicle goes straight on until it is as far away as the second one."""
 
 PASSED_WITHIN_M = 8.0
 """Who passes the end of its leg at most this far to the side has come there, as at sea."""
@@ -136,7 +144,7 @@ class Swarm:
     def __init__(self, spec: MissionSpec, members: list[Member], starts_m: FloatArray, first_step: int = 1) -> None:
         self._spec, self._members = spec, members
         self._speed_mps = np.array([spec.speed_of(member.spec) for member in members])
-        self._radius_m = np.array([max(turn_radius_m(spec, member.spec), LEAST_RADIUS_M) for member in members])
+        self._radius_m = np.array([circle_m(spec, member.spec) for member in members])
         n = len(members)
         self.here = np.column_stack([starts_m, np.zeros(n)])
         # Not everyone tells where it heads.
@@ -223,6 +231,12 @@ class Swarm:
         return np.column_stack([poses, np.full(len(poses), end[2])])
 
 
+def circle_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:
+    """Return the radius of the circles that a vehicle really turns in."""
+    stated_m = vehicle.turn_radius_m or spec.planner.options.turn_radius_m
+    return max(stated_m or spec.speed_of(vehicle) / TURN_RADPS, LEAST_RADIUS_M)
+
+
 def planner_of(spec: MissionSpec, so_far: SoFar) -> PlannerBase:
     """Return a mission's planner with what it had in mind, as far as it can read that."""
     planner = make_planner(spec)
@@ -258,10 +272,18 @@ def steered(
     poses = [(east, north, heading)]
     way_m, along_m = 0.0, 0.0
     off_east, off_north, off_m = to_east, to_north, away_m
+    leaving = False
     while off_m > arrival_m and not (along_m >= away_m and off_m <= PASSED_WITHIN_M) and way_m < most_m:
         piece_m = min(step_m, max(off_m - arrival_m, 0.01))
-        turn = math.remainder(math.atan2(off_east, off_north) - heading, math.tau)
-        heading += max(-piece_m / radius_m, min(turn, piece_m / radius_m))
+        aside_east, aside_north = radius_m * math.cos(heading), -radius_m * math.sin(heading)
+        to_centre_m = min(
+            math.hypot(off_east - aside_east, off_north - aside_north),
+            math.hypot(off_east + aside_east, off_north + aside_north),
+        )
+        leaving = to_centre_m < (LEFT_BEHIND if leaving else TOO_CLOSE) * radius_m
+        if not leaving:
+            turn = math.remainder(math.atan2(off_east, off_north) - heading, math.tau)
+            heading += max(-piece_m / radius_m, min(turn, piece_m / radius_m))
         east += piece_m * math.sin(heading)
         north += piece_m * math.cos(heading)
         way_m += piece_m

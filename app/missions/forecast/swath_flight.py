@@ -33,13 +33,8 @@ from app.missions.team import Member
 from simulator.floors.terrain import Terrain
 
 MOST_CELLS = 20_000
-"""Cells of such a forecast at most."""
-
-CELLS_OF_HALF = 5.0
-"""So many cells are half a swath over the shoaler parts of a floor."""
-
-SHOALER = 0.1
-"""Share of a floor that is shoaler than that."""
+"""Cells of such a forecast at most. What a survey ends with are a few of the mission's cells here and there: on larger
+ones nothing was missed."""
 
 BEAMS_A_CELL, REACHES = 4.0, 3
 """Beams and pings lie so close together, and where a beam meets the bottom is found in so many steps."""
@@ -57,20 +52,9 @@ def sweeps(spec: MissionSpec) -> bool:
     return spec.planner.name in COVERERS and any(swath_sonar(vehicle) is not None for vehicle in spec.vehicles)
 
 
-def swath_cell_m(spec: MissionSpec, members: list[Member], terrain: Terrain) -> float:
+def swath_cell_m(spec: MissionSpec) -> float:
     """Return the side of the cells that what is ensonified is counted on."""
-    shoal_m = float(np.nanquantile(terrain.z_m, SHOALER))
-    narrowest_m = math.inf
-    for member in members:
-        sonar = swath_sonar(member.spec)
-        if sonar is not None:
-            above_m = max(shoal_m - member.cruise_depth_m(spec.limits), spec.limits.min_altitude_m)
-            if math.isfinite(member.altitude_m):
-                above_m = min(above_m, max(member.altitude_m, spec.limits.min_altitude_m))
-            narrowest_m = min(narrowest_m, float(sonar.half_width_m(np.array([above_m]))[0]))
-    fewest_m = math.sqrt(Polygon(spec.local_area()).area / MOST_CELLS)
-    wish_m = narrowest_m / CELLS_OF_HALF if math.isfinite(narrowest_m) else 0.0
-    return max(spec.cell_m, fewest_m, wish_m)
+    return max(spec.cell_m, math.sqrt(Polygon(spec.local_area()).area / MOST_CELLS))
 
 
 @dataclass
@@ -110,7 +94,7 @@ class SwathFlight:
         so_far: SoFar,
     ) -> None:
         self._terrain, self._spec, self._members = floor.terrain, spec, members
-        cell_m = swath_cell_m(spec, members, floor.terrain)
+        cell_m = swath_cell_m(spec)
         self.builder = MapBuilder(spec.local_area(), cell_m, spec.accuracy_m, cell_of_depth=spec.coverage.cell_of_depth)
         self.builder.arrivals.replace(np.zeros((0, 4)), so_far.prior)
         if len(so_far.soundings):

@@ -20,6 +20,7 @@ from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from app.missions.team import CommittedLeg, Member, Team
+from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
 from tests.support.missions.harbour import act, sim_spec, until_state
 from tests.support.missions.specs import make_spec
@@ -171,6 +172,23 @@ def test_floors_are_guesses_of_different_roughness_that_agree_where_soundings_we
     assert east_end > 3 * west
     for one, again in zip(guessed, floors_under(spec, NONE), strict=True):
         np.testing.assert_array_equal(one.terrain.z_m, again.terrain.z_m)
+
+
+def test_between_lines_some_floors_are_as_rough_as_the_sounded_one_and_some_are_not() -> None:
+    spec = make_spec(100.0, cell_m=1.0)
+    relief = generate("rugged", 2, width_m=102.0, height_m=102.0, cell_m=1.0).z_m
+    real = Terrain(20.0 + 2.0 * (relief - relief.mean()) / relief.std(), 1.0)
+    north, east = (axis.ravel() for axis in np.meshgrid(np.arange(0.5, 100.0), np.arange(4.5, 100.0, 16.0)))
+    at = real.depth_at(east, north)
+    floors = floors_under(spec, np.column_stack([east, north, at, np.full_like(at, 0.05)]))
+
+    def roughness_m(floor: Terrain) -> float:
+        """Midway between the lines."""
+        north, east = np.meshgrid(np.arange(0.5, 99.0), np.arange(12.5, 90.0, 16.0))
+        return float(np.sqrt(np.mean(np.diff(floor.depth_at(east, north), axis=1) ** 2)))
+
+    rougher = sum(roughness_m(floor.terrain) > roughness_m(real) for floor in floors)
+    assert 3 <= rougher <= len(floors) - 3
 
 
 def team_of(spec: MissionSpec) -> list[Member]:
