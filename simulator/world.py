@@ -314,6 +314,12 @@ class SimulatedVehicle:
         self.vehicle.loiter_radius_m = loiter_radius_m or self.vehicle.limits.loiter_radius_m
         self.vehicle.goto(SteeringTarget(east_m, north_m, depth_m, speed_mps, by_altitude))
 
+    def float_at(self, east_m: float, north_m: float) -> None:
+        """Put it onto the surface somewhere, beside the terrain too."""
+        motion = self.vehicle.motion
+        motion.east_m, motion.north_m, motion.depth_m = east_m, north_m, 0.0
+        self._set_out_m = (east_m, north_m)
+
     def stop(self) -> None:
         """Motor off: the vehicle floats up."""
         self.vehicle.idle()

@@ -66,6 +66,26 @@ async def test_a_mission_begins_when_the_one_before_it_was_flown_to_its_end(serv
     assert await alarms(service, east) == []
 
 
+async def test_simulated_vehicles_go_on_from_where_the_mission_before_left_them(service: MissionService) -> None:
+    west, east = await two_blocks(service, "one", "two")
+    await act(service, west, "start")
+    await until_state(service, east, S.RUNNING)
+    ends = {v.name: v for v in (await view_of(service, west)).vehicles}
+    begins = {v.name: v for v in (await view_of(service, east)).vehicles}
+    assert begins.keys() == ends.keys() == {"one", "two"}
+    for name, end in ends.items():
+        begin = begins[name]
+        assert begin.lat_deg is not None
+        assert begin.lon_deg is not None
+        assert end.lat_deg is not None
+        assert end.lon_deg is not None
+        assert begin.lat_deg == pytest.approx(end.lat_deg, abs=1e-4), "ten metres"
+        assert begin.lon_deg == pytest.approx(end.lon_deg, abs=1e-4)
+        assert begin.battery_pct is not None
+        assert begin.battery_pct < 100.0
+    await until_state(service, east, S.FINISHED)
+
+
 async def test_three_missions_are_flown_in_their_order_also_across_a_restart(harbour: Harbour) -> None:
     west, east = await two_blocks(harbour.service)
     third = (await harbour.service.create(sim_spec(name="North", area=rectangle(0, 60, 30, 90), after=east))).id

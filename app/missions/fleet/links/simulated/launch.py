@@ -26,6 +26,15 @@ class Lookout:
 
 
 @dataclass(frozen=True)
+class LeftOff:
+    """Where a mission left a vehicle (latitude, longitude), and what its battery held."""
+
+    mission_id: str
+    place: tuple[float, float]
+    battery_pct: float
+
+
+@dataclass(frozen=True)
 class Launch:
     """Where and how a simulated vehicle comes into the world.
 
@@ -50,6 +59,8 @@ class Launch:
     lookout
         For a search: then it is a boat that can stop and turn on the spot.
     battery
+    left_off
+        Where the mission before left it, when it goes on from there.
     """
 
     vehicle: str
@@ -65,6 +76,7 @@ class Launch:
     ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
     lookout: Lookout | None = None
     battery: BatterySpec = BatterySpec()  # noqa: RUF009 - frozen
+    left_off: LeftOff | None = None
 
 
 def lay(settings: SimulationSettings, launch: Launch) -> Terrain:
