@@ -275,9 +275,16 @@ class SimFleetLink(FleetLink):
     def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
         if launch.start is not None:
             return terrain.frame.to_local(*launch.start)
-        there = sum(1 for s in self._deployed.values() if s.terrain.frame.definition == terrain.frame.definition)
+        # The first place along the southern border that nobody is near, or the one that is farthest from all.
         spacing = min(LAUNCH_SPACING_M, terrain.width_m / 4)
-        return LAUNCH_MARGIN_M + (there * spacing) % (terrain.width_m - LAUNCH_MARGIN_M), LAUNCH_MARGIN_M
+        places = np.arange(LAUNCH_MARGIN_M, terrain.width_m, spacing)
+        there = [
+            terrain.frame.to_local(at.lat_deg, at.lon_deg)
+            for at in (s.position(s.body.true_position) for s in self._deployed.values())
+        ]
+        away = [min((math.hypot(x - e, LAUNCH_MARGIN_M - n) for e, n in there), default=math.inf) for x in places]
+        free = np.flatnonzero(np.array(away) >= 0.99 * spacing)
+        return float(places[free[0] if len(free) else int(np.argmax(away))]), LAUNCH_MARGIN_M
 
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle that was launched."""

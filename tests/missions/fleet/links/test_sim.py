@@ -185,3 +185,14 @@ async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_
         )
     finally:
         await link.close()
+
+
+def test_who_joins_is_launched_where_nobody_is() -> None:
+    link = SimFleetLink(SimulationSettings(family="slope"), time_scale=1.0)
+    for name in ("one", "two", "three"):
+        link.launch(replace(launch(BatterySpec()), vehicle=name, start=None))
+    link.put_away("one")
+    link.launch(replace(launch(BatterySpec()), vehicle="four", start=None))
+    at = [link.true_position(name) for name in ("two", "three", "four")]
+    places = {(round(place.lat_deg, 6), round(place.lon_deg, 6)) for place in at}
+    assert len(places) == 3
