@@ -28,8 +28,8 @@ class FlownLine:
     path: FloatArray
     overlap: float
     begun: bool = False
-    entered: bool = True
-    """Whether the vehicle has come to its beginning, if it has begun."""
+    sent_from: tuple[float, float] | None = None
+    """Where the vehicle was when it was sent to the beginning of a line that is begun; None: it came there."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,16 @@ def recalled(kept: dict[str, Any]) -> Assignment:
             _path(course["path"]),
             float(course["overlap"]),
             bool(course["begun"]),
-            bool(course.get("entered", True)),
+            _place(course.get("sent_from")),
         ),
         _pieces(kept["expected"], kept.get("ends", [])),
         int(kept.get("refused", 0)),
         skipped=None if skipped is None else _path(skipped),
     )
+
+
+def _place(kept: Any) -> tuple[float, float] | None:
+    return None if kept is None else (float(kept[0]), float(kept[1]))
 
 
 @dataclass(frozen=True)

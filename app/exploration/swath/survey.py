@@ -178,9 +178,11 @@ class SwathSurvey:
         What lies behind it was not tried either.
         """
         course = sweep.course
-        if course is not None and course.begun and not course.entered:
-            if not len(course.path) or np.hypot(*(pose[:2] - course.path[0])) <= NEAR_M:
-                course.entered = True
+        if course is not None and course.begun and course.sent_from is not None:
+            sent_m = float(np.hypot(*(pose[:2] - course.sent_from)))
+            course.sent_from = None
+            # A place beside the beginning, where it may be, is as good.
+            if not len(course.path) or np.hypot(*(pose[:2] - course.path[0])) <= max(NEAR_M, sent_m):
                 return
             sweep.refused += 1
             if sweep.refused >= MOST_REFUSED:
@@ -240,7 +242,7 @@ class SwathSurvey:
             course.begun = True
             self._count(course.path, asked.flying, asked.coverage)
             if away_m > NEAR_M:
-                course.entered = False
+                course.sent_from = (float(here[0]), float(here[1]))
                 return np.asarray(course.path[0])
         vertices = course.path if np.allclose(course.path[0], here) else np.vstack([here, course.path])
         ahead_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
