@@ -163,7 +163,7 @@ async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: Mission
     before, other = a.legs, b.legs
     await until(lambda: b.legs > other + 3, "b goes on meanwhile")
     assert a.legs == before
-    assert await phase_of(service, mission, "a") is Phase.STOPPED
+    await until(lambda: a.flown.phase is Phase.STOPPED, "its next report is that of one that is held")
     await until(lambda: a.waits_m is not None, "it circles")
     circles = {v.name: v.waiting_circle for v in (await view_of(service, mission.id)).vehicles}
     assert circles["b"] is None
