@@ -41,7 +41,7 @@ class Solution:
         Of the normal matrix.
     ties
     log_evidence
-        Logarithm of how probable fixes and ties are by the drift model, less what is the same for all models.
+        Logarithm of how probable what was measured is by the drift model, less what is the same for all models.
     """
 
     offset_m: FloatArray
@@ -113,44 +113,41 @@ class LeastSquares:
 class ModelsOfDrift:
     """The same problem by several models of drift, of which nobody knows which one holds.
 
-    How fast positions drift is told by few fixes and by the ties. Deviations of the one model that fits best would be
-    too small: what several models give is averaged, weighed by how probable each is (Bayesian model averaging).
+    How fast positions drift is told by few fixes. Deviations of the one model that fits best would be too small: what
+    several models give is averaged, weighed by how probable fixes make each (Bayesian model averaging). Ties do not
+    weigh: their errors go together, and they count as a share of what they say, so that too little drift would do.
     """
 
     def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
         alike = model.alike()
         self._problems = [LeastSquares(nodes, fixes, one) for one, _ in alike]
         self._reckoned = [LeastSquares(nodes, Fixes.none(), one) for one, _ in alike]
-        self._log_prior = np.array([log_prior for _, log_prior in alike])
+        log = np.array([problem.solve(WeighedTies.none()).log_evidence for problem in self._problems])
+        log += np.array([log_prior for _, log_prior in alike])
+        chance = np.exp(log - log.max())
+        self._chance = chance / chance.sum()
 
     def typical(self) -> DriftModel:
         """Return the mean of the models, as probable as they are by fixes alone."""
         models = [problem.model for problem in self._problems]
-        chance = self._chances([problem.solve(WeighedTies.none()) for problem in self._problems])
         walk, rate, rate_time_s = (
-            float(np.exp(chance @ np.log([getattr(one, name) for one in models])))
+            float(np.exp(self._chance @ np.log([getattr(one, name) for one in models])))
             for name in ("walk_m", "rate_mph", "rate_time_s")
         )
         return replace(models[0], walk_m=walk, rate_mph=rate, rate_time_s=rate_time_s)
 
     def average(self, ties: WeighedTies) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return errors of nodes (m, 2) under ties, their deviations, and those by no fix or tie, over all models."""
-        solutions = [problem.solve(ties) for problem in self._problems]
-        chance = self._chances(solutions)
-        kept = np.flatnonzero(chance >= LEAST_SHARE * chance.max())
-        chance = chance[kept] / chance[kept].sum()
-        offsets = np.array([solutions[k].offset_m for k in kept])
-        deviations = np.array([self._problems[k].deviations(solutions[k]) for k in kept])
+        kept = np.flatnonzero(self._chance >= LEAST_SHARE * self._chance.max())
+        chance = self._chance[kept] / self._chance[kept].sum()
+        solutions = [self._problems[k].solve(ties) for k in kept]
+        offsets = np.array([one.offset_m for one in solutions])
+        deviations = np.array([self._problems[k].deviations(one) for k, one in zip(kept, solutions, strict=True)])
         mean = np.einsum("h,hmi->mi", chance, offsets)
         variance = np.einsum("h,hmi->mi", chance, deviations**2 + (offsets - mean) ** 2)
         before = [self._reckoned[k].deviations(self._reckoned[k].solve(WeighedTies.none())) for k in kept]
         before_variance = np.einsum("h,hmi->mi", chance, np.array(before) ** 2)
         return mean, np.sqrt(variance), np.sqrt(before_variance)
-
-    def _chances(self, solutions: list[Solution]) -> FloatArray:
-        log = np.array([one.log_evidence for one in solutions]) + self._log_prior
-        chance = np.exp(log - log.max())
-        return np.asarray(chance / chance.sum())
 
 
 def _of_both(matrix: sparse.csr_array) -> sparse.csc_array:
