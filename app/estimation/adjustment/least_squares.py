@@ -121,7 +121,7 @@ class ModelsOfDrift:
     def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
         alike = model.alike()
         self._problems = [LeastSquares(nodes, fixes, one) for one, _ in alike]
-        self._reckoned = [LeastSquares(nodes, Fixes.none(), one) for one, _ in alike]
+        self._nodes = nodes
         log = np.array([problem.solve(WeighedTies.none()).log_evidence for problem in self._problems])
         log += np.array([log_prior for _, log_prior in alike])
         chance = np.exp(log - log.max())
@@ -145,7 +145,8 @@ class ModelsOfDrift:
         deviations = np.array([self._problems[k].deviations(one) for k, one in zip(kept, solutions, strict=True)])
         mean = np.einsum("h,hmi->mi", chance, offsets)
         variance = np.einsum("h,hmi->mi", chance, deviations**2 + (offsets - mean) ** 2)
-        before = [self._reckoned[k].deviations(self._reckoned[k].solve(WeighedTies.none())) for k in kept]
+        reckoned = [LeastSquares(self._nodes, Fixes.none(), self._problems[k].model) for k in kept]
+        before = [problem.deviations(problem.solve(WeighedTies.none())) for problem in reckoned]
         before_variance = np.einsum("h,hmi->mi", chance, np.array(before) ** 2)
         return mean, np.sqrt(variance), np.sqrt(before_variance)
 
