@@ -1,10 +1,10 @@
 """Half a day over a large site: ``python -m benchmarks.missions.large_site [--planner cao --side 3000 --hours 12]``.
 
-The whole service flies ``--vehicles`` simulated vehicles in simulated time, which stands still while threads work: so
-figures do not depend on how busy the machine is. Told are the time from the start of the mission until a leg is sent
-(on the processor, and by the clock), what each decision, each map and each learning of its model took on the processor
-(50 %, 99 % and the most, and 99 % in the first and last quarter of the mission), and memory by the hour with its
-growth over the second half.
+The whole service flies ``--vehicles`` simulated vehicles in simulated time, which stands still while threads work, so
+that a busy machine changes nothing but figures by the clock. Told are the time from the start of the mission until a
+leg is sent (on the processor, and by the clock), what each decision, each map and each learning of its model took on
+the processor (50 %, 99 % and the most, and 99 % in the first and last quarter of the mission), and memory by the hour
+with its growth over the second half.
 """
 
 import argparse

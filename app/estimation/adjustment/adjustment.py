@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 
 from app.arrays import BoolArray, FloatArray
 from app.estimation.adjustment.drift import DriftModel, Nodes
-from app.estimation.adjustment.least_squares import LeastSquares, ModelsOfDrift, Solution, WeighedTies
+from app.estimation.adjustment.least_squares import DriftModels, LeastSquares, Solution, WeighedTies
 from app.estimation.adjustment.ties import Known, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
 
@@ -166,7 +166,7 @@ def adjusted(
     if not len(soundings):
         raise ValueError("there is no sounding along which a track could be adjusted")
     nodes = Nodes.along(soundings, fixes, node_s)
-    models = ModelsOfDrift(nodes, fixes, model or DriftModel())
+    models = DriftModels(nodes, fixes, model or DriftModel())
     problem = LeastSquares(nodes, fixes, models.typical())
     by_fixes = problem.solve(WeighedTies.none())
     weights = nodes.interpolation(soundings.vehicle, soundings.time_s)

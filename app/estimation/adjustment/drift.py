@@ -41,7 +41,7 @@ class DriftModel:
     rate_time_s: float = 600.0
     start_sd_m: float = 1.0
 
-    def alike(self) -> list[tuple["DriftModel", float]]:
+    def variants(self) -> list[tuple["DriftModel", float]]:
         """Return the models that may hold where this is what is usual, each with the logarithm of its probability.
 
         They drift by other factors and keep their rates for other times; all less one constant.

@@ -110,7 +110,7 @@ class LeastSquares:
         return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", covariances), 0.0)))
 
 
-class ModelsOfDrift:
+class DriftModels:
     """The same problem by several models of drift, of which nobody knows which one holds.
 
     How fast positions drift is told by few fixes. Deviations of the one model that fits best would be too small: what
@@ -119,11 +119,11 @@ class ModelsOfDrift:
     """
 
     def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
-        alike = model.alike()
-        self._problems = [LeastSquares(nodes, fixes, one) for one, _ in alike]
+        variants = model.variants()
+        self._problems = [LeastSquares(nodes, fixes, one) for one, _ in variants]
         self._nodes = nodes
         log = np.array([problem.solve(WeighedTies.none()).log_evidence for problem in self._problems])
-        log += np.array([log_prior for _, log_prior in alike])
+        log += np.array([log_prior for _, log_prior in variants])
         chance = np.exp(log - log.max())
         self._chance = chance / chance.sum()
 

@@ -71,13 +71,11 @@ def scaled_distances(points: FloatArray, metric: FloatArray) -> tuple[FloatArray
     prefactor : (..., n, n)
         ``|A|^(1/4) |B|^(1/4) |(A + B) / 2|^(-1/2)``.
     """
-    shape = (*points.shape[:-1], points.shape[-2])
-    distance, prefactor = np.empty(shape), np.empty(shape)
-    n = points.shape[-2]
-    _scaled_distances(
-        points.reshape(-1, n, 2), metric.reshape(-1, n, 4), distance.reshape(-1, n, n), prefactor.reshape(-1, n, n)
-    )
-    return distance, prefactor
+    n, groups = points.shape[-2], math.prod(points.shape[:-2])
+    distance, prefactor = np.empty((groups, n, n)), np.empty((groups, n, n))
+    _scaled_distances(points.reshape(groups, n, 2), metric.reshape(groups, n, 4), distance, prefactor)
+    shape = (*points.shape[:-1], n)
+    return distance.reshape(shape), prefactor.reshape(shape)
 
 
 @njit(cache=True, nogil=True)

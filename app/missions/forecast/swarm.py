@@ -13,6 +13,7 @@ from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import Member
+from simulator.vehicles.vehicle import LEFT_BEHIND, TOO_CLOSE, VehicleLimits
 
 LEAST_RADIUS_M = 0.5
 
@@ -20,13 +21,6 @@ STEP_M = 1.0
 """A vehicle's way is made of pieces that are at most so long,"""
 STEPS_OF_RADIUS = 4.0
 """and of so many on its turning circle's radius."""
-
-TURN_RADPS = 0.35
-"""How fast a vehicle turns that does not say how wide its circles are, as LAUVs do. Planners allow for wider ones."""
-
-TOO_CLOSE, LEFT_BEHIND = 0.98, 1.4
-"""A place that is nearer to the centre of a turning circle than the first share of its radius cannot be turned to: a
-vehicle goes straight on until it is as far away as the second one."""
 
 PASSED_WITHIN_M = 8.0
 """Who passes the end of its leg at most this far to the side has come there, as at sea."""
@@ -232,9 +226,9 @@ class Swarm:
 
 
 def circle_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:
-    """Return the radius of the circles that a vehicle really turns in."""
+    """Return the radius of the circles that a vehicle turns in: as stated, else a LAUV's; planners allow for more."""
     stated_m = vehicle.turn_radius_m or spec.planner.options.turn_radius_m
-    return max(stated_m or spec.speed_of(vehicle) / TURN_RADPS, LEAST_RADIUS_M)
+    return max(stated_m or spec.speed_of(vehicle) / VehicleLimits().turn_rate_radps, LEAST_RADIUS_M)
 
 
 def planner_of(spec: MissionSpec, so_far: SoFar) -> PlannerBase:

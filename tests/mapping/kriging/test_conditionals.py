@@ -29,6 +29,11 @@ def terms(kernel: KernelName, theta: FloatArray) -> tuple[float, FloatArray]:
     return conditional_terms(KERNEL_CODES[kernel], distance, prefactor, NOISE[members], DEPTH[members], theta)
 
 
+def test_nobody_is_at_no_distance() -> None:
+    distance, prefactor = scaled_distances(np.zeros((0, 2)), np.zeros((0, 4)))
+    assert distance.shape == prefactor.shape == (0, 0)
+
+
 def test_each_term_is_the_joint_density_over_that_of_the_neighbours() -> None:
     """By Bayes: log p(first | others) = log p(all) - log p(others), for the Matern 3/2 kernel."""
     chosen = families(cKDTree(POINTS), 30)

@@ -29,7 +29,7 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.simulated.launch import Launch, LeftOff, Lookout, lay, target_in
+from app.missions.fleet.links.simulated.launch import FinalState, Launch, Lookout, lay, target_in
 from app.missions.fleet.links.simulated.vehicle import DeployedVehicle, lived, ranges
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
@@ -98,7 +98,7 @@ class SimFleetLink(FleetLink):
         self._told_of_pace = False
         self._terrains: dict[tuple[float, float, float, float], Terrain] = {}
         self._deployed: dict[str, DeployedVehicle] = {}
-        self._left_off: dict[str, LeftOff] = {}
+        self._final_states: dict[str, FinalState] = {}
         self._sink: EventSink = lambda _event: None
         self._task: asyncio.Task[None] | None = None
         self._ending = threading.Event()
@@ -122,8 +122,8 @@ class SimFleetLink(FleetLink):
         """Launch a vehicle where its mission has it begin, or where the mission that this one follows left it."""
         vehicle, mission, world = deployment.vehicle, deployment.mission, deployment.world()
         frame, size = mission.frame(), mission.local_area().max(axis=0)
-        left = self._left_off.get(vehicle.name)
-        goes_on = left is not None and left.mission_id == mission.after and vehicle.start is None
+        final = self._final_states.get(vehicle.name)
+        goes_on = final is not None and final.mission_id == mission.after and vehicle.start is None
         launch = Launch(
             vehicle=vehicle.name,
             mission_id=deployment.mission_id,
@@ -148,7 +148,7 @@ class SimFleetLink(FleetLink):
                 nominal_mps=mission.speed_of(vehicle),
                 endurance_min=vehicle.endurance_min or self._battery.endurance_min,
             ),
-            left_off=left if goes_on else None,
+            goes_on_from=final if goes_on else None,
         )
         try:
             self.launch(launch)
@@ -160,8 +160,8 @@ class SimFleetLink(FleetLink):
         there = self._deployed.get(deployment.vehicle.name)
         if there is not None and there.mission_id == deployment.mission_id:
             at = there.position(there.body.true_position)
-            left = LeftOff(there.mission_id, (at.lat_deg, at.lon_deg), there.battery.level_pct)
-            self._left_off[deployment.vehicle.name] = left
+            final = FinalState(there.mission_id, (at.lat_deg, at.lon_deg), there.battery.level_pct)
+            self._final_states[deployment.vehicle.name] = final
             self.put_away(deployment.vehicle.name)
 
     def launch(self, launch: Launch) -> None:
@@ -202,9 +202,9 @@ class SimFleetLink(FleetLink):
             noise = np.random.default_rng([*seed, 2])
             scanning = Scanning(out.world, out.reach_m, out.resolution_deg, SCAN_NOISE_M, noise, started_s)
         deployed = DeployedVehicle(launch.mission_id, body, terrain, ranging, scanning)
-        if launch.left_off is not None:
-            body.float_at(*terrain.frame.to_local(*launch.left_off.place))
-            deployed.battery.recharge(launch.left_off.battery_pct)
+        if launch.goes_on_from is not None:
+            body.float_at(*terrain.frame.to_local(*launch.goes_on_from.place))
+            deployed.battery.recharge(launch.goes_on_from.battery_pct)
         deployed.make_report()
         self._deployed[launch.vehicle] = deployed
 

@@ -26,7 +26,7 @@ class Lookout:
 
 
 @dataclass(frozen=True)
-class LeftOff:
+class FinalState:
     """Where a mission left a vehicle (latitude, longitude), and what its battery held."""
 
     mission_id: str
@@ -59,7 +59,7 @@ class Launch:
     lookout
         For a search: then it is a boat that can stop and turn on the spot.
     battery
-    left_off
+    goes_on_from
         Where the mission before left it, when it goes on from there.
     """
 
@@ -76,7 +76,7 @@ class Launch:
     ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
     lookout: Lookout | None = None
     battery: BatterySpec = BatterySpec()  # noqa: RUF009 - frozen
-    left_off: LeftOff | None = None
+    goes_on_from: FinalState | None = None
 
 
 def lay(settings: SimulationSettings, launch: Launch) -> Terrain:
