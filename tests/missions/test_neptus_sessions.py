@@ -14,7 +14,7 @@ import pytest
 from app.missions.maps.builder import make_grid
 from app.missions.states import MissionState
 from app.missions.views.measurements.soundings import Verdict
-from imc_bridge.neptus import SessionRefusedError
+from imc_bridge.neptus import SessionRefusedError, protocol
 from tests.support.missions.harbour import act
 from tests.support.missions.stored_soundings import soundings_of
 from tests.support.neptus.gateway import COLS, ROWS, SESSION, Gateway
@@ -230,14 +230,15 @@ async def test_no_vehicle_is_sent_to_the_border(gateway: Gateway) -> None:
         assert min(away_m[inside:]) > NEAR_M - 0.5, "never back to it"
 
 
-async def test_of_too_many_samples_the_newest_are_taken(gateway: Gateway) -> None:
+async def test_of_too_many_samples_the_newest_are_taken(gateway: Gateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(protocol, "MAX_SAMPLES", 500)
     panel = gateway.real(floor_m, two())
-    old = [[21.0, 21.0, 1.0, 13.0]] * 50_000
+    old = [[21.0, 21.0, 1.0, 13.0]] * 500
     panel.samples = [*old, *([row, 20.0, 1.0, floor_m(row, 20.0)] for row in (18.0, 19.0, 20.0))]
     await fly(gateway, panel, 1)
     found = await soundings(gateway)
-    assert len([row for row, _ in found if row.source == "neptus DVL"]) == 50_000
-    assert any("3 beyond the newest 50000" in line for line in await gateway.log("neptus"))
+    assert len([row for row, _ in found if row.source == "neptus DVL"]) == 500
+    assert any("3 beyond the newest 500" in line for line in await gateway.log("neptus"))
 
 
 async def test_the_servers_log_does_not_grow_while_nothing_happens(
