@@ -90,7 +90,7 @@ def test_explore_under_limited_communication(terrain: Terrain) -> None:
 
 def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Terrain) -> None:
     result = call(
-        "survey", "--terrain", terrain, "--steps", "12", "--max-step", "8", "--sampling", "continuous", "--json"
+        "survey", "--terrain", terrain, "--steps", "6", "--max-step", "8", "--sampling", "continuous", "--json"
     )
     document = json.loads(result.stdout)
     for part in (document, document["usual_practice"], document["coverage"], document["even"], document["oracle"]):
