@@ -197,8 +197,8 @@ export const cursor = signal<LngLat | null>(null);
 export const mapCentre = signal<LngLat>([-8.7044, 41.1854]);
 /** What the map is to go to next; taken back when it has. */
 export const destination = signal<Bounds | null>(null);
-/** A place that was typed to go to; null: none is marked. */
-export const marked = signal<LngLat | null>(null);
+/** A place that was asked for, with its name if it has one; null: none is marked. */
+export const marked = signal<{ at: LngLat; name?: string } | null>(null);
 /** Whether a place to go to is being asked for. */
 export const goingTo = signal(false);
 export const in3d = signal(false);

@@ -214,9 +214,9 @@ function pointedOut(): PlaceMark[] {
     ...(asked
       ? [
           {
-            words: place(asked, coordinateFormat.value),
+            words: asked.name ?? place(asked.at, coordinateFormat.value),
             sign: "position" as const,
-            at: asked,
+            at: asked.at,
             radius_m: 0,
           },
         ]
