@@ -214,8 +214,11 @@ export interface DraftShapes {
   /** Places of a search, and where vehicles come home to. */
   marks: readonly PlaceMark[];
 }
-/** What the mission that is being described would begin with, block by block; `old` while something else is described by now. */
-export const planned = signal<{ plans: readonly PlanView[]; old: boolean } | null>(null);
+/**
+ * What the mission that is being described would begin with, block by block: the first `fresh` as it is described now, the
+ * others as it was before.
+ */
+export const planned = signal<{ plans: readonly PlanView[]; fresh: number } | null>(null);
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);
