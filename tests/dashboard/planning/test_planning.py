@@ -159,8 +159,20 @@ def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Wa
     by_id(page, "block-3").click()
     expect(by_id(page, "block-3")).to_have_attribute("aria-pressed", "true")
     expect(by_id(page, "editing")).to_have_attribute("data-ready", "true")
+    # Each block has its own vehicles' figures, the marked one unfolded; all of them are one way and one battery.
+    expect(by_id(page, "of-block-3")).to_have_attribute("open", "")
+    expect(by_id(page, "block-3-share-sim-1")).to_contain_text(re.compile(r"\d+ m"))
+    expect(by_id(page, "block-1-share-sim-1")).to_be_hidden()
+    expect(by_id(page, "share-sim-1")).to_contain_text(re.compile(r"\d+ m"))
+    page.get_by_text("Single vehicles: speed, endurance").click()
+    by_id(page, "endurance_min-sim-2").fill("1")
+    expect(by_id(page, "share-sim-2")).to_contain_text(
+        re.compile(r"turns back after .*▲ \d+ % of its endurance")
+    )
+    expect(by_id(page, "block-3-share-sim-2")).to_contain_text(re.compile(r"▲ .*left then"))
     picture(page, "blocks-wide")
     assert violations(page) == []
+    by_id(page, "endurance_min-sim-2").fill("")
     page.set_viewport_size({"width": 390, "height": 844})
     by_id(page, "blocks").scroll_into_view_if_needed()
     picture(page, "blocks-phone")

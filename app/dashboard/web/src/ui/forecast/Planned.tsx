@@ -90,8 +90,8 @@ export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
       ) : null}
       {several ? (
         <>
-          <h4>{say("blocks.inAll")}</h4>
           <Team
+            caption={say("blocks.inAll")}
             shares={shares.map((share) => ({ ...share, metres: 0 }))}
             partsOf={(name) => (plans.length < names.length ? [] : plans.flatMap(partsOf(name)))}
             unplanned={say("planned.notYet")}
@@ -220,13 +220,15 @@ interface TeamProps {
   id?: string;
   /** Whether its energy is what other blocks left. */
   later?: boolean;
+  caption?: string;
   /** Instead of the most that it may fly, while there is no plan. */
   unplanned?: string;
 }
 
-function Team({ shares, partsOf, id = "", later = false, unplanned }: TeamProps) {
+function Team({ shares, partsOf, id = "", later = false, caption, unplanned }: TeamProps) {
   return (
     <table class="shares" data-testid={`${id}shares`}>
+      {caption ? <caption>{caption}</caption> : null}
       <thead>
         <tr>
           {titles().map((title) => (
