@@ -102,7 +102,7 @@ function InAll({ found, names, waiting }: InAllProps) {
   return (
     <>
       <h3>{say("forecast.forecastNotMeasured")}</h3>
-      <table class="shares" data-testid="forecast-in-blocks">
+      <table class="shares in-blocks" data-testid="forecast-in-blocks">
         <thead>
           <tr>
             <th scope="col">{say("blocks.blocks")}</th>
