@@ -13,6 +13,8 @@ from tests.support.dashboard.steps import by_id, click_round, expect_state, pict
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
+FORECAST_MS = 240_000
+
 
 def named(service: Service, name: str) -> list[str]:
     return [one["id"] for one in service.get("/missions") if one["name"] == name]
@@ -190,6 +192,29 @@ def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Wa
     expect(by_id(page, "abort")).to_be_visible()
     assert service.get(f"/missions/{west}")["state"] == "finished"
     assert watched.complaints == []
+
+
+def test_every_block_is_forecast_over_a_bottom_as_deep_as_is_typed(page: Page) -> None:
+    depths: list[str] = []
+    page.on("request", lambda asked: depths.append(asked.url.partition("?")[2]) if "/forecast" in asked.url else None)
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-steps").fill("2")
+    expect(by_id(page, "field-floor_depth_m")).to_have_attribute("placeholder", "a guess")
+    by_id(page, "another-block").click()
+    by_id(page, "field-floor_depth_m").fill("-3")
+    # What no depth can be is asked of nobody.
+    expect(by_id(page, "ask-forecast")).to_have_count(0)
+    by_id(page, "field-floor_depth_m").fill("12.5")
+    expect(by_id(page, "planned")).to_have_attribute("data-plan", "new")
+    by_id(page, "ask-forecast").click()
+    expect(by_id(page, "forecast")).to_contain_text("1 of 2")
+    expect(by_id(page, "forecast-block-1")).to_contain_text(re.compile(r"\d+ s"), timeout=FORECAST_MS)
+    expect(by_id(page, "forecast-in-all")).to_contain_text("not computed yet")
+    expect(by_id(page, "forecast-in-all")).to_contain_text(re.compile(r"\d+ s"), timeout=FORECAST_MS)
+    assert depths == ["floor_depth_m=12.5"] * 2
+    picture(page, "blocks-forecast")
+    assert violations(page) == []
 
 
 def test_who_finishes_a_block_early_is_told_that_the_next_does_not_begin(page: Page, service: Service) -> None:
