@@ -168,9 +168,7 @@ def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Wa
     expect(by_id(page, "share-sim-1")).to_contain_text(re.compile(r"\d+ m"))
     page.get_by_text("Single vehicles: speed, endurance").click()
     by_id(page, "endurance_min-sim-2").fill("1")
-    expect(by_id(page, "share-sim-2")).to_contain_text(
-        re.compile(r"turns back after .*▲ \d+ % of its endurance")
-    )
+    expect(by_id(page, "share-sim-2")).to_contain_text(re.compile(r"turns back after .*▲ \d+ % of its endurance"))
     expect(by_id(page, "block-3-share-sim-2")).to_contain_text(re.compile(r"▲ .*left then"))
     picture(page, "blocks-wide")
     assert violations(page) == []

@@ -77,7 +77,9 @@ interface PlannedProps {
 
 /** What each vehicle does by the plan, or at most while there is none, beside the energy that it has. */
 export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
-  const { plans, fresh } = planned.value ?? { plans: [], fresh: 0 };
+  const { plans: all, fresh } = planned.value ?? { plans: [], fresh: 0 };
+  // What is answered late may be of more blocks than there are now.
+  const plans = all.slice(0, names.length);
   const state = plans.length === 0 ? "none" : fresh < names.length ? "old" : "new";
   const several = names.length > 1;
   const [only] = plans;
@@ -92,9 +94,10 @@ export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
         <>
           <Team
             caption={say("blocks.inAll")}
+            old={state === "old"}
             shares={shares.map((share) => ({ ...share, metres: 0 }))}
             partsOf={(name) => (plans.length < names.length ? [] : plans.flatMap(partsOf(name)))}
-            unplanned={say("planned.notYet")}
+            unplanned={fault ? "–" : say("planned.notYet")}
           />
           {plans.map((plan, i) => (
             <details
@@ -221,13 +224,15 @@ interface TeamProps {
   /** Whether its energy is what other blocks left. */
   later?: boolean;
   caption?: string;
+  /** Whether it is of what was described before. */
+  old?: boolean;
   /** Instead of the most that it may fly, while there is no plan. */
   unplanned?: string;
 }
 
-function Team({ shares, partsOf, id = "", later = false, caption, unplanned }: TeamProps) {
+function Team({ shares, partsOf, id = "", later = false, caption, old, unplanned }: TeamProps) {
   return (
-    <table class="shares" data-testid={`${id}shares`}>
+    <table class={old ? "shares old" : "shares"} data-testid={`${id}shares`}>
       {caption ? <caption>{caption}</caption> : null}
       <thead>
         <tr>
