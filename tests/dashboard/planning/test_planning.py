@@ -193,8 +193,8 @@ def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Wa
 
 
 def test_every_block_is_forecast_over_a_bottom_as_deep_as_is_typed(page: Page) -> None:
-    depths: list[str] = []
-    page.on("request", lambda asked: depths.append(asked.url.partition("?")[2]) if "/forecast" in asked.url else None)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
     page.goto("/")
     by_id(page, "new-mission").click()
     by_id(page, "field-steps").fill("2")
@@ -210,7 +210,8 @@ def test_every_block_is_forecast_over_a_bottom_as_deep_as_is_typed(page: Page) -
     expect(by_id(page, "forecast-block-1")).to_contain_text(re.compile(r"\d+ s"), timeout=FORECAST_MS)
     expect(by_id(page, "forecast-in-all")).to_contain_text("not computed yet")
     expect(by_id(page, "forecast-in-all")).to_contain_text(re.compile(r"\d+ s"), timeout=FORECAST_MS)
-    assert depths == ["floor_depth_m=12.5"] * 2
+    forecasts = [url for url in asked if "/forecast" in url]
+    assert [url.partition("?")[2] for url in forecasts] == ["floor_depth_m=12.5"] * 2
     picture(page, "blocks-forecast")
     assert violations(page) == []
 
