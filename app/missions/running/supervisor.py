@@ -20,6 +20,7 @@ from app.missions.live.journals.journal import ENDS, add_lines
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
 from app.missions.running.final_maps import FinalMaps
+from app.missions.settings import ServiceSettings
 from app.missions.states import ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
@@ -52,16 +53,14 @@ class MissionSupervisor:
         executor: Executor,
         maps: FinalMaps,
         compilation: Compilation,
-        time_scale: float,
-        map_pause_s: float,
+        settings: ServiceSettings,
     ) -> None:
         self._hub = hub
         self._claims = claims
         self._executor = executor
         self._maps = maps
         self._compilation = compilation
-        self._time_scale = time_scale
-        self._map_pause_s = map_pause_s
+        self._settings = settings
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self._ending: dict[str, asyncio.Task[list[StopReceipt]]] = {}
@@ -84,8 +83,8 @@ class MissionSupervisor:
 
         def fly() -> Awaitable[str]:
             # Made where its failure ends this mission alone: its planner may be gone since the mission was begun.
-            ready = self._compilation.maps
-            return Runner(live, self._hub, self._executor, self._time_scale, self._map_pause_s, ready).run()
+            scale, pause_s = self._settings.time_scale, self._settings.compute.map_pause_s
+            return Runner(live, self._hub, self._executor, scale, pause_s, self._compilation.maps).run()
 
         self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
 
