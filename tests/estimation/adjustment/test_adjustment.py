@@ -177,3 +177,23 @@ def share_within(times_usual: float) -> float:
         left = error.reshape(-1, 2) - inner @ found.offset_m
         within.append(np.mean(np.abs(left) <= 1.96 * (inner @ found.sd_m)))
     return float(np.mean(within))
+
+
+@settings(max_examples=10, deadline=None)
+@given(scale=st.floats(-0.005, 0.005), heading_rad=st.floats(-0.03, 0.03), course_rad=st.floats(-3.1, 3.1))
+def test_a_wrong_heading_or_scale_seen_by_fixes_is_taken_out_of_the_whole_dive(
+    scale: float, heading_rad: float, course_rad: float
+) -> None:
+    """What a vehicle is off by grows on its way out and goes on the way back, whichever way it goes."""
+    time_s = np.arange(0.0, 801.0, 5.0)
+    way = np.array([1.0, 0.2j]) @ np.array([100.0 - np.abs(time_s % 400.0 - 200.0) / 2.0, time_s / 8.0])
+    way = way * np.exp(1.0j * course_rad)
+    error = (way - way[0]) * complex(scale, heading_rad)
+    n = len(time_s)
+    of, level = np.zeros(n, np.int64), np.zeros(n)
+    soundings = TrackSoundings(of, time_s, way.real, way.imag, level + 5.0, level + 0.1)
+    at = np.searchsorted(time_s, [0.0, 200.0])
+    fixes = Fixes(of[:2], time_s[at], error[at].real, error[at].imag, np.full(2, 1e-3), np.array([True, False]))
+    still = DriftModel(walk_m=1e-2, rate_mph=1e-2)
+    left = adjusted(soundings, fixes, still).at(0, time_s) @ (1.0, 1.0j) - error
+    assert np.abs(left).max() < 0.05
