@@ -40,9 +40,9 @@ class DriftModel:
     start_sd_m
         Standard deviation of the error at the begin of a dive.
     scale_sd
-        Standard deviation of the share of the way that it is off by along it. Doppler logs are told to have 0.2 to 0.4 %.
+        Standard deviation of the share of the way that it is off by along it; Doppler logs have 0.2 to 0.4 % of it.
     heading_sd_rad
-        The same across, by a wrong heading. Compasses on vehicles are told to have 0.5 to 1 degree.
+        The same across, by a wrong heading; compasses on vehicles are off by 0.5 to 1 degree.
     """
 
     walk_m: float = 3.0
@@ -146,7 +146,9 @@ class Nodes:
 def _places(soundings: TrackSoundings, vehicle: int, time_s: FloatArray) -> FloatArray:
     """Return where a vehicle was at the nodes of a dive (n,), (n, 2): amid what it sounded then, else between that."""
     begin = time_s[0]
-    own = soundings.take((soundings.vehicle == vehicle) & (soundings.time_s >= begin) & (soundings.time_s <= time_s[-1]))
+    own = soundings.take(
+        (soundings.vehicle == vehicle) & (soundings.time_s >= begin) & (soundings.time_s <= time_s[-1])
+    )
     if not len(own):
         return np.zeros((len(time_s), 2))
     piece = np.floor((own.time_s - begin) / PLACE_S).astype(np.int64)
