@@ -183,8 +183,8 @@ def prior_rows(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.cs
         for column, value in entries:
             rows.append(count + np.arange(n))
             cols.append(column)
-            values.append(value / sd + 0j)
-        right.append(to / sd + 0j)
+            values.append(np.asarray(value / sd, dtype=np.complex128))
+        right.append(np.asarray(to / sd, dtype=np.complex128))
         count += n
 
     joined = np.flatnonzero(np.diff(nodes.dive) == 0)
