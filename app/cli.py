@@ -368,7 +368,15 @@ def _show_diagnosis(diagnosis: "Diagnosis", ships: Sequence["TrafficFinding"] = 
 
 @app.command()
 def demo(
-    speed: Annotated[float, typer.Option(min=0.1, max=200, help="How much faster than real time.")] = 10.0,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1,
+            max=200,
+            help="How much faster than real time [default: 10, less on a slow or busy machine]",
+            show_default=False,
+        ),
+    ] = None,
     terrain: Annotated[
         Path | None,
         typer.Option(
@@ -414,16 +422,16 @@ def demo(
     given = [option for option, value in lengths.items() if value is not None]
     if len(given) > 1:
         raise CommandError(f"{' and '.join(given)} are given", "a mission has one length: leave out all but one")
+    if search is not None and given:
+        raise CommandError(f"{given[0]}: a search is as long as its time window", "give --window in seconds")
     if search is not None:
-        if given:
-            raise CommandError(f"{given[0]}: a search is as long as its time window", "give --window in seconds")
         raise typer.Exit(_search_demo(search, vehicles, window, speed, seed, port, output, keep_serving=keep_serving))
     options = DemoOptions(
         vehicles=vehicles,
         steps=steps if given else 60,
         minutes=minutes,
         km=km,
-        speed=speed,
+        speed=_demo_speed(speed),
         terrain=terrain,
         seed=seed,
         port=port,
@@ -437,8 +445,26 @@ def demo(
     raise typer.Exit(code)
 
 
+def _demo_speed(asked: float | None) -> float:
+    """Return how much faster than real time a demonstration runs: as asked for, or as this machine can."""
+    from app.demo.pace import FASTEST, kept_speed
+
+    speed = kept_speed() if asked is None else asked
+    if asked is None and speed < FASTEST:
+        typer.echo(f"This machine is slow or busy: vehicles live {speed:g} times as fast as the clock (--speed).")
+    return speed
+
+
 def _search_demo(
-    site: str, vehicles: int, window_s: float, speed: float, seed: int, port: int, output: Path, *, keep_serving: bool
+    site: str,
+    vehicles: int,
+    window_s: float,
+    speed: float | None,
+    seed: int,
+    port: int,
+    output: Path,
+    *,
+    keep_serving: bool,
 ) -> int:
     from app.demo.search import SearchDemoOptions, run_search_demo
     from app.demo.service import DemoError
@@ -446,7 +472,7 @@ def _search_demo(
 
     if site not in SITES:
         raise CommandError(f"--search: there is no {site!r}", f"choose one of {', '.join(SITES)}")
-    options = SearchDemoOptions(site, vehicles, window_s, speed, seed, port, keep_serving, output)
+    options = SearchDemoOptions(site, vehicles, window_s, _demo_speed(speed), seed, port, keep_serving, output)
     try:
         return run_search_demo(options)
     except DemoError as error:

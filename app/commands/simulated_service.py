@@ -15,6 +15,9 @@ Came = TypeVar("Came")
 START_S = 1.7e9
 """Unix time at which it begins."""
 
+MAP_PAUSE_S = 20.0
+"""How long no map is begun after one, of the vehicles' time: as slowly do maps of a leg's soundings change."""
+
 
 def served(sea: "SimulationSettings", time_scale: float, work: "Callable[[MissionService], Awaitable[Came]]") -> Came:
     """Return what comes of work with a service whose time goes on only when nobody has anything left to do.
@@ -33,6 +36,7 @@ def served(sea: "SimulationSettings", time_scale: float, work: "Callable[[Missio
 async def _served(
     sea: "SimulationSettings", time_scale: float, work: "Callable[[MissionService], Awaitable[Came]]"
 ) -> Came:
+    from app.compute.settings import ComputeSettings
     from app.missions.service import MissionService
     from app.missions.settings import ImcSettings, ServiceSettings
     from app.storage.database import Database
@@ -43,7 +47,11 @@ async def _served(
         await prepare_database(url, may_upgrade=True)
         database = Database(url)
         settings = ServiceSettings(
-            database_url=url, imc=ImcSettings(enabled=False), time_scale=time_scale, simulation=sea
+            database_url=url,
+            imc=ImcSettings(enabled=False),
+            time_scale=time_scale,
+            simulation=sea,
+            compute=ComputeSettings(map_pause_s=MAP_PAUSE_S / time_scale),
         )
         service = MissionService(settings, database)
         await service.startup()

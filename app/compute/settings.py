@@ -23,6 +23,12 @@ class ComputeSettings(BaseModel):
         le=86_400,
         description="What the cluster has not done after so long is done on this machine",
     )
+    map_pause_s: float = Field(
+        default=0.2,
+        ge=0,
+        le=600,
+        description="How long no map of a running mission is begun after one; never shorter than that one took",
+    )
     tls_ca_file: Path | None = Field(
         default=None, description="File with the certificate (PEM) of the authority that the cluster's are signed by"
     )

@@ -128,7 +128,13 @@ class MissionService:
         self.previews = PlanPreviews(self.hub, self._compilation)
         """Plans of missions that are being described."""
         self._supervisor = MissionSupervisor(
-            self.hub, self._claims, self._executor, self.maps, self._compilation, settings.time_scale
+            self.hub,
+            self._claims,
+            self._executor,
+            self.maps,
+            self._compilation,
+            settings.time_scale,
+            settings.compute.map_pause_s,
         )
         self._runs = self._supervisor.runs
         self.team_changes = TeamChanges(self.hub, self._claims, self._supervisor)

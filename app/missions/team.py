@@ -124,7 +124,7 @@ class Member:
     link: LinkState = LinkState.UNKNOWN
     engaged: bool = False
     followed: bool = False
-    """Whether it ever followed in this run: one that then refuses is an alarm."""
+    """Whether it ever followed in this run, or may have: one that then refuses, or is silent, is an alarm."""
     refusal: str = ""
     order: WaypointOrder | None = None
     target_m: NDArray[np.float64] | None = None

@@ -49,6 +49,8 @@ class Runner:
     ----------
     time_scale
         How much faster than the wall clock the vehicles live.
+    map_pause_s
+        For how long no map is made after one, at least, on the wall clock.
     maps_ready
         Returns when what maps are made with is compiled.
     """
@@ -59,6 +61,7 @@ class Runner:
         hub: FleetHub,
         executor: Executor,
         time_scale: float,
+        map_pause_s: float,
         maps_ready: Callable[[], Awaitable[None]],
     ) -> None:
         self._live = live
@@ -67,7 +70,7 @@ class Runner:
         planner = OrderedPlanner(make_planner(live.spec, live.planning_sensor))
         linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
         self._apart = live.search is None and not linked and planner.decides_apart
-        self._maps = StepMaps(live, executor, time_scale, maps_ready)
+        self._maps = StepMaps(live, executor, time_scale, map_pause_s, maps_ready)
         self._waiting = Waiting(live)
         self._lookout = SearchHooks(live, time_scale, self._waiting.until)
         self._decider = Decider(live, constraints, planner, self._maps, executor)

@@ -53,6 +53,7 @@ class MissionSupervisor:
         maps: FinalMaps,
         compilation: Compilation,
         time_scale: float,
+        map_pause_s: float,
     ) -> None:
         self._hub = hub
         self._claims = claims
@@ -60,6 +61,7 @@ class MissionSupervisor:
         self._maps = maps
         self._compilation = compilation
         self._time_scale = time_scale
+        self._map_pause_s = map_pause_s
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self._ending: dict[str, asyncio.Task[list[StopReceipt]]] = {}
@@ -82,7 +84,8 @@ class MissionSupervisor:
 
         def fly() -> Awaitable[str]:
             # Made where its failure ends this mission alone: its planner may be gone since the mission was begun.
-            return Runner(live, self._hub, self._executor, self._time_scale, self._compilation.maps).run()
+            ready = self._compilation.maps
+            return Runner(live, self._hub, self._executor, self._time_scale, self._map_pause_s, ready).run()
 
         self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
 

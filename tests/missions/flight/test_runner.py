@@ -5,13 +5,15 @@ from typing import Any
 
 import pytest
 
-from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import LinkState, VehicleRefusedError
+from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.operations.history import events_after
 from app.missions.service import MissionService
+from app.missions.spec.vehicle import VehicleKind
 from app.missions.states import MissionState
 from app.storage.queries import missions as mission_queries
 from tests.support.missions.harbour import act, sim_spec, until_state, view_of
@@ -92,3 +94,24 @@ async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
         steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
     assert all(row.status in ("sent", "acknowledged", "reached") for rows in steps for row in rows)
     assert all(row.status == "reached" for row in steps[0]) or any(row.status != "planned" for row in steps[1])
+
+
+async def test_a_vehicle_that_falls_silent_while_it_is_asked_is_lost(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def silenced(hub: FleetHub, key: VehicleKey) -> None:
+        link = hub.link(VehicleKind.SIM)
+        assert isinstance(link, SimFleetLink)
+        link.silence(key[1])
+        await until(lambda: hub.info(key).state is LinkState.LOST, "it is silent")
+        raise VehicleRefusedError(key[1], "silent for 12 s, last heard at the surface", "Bring its link up first")
+
+    monkeypatch.setattr(FleetHub, "engage", silenced)
+    mission = (await service.create(sim_spec(steps=2))).id
+    await act(service, mission, "start", actor="Ana")
+    live = await service.get(mission)
+
+    async def is_lost() -> bool:
+        return any(event.level == "alarm" and "is lost" in event.message for event in await events_after(live))
+
+    await until(is_lost, "it may follow us")

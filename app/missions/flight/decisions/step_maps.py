@@ -14,10 +14,8 @@ from app.missions.maps.builder import MapBuilder
 PATIENCE_S = 2.0
 """How much of the vehicles' time a decision may wait for a newer map."""
 
-LEAST_AGE_S = 0.2
-"""How old a map is at least, on the wall clock, before the next one is begun."""
 REST = 1.0
-"""For how long no map is made after one, in times of what it took."""
+"""For how long no map is made after one, at least, in times of what it took."""
 
 _LEARNING = threading.Lock()
 
@@ -33,16 +31,24 @@ class StepMaps:
         Whose threads make and refine maps.
     time_scale
         How much faster than the wall clock the vehicles live.
+    pause_s
+        For how long no map is made after one, at least, on the wall clock.
     ready
         Returns when what maps are made with is compiled: it takes longer where two threads or processes do it.
     """
 
     def __init__(
-        self, live: LiveMission, executor: Executor, time_scale: float, ready: Callable[[], Awaitable[None]]
+        self,
+        live: LiveMission,
+        executor: Executor,
+        time_scale: float,
+        pause_s: float,
+        ready: Callable[[], Awaitable[None]],
     ) -> None:
         self._live = live
         self._executor = executor
         self._time_scale = time_scale
+        self._pause_s = pause_s
         self._ready = ready
         self._took_s = 0.0
         self._made_at_s = -math.inf
@@ -60,7 +66,7 @@ class StepMaps:
     def _due(self) -> bool:
         """Whether the newest map is so old that the next one may take a core again."""
         age_s = asyncio.get_running_loop().time() - self._made_at_s
-        return age_s >= max(LEAST_AGE_S, REST * self._took_s)
+        return age_s >= max(self._pause_s, REST * self._took_s)
 
     async def renew(self) -> None:
         """Bring the map up to date, unless vehicles would circle for long meanwhile: then the newest has to do.

@@ -131,10 +131,14 @@ class Engagement:
         live = self._live
         if live.halted:
             return
+        was_lost = self._hub.info(member.key).state is LinkState.LOST
         try:
             await self._hub.engage(member.key)
         except VehicleRefusedError as error:
             await self._note(member, error)
+            if not was_lost and self._hub.info(member.key).state is LinkState.LOST:
+                # It fell silent while it was asked, and may follow what it heard.
+                member.followed = True
             return
         except Exception:
             log.exception("a vehicle could not be engaged, trying again", vehicle=member.name)

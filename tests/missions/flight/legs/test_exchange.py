@@ -45,7 +45,7 @@ class Flight:
         constraints = make_constraints(spec)
         self.planner = make_planner(spec)
         self.committing = LegCommit(live, constraints, leads=False)
-        maps = StepMaps(live, executor, TIME_SCALE, _at_once)
+        maps = StepMaps(live, executor, TIME_SCALE, 0.2, _at_once)
         self.decider = Decider(live, constraints, self.planner, maps, executor)
         ways = EnergyRange(live, constraints, self.committing)
         self.exchange = LegExchange(live, self.decider, self.committing, ways, TIME_SCALE)
