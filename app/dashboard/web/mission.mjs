@@ -7,7 +7,8 @@ import { readFile, writeFile } from "node:fs/promises";
 
 const [source, target] = process.argv.slice(2);
 const text = source.startsWith("http") ? await (await fetch(source)).text() : await readFile(source, "utf8");
-const { schemas } = JSON.parse(text).components;
+const { components, paths } = JSON.parse(text);
+const { schemas } = components;
 const KEPT = /^(type|minimum|maximum|exclusiveMinimum|exclusiveMaximum|maxItems|enum|default|description)$/;
 
 /** A schema without references; of alternatives the one that is not null. */
@@ -42,4 +43,7 @@ for (const [name, { default: usual }] of Object.entries(schemas.MissionSpec.prop
   if (typeof usual !== "object" || Array.isArray(usual)) continue;
   for (const [path, value] of flat(usual, [name])) fields[path].default = value;
 }
+// How deep it is is asked with a plan, and is no value of the mission.
+const [floor] = paths["/api/v1/plan"].post.parameters.filter(({ name }) => name === "floor_depth_m");
+fields.floor_depth_m = { ...leaves(floor.schema).next().value[1], description: floor.description };
 await writeFile(target, `${JSON.stringify(fields, null, 2)}\n`);

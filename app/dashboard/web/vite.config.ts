@@ -15,7 +15,7 @@ function compressed(): Plugin {
     closeBundle() {
       const folder = join(import.meta.dirname, outDir, "assets");
       for (const name of readdirSync(folder)) {
-        if (/\.(m?js|css|svg|json)$/.test(name)) {
+        if (/\.(m?js|css|svg|json|tsv)$/.test(name)) {
           writeFileSync(join(folder, `${name}.gz`), gzipSync(readFileSync(join(folder, name)), { level: 9 }));
         }
       }

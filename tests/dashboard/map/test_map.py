@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, show
+from tests.support.dashboard.steps import by_id, picture, show, violations
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -105,6 +105,64 @@ def test_the_map_tells_what_is_known_and_where_it_is(watched: Watched, service: 
     )
     assert [one for one in watched.addresses if not one.startswith((service.url, "data:", "blob:"))] == []
     # Reading the canvas back is the test's own.
+    assert [words for words in watched.complaints if "getImageData" not in words] == []
+
+
+def expect_name(page: Page, drawn: bool) -> None:
+    """Wait until the map's lively sheet shows something, or nothing."""
+    page.wait_for_function(
+        """(drawn) => {
+            const sheet = document.querySelector(".sheet.lively");
+            const { data } = sheet.getContext("2d").getImageData(0, 0, sheet.width, sheet.height);
+            return data.some((value, i) => i % 4 === 3 && value > 0) === drawn;
+        }""",
+        arg=drawn,
+    )
+
+
+def test_harbours_are_found_by_name_and_named_on_a_map_that_shows_their_coast(
+    watched: Watched, service: Service
+) -> None:
+    page = watched.page
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    assert not [one for one in watched.addresses if "harbours" in one]
+    page.keyboard.press("g")
+    field = by_id(page, "go-to-position")
+    field.fill("lis")
+    expect(by_id(page, "harbour-0")).to_have_text("LisboaPortugal")
+    expect(page.get_by_role("option", selected=True)).to_have_count(1)
+    field.press("ArrowDown")
+    expect(page.get_by_role("option", selected=True)).to_have_id("harbour-1")
+    expect(field).to_have_attribute("aria-activedescendant", "harbour-1")
+    expect(page.locator(".go-to [role=status]")).to_have_text(re.compile(r"\d harbours: ↓ and ↑ choose"))
+    assert violations(page) == []
+    picture(page, "harbours-found")
+    field.press("Escape")
+    expect(by_id(page, "harbour-0")).to_have_count(0)
+    expect(field).to_have_value("lis")
+    # Typed with its accents, too; the field takes a position as before.
+    field.fill("Leixões")
+    field.press("Enter")
+    expect(field).to_have_value("Porto De Leixoes")
+    expect(page.locator(".grid-labels")).to_contain_text("41.2")
+    picture(page, "harbours-leixoes")
+    page.get_by_role("button", name="Unmark").click()
+    expect_name(page, drawn=True)
+    for theme in ("dark", "contrast", "night"):
+        by_id(page, "open-settings").click()
+        by_id(page, "theme").select_option(theme)
+        by_id(page, "settings-close").click()
+        picture(page, f"harbours-{theme}")
+    field.fill("41.1852, -8.7048")
+    expect(by_id(page, "harbour-0")).to_have_count(0)
+    field.press("Enter")
+    page.get_by_role("button", name="Unmark").click()
+    expect_name(page, drawn=False)
+    field.fill("no such harbour")
+    field.press("Enter")
+    expect(by_id(page, "go-to-fault")).to_contain_text("or a harbour’s name")
+    assert [one for one in watched.addresses if not one.startswith((service.url, "data:", "blob:"))] == []
     assert [words for words in watched.complaints if "getImageData" not in words] == []
 
 

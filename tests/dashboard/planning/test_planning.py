@@ -13,6 +13,8 @@ from tests.support.dashboard.steps import by_id, click_round, expect_state, pict
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
+FORECAST_MS = 240_000
+
 
 def named(service: Service, name: str) -> list[str]:
     return [one["id"] for one in service.get("/missions") if one["name"] == name]
@@ -159,8 +161,18 @@ def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Wa
     by_id(page, "block-3").click()
     expect(by_id(page, "block-3")).to_have_attribute("aria-pressed", "true")
     expect(by_id(page, "editing")).to_have_attribute("data-ready", "true")
+    # Each block has its own vehicles' figures, the marked one unfolded; all of them are one way and one battery.
+    expect(by_id(page, "of-block-3")).to_have_attribute("open", "")
+    expect(by_id(page, "block-3-share-sim-1")).to_contain_text(re.compile(r"\d+ m"))
+    expect(by_id(page, "block-1-share-sim-1")).to_be_hidden()
+    expect(by_id(page, "share-sim-1")).to_contain_text(re.compile(r"\d+ m"))
+    page.get_by_text("Single vehicles: speed, endurance").click()
+    by_id(page, "endurance_min-sim-2").fill("1")
+    expect(by_id(page, "share-sim-2")).to_contain_text(re.compile(r"turns back after .*▲ \d+ % of its endurance"))
+    expect(by_id(page, "block-3-share-sim-2")).to_contain_text(re.compile(r"▲ .*left then"))
     picture(page, "blocks-wide")
     assert violations(page) == []
+    by_id(page, "endurance_min-sim-2").fill("")
     page.set_viewport_size({"width": 390, "height": 844})
     by_id(page, "blocks").scroll_into_view_if_needed()
     picture(page, "blocks-phone")
@@ -178,6 +190,30 @@ def test_several_areas_are_blocks_that_are_flown_one_after_the_other(watched: Wa
     expect(by_id(page, "abort")).to_be_visible()
     assert service.get(f"/missions/{west}")["state"] == "finished"
     assert watched.complaints == []
+
+
+def test_every_block_is_forecast_over_a_bottom_as_deep_as_is_typed(page: Page) -> None:
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-steps").fill("2")
+    expect(by_id(page, "field-floor_depth_m")).to_have_attribute("placeholder", "a guess")
+    by_id(page, "another-block").click()
+    by_id(page, "field-floor_depth_m").fill("-3")
+    # What no depth can be is asked of nobody.
+    expect(by_id(page, "ask-forecast")).to_have_count(0)
+    by_id(page, "field-floor_depth_m").fill("12.5")
+    expect(by_id(page, "planned")).to_have_attribute("data-plan", "new")
+    by_id(page, "ask-forecast").click()
+    expect(by_id(page, "forecast")).to_contain_text("1 of 2")
+    expect(by_id(page, "forecast-block-1")).to_contain_text(re.compile(r"\d+ s"), timeout=FORECAST_MS)
+    expect(by_id(page, "forecast-in-all")).to_contain_text("not computed yet")
+    expect(by_id(page, "forecast-in-all")).to_contain_text(re.compile(r"\d+ s"), timeout=FORECAST_MS)
+    forecasts = [url for url in asked if "/forecast" in url]
+    assert [url.partition("?")[2] for url in forecasts] == ["floor_depth_m=12.5"] * 2
+    picture(page, "blocks-forecast")
+    assert violations(page) == []
 
 
 def test_who_finishes_a_block_early_is_told_that_the_next_does_not_begin(page: Page, service: Service) -> None:

@@ -58,6 +58,10 @@ REPORT_PERIOD_S = 0.5
 LAUNCH_MARGIN_M = 2.0
 LAUNCH_SPACING_M = 6.0
 KEPT_TERRAINS = 32
+RAISED_BY_M, CLIMB = 0.05, 4.0
+"""A vehicle over a rising bottom is raised by at least so much each time, and by so many times what it is too low more
+than to its least altitude: over a steep bottom it would never come up to it."""
+
 FORSAKEN_S = 60.0
 """A vehicle that is out of reach for so long gives its waypoint up, as DUNE does: its motor is off and it comes up."""
 SILENT = "out of reach"
@@ -405,8 +409,12 @@ class SimFleetLink(FleetLink):
                 deployed.adrift = True
 
     def _keep_clear_of_bottom(self, deployed: DeployedVehicle, order: WaypointOrder) -> None:
-        state = deployed.body.state
-        too_low = state.altitude_m < order.min_altitude_m
-        if too_low and not deployed.raised and not deployed.reached:
-            deployed.raised = True
-            deployed.head_for(order, order.position, max(0.0, deployed.body.bottom_m - order.min_altitude_m))
+        """Raise a vehicle over a rising bottom, again and again."""
+        too_low_m = order.min_altitude_m - deployed.body.state.altitude_m
+        if not too_low_m > 0.0:
+            return
+        depth_m = max(0.0, deployed.body.bottom_m - order.min_altitude_m - CLIMB * too_low_m)
+        if depth_m < deployed.raised_to_m - RAISED_BY_M:
+            deployed.raised_to_m = depth_m
+            ahead = order.lead if deployed.reached and order.lead is not None else order.position
+            deployed.head_for(order, ahead, depth_m)

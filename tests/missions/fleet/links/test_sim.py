@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleSpec
 from simulator.floors import seafloors
+from simulator.floors.terrain import Terrain
+from simulator.floors.terrain_files import save_npz
 from simulator.sonars.swath import SwathSonar
 from simulator.vehicles.battery import BatterySpec
 from tests.support.missions.specs import LAT, LON
@@ -113,6 +116,27 @@ async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float
             await until(partial(has_reached, step), f"step {step} is reached")
     finally:
         await link.close()
+
+
+async def test_it_keeps_clear_of_a_bottom_that_goes_on_rising(tmp_path: Path) -> None:
+    events: list[FleetEvent] = []
+    rising = Terrain(np.tile(np.linspace(12.0, 2.5, 101)[:, None], (1, 101)), 1.0)
+    save_npz(rising, tmp_path / "rising.npz")
+    link = SimFleetLink(SimulationSettings(terrain=tmp_path / "rising.npz"), 50.0)
+    await link.start(events.append)
+    try:
+        link.launch(launch(BatterySpec()))
+        await link.engage(NAME)
+        lat, lon = FLOOR.frame.to_geodetic(50, 90)
+        await link.order(WaypointOrder("m", 1, NAME, Position(lat, lon, 8.0), 1.0, 4.0, 1.0))
+        await until(
+            lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
+            "it has arrived",
+        )
+    finally:
+        await link.close()
+    altitudes_m = [e.altitude_m for e in events if isinstance(e, VehicleReport) and e.altitude_m is not None]
+    assert min(altitudes_m) > 0.5, "where a failsafe would bring it up for good"
 
 
 async def test_a_multibeam_tells_of_whole_pings() -> None:

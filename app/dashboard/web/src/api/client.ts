@@ -136,6 +136,15 @@ const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/$
 
 const sitePath = (id: string, part: string) => `/sites/${encodeURIComponent(id)}/${part}`;
 
+/** A mission that nobody has created, and how deep it is there; empty: not known. */
+export interface Described {
+  mission: NewMission;
+  floor_depth_m: string;
+}
+
+const atDepth = (floor_depth_m: string): string =>
+  floor_depth_m.trim() === "" ? "" : `?${new URLSearchParams({ floor_depth_m: floor_depth_m.trim() })}`;
+
 export const api = {
   session: () => request<SessionView>("/session"),
   signIn: (token: string) =>
@@ -162,17 +171,17 @@ export const api = {
   mission: (id: string) => request<MissionView>(missionPath(id)),
   deleteMission: (id: string) => remove(missionPath(id)),
   preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
-  forecast: (id: string, gone: AbortSignal) =>
-    request<ForecastView>(`${missionPath(id)}/forecast`, { method: "POST", signal: gone }),
-  forecastOf: (mission: NewMission, gone: AbortSignal) =>
-    request<ForecastView>("/forecast", {
+  forecast: (id: string, depth_m: string, gone: AbortSignal) =>
+    request<ForecastView>(`${missionPath(id)}/forecast${atDepth(depth_m)}`, { method: "POST", signal: gone }),
+  forecastOf: ({ mission, floor_depth_m }: Described, gone: AbortSignal) =>
+    request<ForecastView>(`/forecast${atDepth(floor_depth_m)}`, {
       method: "POST",
       signal: gone,
       body: JSON.stringify(mission),
       headers: { "Content-Type": "application/json" },
     }),
-  plan: (mission: NewMission, gone: AbortSignal) =>
-    request<PlanView>("/plan", {
+  plan: ({ mission, floor_depth_m }: Described, gone: AbortSignal) =>
+    request<PlanView>(`/plan${atDepth(floor_depth_m)}`, {
       method: "POST",
       signal: gone,
       body: JSON.stringify(mission),

@@ -197,8 +197,8 @@ export const cursor = signal<LngLat | null>(null);
 export const mapCentre = signal<LngLat>([-8.7044, 41.1854]);
 /** What the map is to go to next; taken back when it has. */
 export const destination = signal<Bounds | null>(null);
-/** A place that was typed to go to; null: none is marked. */
-export const marked = signal<LngLat | null>(null);
+/** A place that was asked for, with its name if it has one; null: none is marked. */
+export const marked = signal<{ at: LngLat; name?: string } | null>(null);
 /** Whether a place to go to is being asked for. */
 export const goingTo = signal(false);
 export const in3d = signal(false);
@@ -214,8 +214,11 @@ export interface DraftShapes {
   /** Places of a search, and where vehicles come home to. */
   marks: readonly PlaceMark[];
 }
-/** What the mission that is being described would begin with, block by block; `old` while something else is described by now. */
-export const planned = signal<{ plans: readonly PlanView[]; old: boolean } | null>(null);
+/**
+ * What the mission that is being described would begin with, block by block: the first `fresh` as it is described now, the
+ * others as it was before.
+ */
+export const planned = signal<{ plans: readonly PlanView[]; fresh: number } | null>(null);
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);

@@ -93,6 +93,7 @@ const NO_WORDS = new Set([
   "ui/keys.ts: Tab",
   "ui/keys.ts: Escape",
   "ui/form/Fields.tsx: a field outside its form",
+  "ui/chart/GoTo.tsx: Escape",
   "ui/chart/MapMenu.tsx: Escape",
   "ui/chart/mapUpdates.tsx: waypoint",
   "ui/chart/mapUpdates.tsx: vehicle",

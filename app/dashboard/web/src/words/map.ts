@@ -58,7 +58,10 @@ export const MAP = {
     en: "Close the field for a position",
     pt: "Fechar o campo da posição",
   },
-  "mapTools.goToAPosition": { en: "Go to a position", pt: "Ir para uma posição" },
+  "mapTools.goToAPosition": {
+    en: "Go to a position or a harbour",
+    pt: "Ir para uma posição ou um porto",
+  },
   "mapTools.hideWhereThisDeviceIs": {
     en: "Hide where this device is",
     pt: "Esconder onde está este aparelho",
@@ -80,11 +83,23 @@ export const MAP = {
   "mapTools.positionsIn": { en: "Positions in {it}", pt: "Posições em {it}" },
   "mapTools.lookAtTheSeaFloorIn": { en: "Look at the sea floor in space", pt: "Ver o fundo no espaço" },
   "mapTools.typeAPositionSuchAs": {
-    en: "Type a position such as {sample}",
-    pt: "Escreva uma posição como {sample}",
+    en: "Type a position such as {sample}, or a harbour’s name",
+    pt: "Escreva uma posição como {sample}, ou o nome de um porto",
   },
-  "mapTools.positionToGoTo": { en: "Position to go to", pt: "Posição para onde ir" },
-  "mapTools.sample": { en: "41°11.112′ N 8°42.276′ W", pt: "41°11.112′ N 8°42.276′ W" },
+  "mapTools.positionToGoTo": {
+    en: "Position or harbour to go to",
+    pt: "Posição ou porto para onde ir",
+  },
+  "mapTools.sample": { en: "41°11.112′ N 8°42.276′ W, or Lisboa", pt: "41°11.112′ N 8°42.276′ W, ou Lisboa" },
+  "mapTools.harbours": { en: "Harbours", pt: "Portos" },
+  "mapTools.harboursFound": {
+    en: "{n} {n|harbour|harbours}: ↓ and ↑ choose, Enter goes there",
+    pt: "{n} {n|porto|portos}: ↓ e ↑ escolhem, Enter vai lá",
+  },
+  "mapTools.toAboutAMile": {
+    en: "Most harbours lie where the World Port Index says to about a mile",
+    pt: "A maioria dos portos fica onde diz o World Port Index com cerca de uma milha de erro",
+  },
   "mapTools.go": { en: "Go", pt: "Ir" },
   "mapTools.unmark": { en: "Unmark", pt: "Desmarcar" },
   "mapTools.lastAt": { en: "Last {b} at {bearingDeg}°", pt: "Último {b} a {bearingDeg}°" },

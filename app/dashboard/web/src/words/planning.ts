@@ -127,6 +127,12 @@ export const PLANNING = {
   "asked.metresBetweenLines": { en: "metres between lines", pt: "metros entre fiadas" },
   "asked.linesApartM": { en: "Lines apart, m", pt: "Entre fiadas, m" },
   "asked.lengthIn": { en: "Length in", pt: "Extensão em" },
+  "asked.depthOfTheBottom": { en: "Depth of the bottom", pt: "Profundidade do fundo" },
+  "asked.depthOfTheBottomM": {
+    en: "Depth of the bottom, where you know it, m",
+    pt: "Profundidade do fundo, se a conhece, m",
+  },
+  "asked.aGuess": { en: "a guess", pt: "estimada" },
   "asked.upToFromTheRecoveryPoint": {
     en: " Up to {farthestM} from the recovery point.",
     pt: " Até {farthestM} do ponto de recolha.",
@@ -159,6 +165,13 @@ export const PLANNING = {
     en: "{vehicle} {way}, {time}, {batteries} batteries",
     pt: "{vehicle} {way}, {time}, {batteries} baterias",
   },
+  "planned.notYet": { en: "not computed yet", pt: "ainda não calculado" },
+  "planned.ofWhatIsLeftThen": {
+    en: "{it}{share} of what is left then",
+    pt: "{it}{share} do que então resta",
+  },
+  "planned.nothingIsLeftThen": { en: "▲ nothing is left then", pt: "▲ então já nada resta" },
+  "planned.noPlanOf": { en: "No plan of {name}: {fault}", pt: "Sem plano de {name}: {fault}" },
   "planned.noPlan": { en: "No plan: {fault}", pt: "Sem plano: {fault}" },
   "planned.whatIsTakenToBeSo": { en: "What is taken to be so", pt: "O que se supõe" },
   "planned.wayHome": { en: "Way home", pt: "Regresso" },
@@ -452,6 +465,12 @@ export const PLANNING = {
     en: "Simulating the mission over several floors, half a minute or so…",
     pt: "A simular a missão sobre vários fundos, cerca de meio minuto…",
   },
+  "forecast.simulatingOneOf": {
+    en: "Simulating {name}, {i} of {n}, over several floors, half a minute or so…",
+    pt: "A simular {name}, {i} de {n}, sobre vários fundos, cerca de meio minuto…",
+  },
+  "forecast.notSimulated": { en: "not simulated", pt: "não simulado" },
+  "forecast.goOn": { en: "Simulate the others", pt: "Simular os outros" },
   "forecast.forecastByAQuickSimulation": {
     en: "Forecast by a quick simulation",
     pt: "Prever com uma simulação rápida",

@@ -46,7 +46,7 @@ export const WATCHING = {
     pt: "Deixá-lo aguardar onde está até ser retomado; os outros continuam",
   },
   "cards.more": { en: "More…", pt: "Mais…" },
-  "cards.furtherOrders": { en: "Further orders to {name}", pt: "Outras ordens para {name}" },
+  "cards.furtherOrders": { en: "More… orders to {name}", pt: "Mais… ordens para {name}" },
   "cards.hold": { en: "Hold", pt: "Aguardar" },
   "cards.letItSurveyAgainForExample": {
     en: "Let it survey again, for example with a new battery",

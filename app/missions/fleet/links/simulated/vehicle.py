@@ -54,7 +54,8 @@ class DeployedVehicle:
         self.state = LinkState.READY
         self.order: WaypointOrder | None = None
         self.reached = False
-        self.raised = False
+        self.raised_to_m = math.inf
+        """The least depth that it was raised to on its way, to keep clear of the bottom."""
         self.reported_s = -math.inf
         self.report: VehicleReport | None = None
         self.faults: dict[FaultKind, FaultReport] = {}
@@ -92,7 +93,7 @@ class DeployedVehicle:
 
     def begin(self, order: WaypointOrder) -> None:
         """Set out for a waypoint."""
-        self.order, self.reached, self.raised, self.adrift = order, False, False, False
+        self.order, self.reached, self.adrift, self.raised_to_m = order, False, False, math.inf
         self.head_for(order, order.position, order.position.depth_m)
 
     def head_for(self, order: WaypointOrder, place: Position, depth_m: float) -> None:

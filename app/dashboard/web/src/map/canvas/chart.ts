@@ -9,6 +9,7 @@ import workerUrl from "maplibre-gl/dist/maplibre-gl-worker.mjs?url";
 import type { LngLat, PolygonGeometry } from "../../api/types";
 import { say } from "../../words/say";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "../geo";
+import { type Harbour, harbours } from "../harbours";
 import type { PlaceMark, Route, Spot, Track } from "../marks/marks";
 import type { ShipMark } from "../marks/ships";
 import { type Site, sitePicture } from "../marks/site";
@@ -18,7 +19,8 @@ import type { PictureResult } from "../picture/picture.worker";
 import { Sheets } from "./canvasLayers";
 import { coasts, showsCoast } from "./coast";
 import { imageOf, paintStill, type StillContent } from "./fixedMarks";
-import { type Box, type Label, placed, type Side } from "./labels";
+import { type LaidName, laidNames, paintNames, showsHarbours, sidesOf } from "./harbourNames";
+import { type Box, boxesOf, type Label, placed, type Side } from "./labels";
 import { type Look, PAPER } from "./mapColours";
 import {
   type LivelyContent,
@@ -90,6 +92,7 @@ export class Chart {
   readonly #labels = new Map<string, Pick<Label, "width" | "height" | "reach">>();
   #sides = new Map<string, Side>();
   #covers: readonly Box[] = [];
+  #harbours: readonly Harbour[] = [];
   #look: Look;
   #still: StillContent = {
     lands: [],
@@ -108,7 +111,8 @@ export class Chart {
   #fitting: (() => Padding) | null = null;
   #tiles = "";
   #smooth = true;
-  #askedForCoasts = false;
+  /** What of the world was asked for and has not come yet. */
+  readonly #asked = new Set<string>();
   #styled = false;
 
   /** Makes the map inside an element. It is drawn on at once; what MapLibre itself shows follows when it is ready. */
@@ -130,8 +134,11 @@ export class Chart {
     this.#sheets = new Sheets(
       map,
       (context, at) => paintStill(context, at, at, this.#still, PAPER[this.#look]),
-      (context, at) =>
-        paintLively(context, at, this.#lively, this.#layLabels(context, at), PAPER[this.#look]),
+      (context, at) => {
+        const { sides, names } = this.#layLabels(context, at);
+        paintNames(context, at, names, PAPER[this.#look]);
+        paintLively(context, at, this.#lively, sides, PAPER[this.#look]);
+      },
     );
     map.on("mousemove", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
     map.on("mouseout", () => hooks.onCursor(null));
@@ -146,7 +153,7 @@ export class Chart {
       hooks.onMenu([e.lngLat.lng, e.lngLat.lat], e.originalEvent.clientX, e.originalEvent.clientY);
     });
     map.on("move", this.#tellFrame);
-    map.on("move", this.#wantCoasts);
+    map.on("move", this.#wantWorld);
     map.on("resize", this.#tellFrame);
     map.on("resize", this.#fitAgain);
     map.on("movestart", (e) => {
@@ -201,9 +208,13 @@ export class Chart {
       context.drawImage(this.#map.getCanvas(), left, top, width, height);
     }
     paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]);
+    const toTheRight = () => "right" as const;
+    const labels = this.#allLabels(context, at);
+    const taken = boxesOf(labels, labels.map(toTheRight));
+    paintNames(context, at, this.#namesBeside(context, at, taken), PAPER[this.#look]);
     const sides = {
-      marks: this.#lively.marks.map(() => "right" as const),
-      targets: this.#lively.targets.map(() => "right" as const),
+      marks: this.#lively.marks.map(toTheRight),
+      targets: this.#lively.targets.map(toTheRight),
     };
     paintLively(context, at, { ...this.#lively, pointed: null }, sides, PAPER[this.#look]);
   }
@@ -439,8 +450,8 @@ export class Chart {
     this.#sheets.refresh();
   }
 
-  /** Finds room for all labels, those of vehicles first, and turns these to their side. */
-  #layLabels(context: CanvasRenderingContext2D, at: Projection): Sides {
+  /** All labels, those of vehicles first. */
+  #allLabels(context: CanvasRenderingContext2D, at: Projection): (Label & { key: string })[] {
     const { marks, targets } = this.#lively;
     context.font = WORDS_FONT;
     const worded = (key: string, place: LngLat, words: string) => ({
@@ -458,19 +469,33 @@ export class Chart {
         ? [{ key, at: [at.x(place.lng), at.y(place.lat)] as Pixel, width, height, reach, side }]
         : [];
     });
-    const labels = [
+    return [
       ...pinned,
       ...marks.map((mark, i) => worded(`mark ${i} ${mark.sign}`, mark.at, mark.words)),
       ...targets.map((target) => worded(`target ${target.name}`, target.at, target.name)),
     ];
+  }
+
+  /** Finds room for all labels and turns those of vehicles to their side; harbours are named where there is some left. */
+  #layLabels(context: CanvasRenderingContext2D, at: Projection): { sides: Sides; names: LaidName[] } {
+    const labels = this.#allLabels(context, at);
     const sides = placed(labels, this.#covers, at.width, at.height);
-    this.#sides = new Map(labels.map(({ key }, i) => [key, sides[i] as Side]));
-    pinned.forEach(({ key }, i) => {
+    const names = this.#namesBeside(context, at, [...this.#covers, ...boxesOf(labels, sides)]);
+    this.#sides = new Map([
+      ...labels.map(({ key }, i) => [key, sides[i] as Side] as const),
+      ...sidesOf(names),
+    ]);
+    labels.forEach(({ key }, i) => {
       const element = this.#pins.get(key)?.getElement();
       if (element && element.dataset.side !== sides[i]) element.dataset.side = sides[i] as Side;
     });
-    const own = sides.slice(pinned.length);
-    return { marks: own.slice(0, marks.length), targets: own.slice(marks.length) };
+    const { marks, targets } = this.#lively;
+    const own = sides.slice(labels.length - marks.length - targets.length);
+    return { sides: { marks: own.slice(0, marks.length), targets: own.slice(marks.length) }, names };
+  }
+
+  #namesBeside(context: CanvasRenderingContext2D, at: Projection, taken: readonly Box[]): LaidName[] {
+    return this.#tiles ? [] : laidNames(context, at, this.#harbours, taken, this.#sides);
   }
 
   #spotAt(x: number, y: number): Spot | null {
@@ -491,23 +516,33 @@ export class Chart {
     }
   };
 
-  /** Coasts are fetched when so much is seen that they tell something; charts have better ones. */
-  #wantCoasts = (): void => {
-    const wanted = this.#tiles === "" && showsCoast(this.#map.getZoom());
-    if (!wanted) {
-      if (this.#tiles !== "" && this.#still.lands.length > 0) this.#lay({ lands: [] });
+  /** Coasts and harbours are fetched when so much is seen that they tell something; charts have better ones. */
+  #wantWorld = (): void => {
+    if (this.#tiles !== "") {
+      if (this.#still.lands.length > 0) this.#lay({ lands: [] });
       return;
     }
-    if (this.#still.lands.length > 0 || this.#askedForCoasts) return;
-    this.#askedForCoasts = true;
-    coasts()
-      .then((lands) => this.#lay({ lands }))
+    const zoom = this.#map.getZoom();
+    if (showsCoast(zoom) && this.#still.lands.length === 0) {
+      this.#ask("coasts", coasts, (lands) => this.#lay({ lands }));
+    }
+    if (showsHarbours(zoom) && this.#harbours.length === 0) {
+      this.#ask("harbours", harbours, (all) => {
+        this.#harbours = all;
+        this.#sheets.refresh();
+      });
+    }
+  };
+
+  #ask<T>(what: string, fetched: () => Promise<T>, take: (found: T) => void): void {
+    if (this.#asked.has(what)) return;
+    this.#asked.add(what);
+    fetched()
+      .then(take)
       // The service is gone, which is told elsewhere; the next move asks again.
       .catch(() => undefined)
-      .finally(() => {
-        this.#askedForCoasts = false;
-      });
-  };
+      .finally(() => this.#asked.delete(what));
+  }
 
   #tellFrame = (): void => {
     const at = this.#sheets.projection;

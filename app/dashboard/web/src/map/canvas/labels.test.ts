@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { boxOf, type Label, placed } from "./labels";
+import { boxesOf, boxOf, fitting, type Label, placed } from "./labels";
 
 const label = (x: number, y: number, changes: Partial<Label> = {}): Label => ({
   at: [x, y],
@@ -31,4 +31,14 @@ it("labels leave each other, other signs, covers and the window's edge alone", (
 it("where every side is taken the least hidden one is", () => {
   const everywhere = { left: 0, top: 0, right: 400, bottom: 400 };
   expect(placed([label(2, 200)], [everywhere], 400, 400)).toEqual(["right"]);
+});
+
+it("further labels are written where they cover nothing, and left out elsewhere", () => {
+  const taken = boxesOf([label(200, 200)], ["right"]);
+  const names = [label(190, 260), label(205, 200), label(200, 262), label(30, 350)].map((one) => ({
+    ...one,
+    reach: 6,
+  }));
+  const sides = fitting(names, taken, 400, 400);
+  expect(sides.map((side) => side !== null)).toEqual([true, false, false, true]);
 });

@@ -35,6 +35,39 @@ const common = (a: Box, b: Box) =>
   Math.max(0, Math.min(a.right, b.right) - Math.max(a.left, b.left)) *
   Math.max(0, Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top));
 
+/** What signs and labels cover. */
+export const boxesOf = (labels: readonly Label[], sides: readonly Side[]): Box[] =>
+  labels.flatMap((label, i) => [signOf(label), boxOf(label, sides[i] ?? label.side)]);
+
+const signOf = ({ at: [x, y], reach }: Label): Box => ({
+  left: x - reach,
+  top: y - reach,
+  right: x + reach,
+  bottom: y + reach,
+});
+
+/** Sides for those of further labels, the most important first, that cover nothing that is `taken`; null for the others. */
+export function fitting(
+  labels: readonly Label[],
+  taken: readonly Box[],
+  width: number,
+  height: number,
+): (Side | null)[] {
+  const all = [...taken];
+  return labels.map((label) => {
+    const sign = signOf(label);
+    const isFree = (box: Box) => all.every((other) => common(box, other) === 0);
+    if (!isFree(sign)) return null;
+    const side = [label.side, ...SIDES].find((one) => {
+      const box = boxOf(label, one);
+      const within = box.left >= 0 && box.top >= 0 && box.right <= width && box.bottom <= height;
+      return within && isFree(box);
+    });
+    if (side) all.push(sign, boxOf(label, side));
+    return side ?? null;
+  });
+}
+
 /** Sides for labels, the most important first; `covers` are not to be written under, nor the edge of the window over. */
 export function placed(
   labels: readonly Label[],
@@ -42,12 +75,7 @@ export function placed(
   width: number,
   height: number,
 ): Side[] {
-  const signs = labels.map(({ at: [x, y], reach }) => ({
-    left: x - reach,
-    top: y - reach,
-    right: x + reach,
-    bottom: y + reach,
-  }));
+  const signs = labels.map(signOf);
   const taken: Box[] = [];
   return labels.map((label, i) => {
     const others = signs.filter((_, k) => k !== i);

@@ -19,16 +19,14 @@ export interface Sketch {
   handles: readonly { at: LngLat; strong: boolean }[];
 }
 
-/** What a mission that is being described would begin with; `old` while something else is described by now. */
-export interface PlanLines {
+/** What a mission that is being described would begin with; `old`: as it was described before. */
+export type PlanLines = readonly {
   old: boolean;
-  ways: readonly {
-    colour: string;
-    way: readonly LngLat[];
-    beyond: readonly LngLat[];
-    home: readonly LngLat[];
-  }[];
-}
+  colour: string;
+  way: readonly LngLat[];
+  beyond: readonly LngLat[];
+  home: readonly LngLat[];
+}[];
 
 export interface LivelyContent {
   draft: { areas: readonly PolygonGeometry[]; keepOut: readonly PolygonGeometry[] };
@@ -61,7 +59,7 @@ export const WORDS_FONT = "12px sans-serif";
 
 export const NOTHING: LivelyContent = {
   draft: { areas: [], keepOut: [] },
-  plan: { old: false, ways: [] },
+  plan: [],
   ranges: [],
   tails: [],
   swaths: [],
@@ -147,14 +145,9 @@ export function paintLively(
 }
 
 /** Lines that are planned; what comes after a vehicle has to turn back is hardly seen. */
-function paintPlan(
-  context: CanvasRenderingContext2D,
-  at: Projection,
-  { old, ways }: PlanLines,
-  paper: Paper,
-): void {
-  const opacity = old ? 0.45 : 1;
-  for (const { colour, way: lines, beyond, home } of ways) {
+function paintPlan(context: CanvasRenderingContext2D, at: Projection, plan: PlanLines, paper: Paper): void {
+  for (const { old, colour, way: lines, beyond, home } of plan) {
+    const opacity = old ? 0.45 : 1;
     line(context, at, lines, { colour: paper.casing, width: 4, opacity: 0.5 * opacity });
     line(context, at, lines, { colour, width: 2.2, dash: [7, 3], opacity });
     line(context, at, beyond, { colour, width: 1.2, dash: [2, 5], opacity: 0.6 * opacity });

@@ -6,6 +6,9 @@ import {
   blockTitle,
   comingFrom,
   earlier,
+  inAll,
+  inSequence,
+  type PlannedVehicle,
   renamed,
   toMissions,
   withAnother,
@@ -143,5 +146,54 @@ describe("the plan of a block", () => {
     const asked = comingFrom(before, middle);
     expect(asked.after).toBe("planned");
     expect(asked.vehicles.map(({ start }) => start)).toEqual([[-9, 41.001], undefined]);
+  });
+});
+
+describe("blocks on one battery", () => {
+  const plan = (distance_m: number, duration_s: number, home_s: number, left_s: number | null): PlanView =>
+    ({
+      distance_m,
+      vehicles: [
+        {
+          vehicle: "sim-1",
+          distance_m,
+          duration_s,
+          duration_s_range: { low: duration_s - 10, high: duration_s + 10 },
+          energy_needs_s: duration_s + home_s,
+          energy_left_s: left_s,
+          home_s,
+          turn_back_m: null,
+        },
+      ],
+    }) as unknown as PlanView;
+  const parts = (...plans: PlanView[]) =>
+    inSequence(plans).map(({ vehicles }) => vehicles[0] as PlannedVehicle);
+
+  it("have left what the blocks before did not use, and sums that say so", () => {
+    const [first, second] = parts(plan(1000, 600, 100, 2000), plan(500, 300, 50, 2000));
+    expect([first?.energy_left_s, second?.energy_left_s]).toEqual([2000, 1400]);
+    expect(second?.turn_back_m).toBeNull();
+    expect(inAll([first, second] as PlannedVehicle[])).toMatchObject({
+      distance_m: 1500,
+      duration_s_range: { low: 880, high: 920 },
+      energy_left_s: 2000,
+      energy_needs_s: 950,
+      home_s: 50,
+      turn_back_m: null,
+    });
+  });
+
+  it("turn back in the one in which it ends", () => {
+    const [first, second] = parts(plan(1000, 600, 100, 800), plan(500, 300, 50, 800));
+    expect(first?.turn_back_m).toBeNull();
+    // 200 s are left, of which 100 are for the way home.
+    expect(second?.turn_back_m).toBeCloseTo(500 / 3);
+    expect(inAll([first, second] as PlannedVehicle[])?.turn_back_m).toBeCloseTo(1000 + 500 / 3);
+  });
+
+  it("are not said to last where that is not known", () => {
+    const [first, second] = parts(plan(1000, 600, 100, null), plan(500, 300, 50, null));
+    expect([first?.energy_left_s, second?.energy_left_s, second?.turn_back_m]).toEqual([null, null, null]);
+    expect(inAll([])).toBeUndefined();
   });
 });

@@ -1,6 +1,6 @@
 /** Several areas of one plan, flown one after the other by the same team: blocks. Pure. */
 
-import type { LngLat, NewMission, PlanView } from "../../api/types";
+import type { ForecastView, LngLat, NewMission, PlanView } from "../../api/types";
 import { say } from "../../words/say";
 import { allBlocks, type Block, cornersOf, type Draft, toMission } from "./draft";
 
@@ -90,6 +90,76 @@ export function comingFrom(before: PlanView | undefined, mission: NewMission): N
     vehicles: mission.vehicles.map((vehicle) => {
       const start = ends.get(vehicle.name);
       return start ? { ...vehicle, start } : vehicle;
+    }),
+  };
+}
+
+export type PlannedVehicle = PlanView["vehicles"][number];
+
+/** Plans of blocks that are flown one after the other on one battery: what was used before is not left any more. */
+export function inSequence(plans: readonly PlanView[]): PlanView[] {
+  const used_s = new Map<string, number>();
+  const homeBefore_s = new Map<string, number>();
+  return plans.map((plan) => ({
+    ...plan,
+    vehicles: plan.vehicles.map((v) => {
+      const left_s = v.energy_left_s === null ? null : v.energy_left_s - (used_s.get(v.vehicle) ?? 0);
+      used_s.set(v.vehicle, (used_s.get(v.vehicle) ?? 0) + v.duration_s);
+      const home_s = v.energy_needs_s - v.duration_s;
+      const most_s = Math.max(home_s, homeBefore_s.get(v.vehicle) ?? 0);
+      homeBefore_s.set(v.vehicle, home_s);
+      if (left_s === v.energy_left_s || left_s === null) return v;
+      // Its plan knew nothing of what was used before: where it turns back is about where this lasts for the way home.
+      const share = Math.min(Math.max((left_s - most_s) / v.duration_s, 0), 1);
+      const turn_back_m = v.energy_needs_s > left_s ? share * v.distance_m : null;
+      return { ...v, energy_left_s: left_s, turn_back_m };
+    }),
+  }));
+}
+
+export function total<T>(all: readonly T[], of: (one: T) => number): number {
+  return all.reduce((sum, one) => sum + of(one), 0);
+}
+
+/** What a vehicle does in all blocks, of its parts as `inSequence` gives them: home it goes from the last one. */
+export function inAll(parts: readonly PlannedVehicle[]): PlannedVehicle | undefined {
+  const [first, last] = [parts[0], parts.at(-1)];
+  if (!first || !last) return undefined;
+  const before = (i: number, of: (part: PlannedVehicle) => number) => total(parts.slice(0, i), of);
+  const turn = parts.findIndex(({ turn_back_m }) => turn_back_m !== null);
+  return {
+    ...last,
+    distance_m: total(parts, (part) => part.distance_m),
+    duration_s: total(parts, (part) => part.duration_s),
+    duration_s_range: {
+      low: total(parts, (part) => part.duration_s_range.low),
+      high: total(parts, (part) => part.duration_s_range.high),
+    },
+    energy_left_s: first.energy_left_s,
+    energy_needs_s: Math.max(
+      ...parts.map((part, i) => before(i, ({ duration_s }) => duration_s) + part.energy_needs_s),
+    ),
+    turn_back_m:
+      turn < 0 ? null : before(turn, ({ distance_m }) => distance_m) + (parts[turn]?.turn_back_m ?? 0),
+  };
+}
+
+/** What is to be expected of several blocks: sums, as soon as each was simulated. */
+export function forecastInAll(found: readonly ForecastView[]) {
+  return {
+    duration_s_range: {
+      low: total(found, (view) => view.duration_s_range.low),
+      high: total(found, (view) => view.duration_s_range.high),
+    },
+    vehicles: (found[0]?.vehicles ?? []).map(({ vehicle }) => {
+      const ways = found.flatMap((view) => view.vehicles.filter((one) => one.vehicle === vehicle));
+      return {
+        vehicle,
+        distance_m_range: {
+          low: total(ways, (way) => way.distance_m_range.low),
+          high: total(ways, (way) => way.distance_m_range.high),
+        },
+      };
     }),
   };
 }

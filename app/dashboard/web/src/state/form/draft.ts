@@ -51,6 +51,8 @@ export interface Draft extends Texts {
   length: LengthUnit;
   /** How far apart lines over the whole area are to be, which is another way to give the length; empty: it is given. */
   spacing_m: string;
+  /** How deep it is, for plan and forecast alone; empty: they guess. */
+  floor_depth_m: string;
   /** As "latitude, longitude". */
   goal: string;
   entry: string;
@@ -127,6 +129,7 @@ export function emptyDraft(middle: LngLat): Draft {
     site: "",
     length: "steps",
     spacing_m: "",
+    floor_depth_m: "",
     goal: "",
     entry: "",
     obstacles: [],
@@ -294,6 +297,11 @@ export function faultsOf(described: Draft): Faults {
   note("name", draft.name.trim() ? "" : say("draft.giveTheMissionAName"));
   if (draft.spacing_m.trim() !== "")
     note("spacing_m", numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE));
+  if (draft.floor_depth_m.trim() !== "")
+    note(
+      "floor_depth_m",
+      numberFault(say("asked.depthOfTheBottom"), draft.floor_depth_m, SPEC.floor_depth_m),
+    );
   if (draft.source === "typed") {
     for (const [field, label, schema] of corner()) note(field, numberFault(label, draft[field], schema));
   }

@@ -83,7 +83,7 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
 export function withTemplate(template: NewMission, draft: Draft): Draft {
   const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
     draft;
-  const { blocks, turn, block_name } = draft;
+  const { blocks, turn, block_name, floor_depth_m } = draft;
   const { own, ...settings } = draftOf(template);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
   return {
@@ -91,7 +91,7 @@ export function withTemplate(template: NewMission, draft: Draft): Draft {
     own: Object.fromEntries(placeless),
     obstacles: [],
     ...{ name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery },
-    ...{ blocks, turn, block_name },
+    ...{ blocks, turn, block_name, floor_depth_m },
   };
 }
 

@@ -71,6 +71,28 @@ describe("a plan", () => {
   });
 });
 
+it("what is found of several plans is shown before the others are", async () => {
+  const told: [string, boolean][] = [];
+  let end = () => {};
+  const partly = new LatestAsker<string>(
+    async (of, _, tell) => {
+      tell(`part of ${of}`);
+      await new Promise<void>((go) => {
+        end = go;
+      });
+      return `all of ${of}`;
+    },
+    (answer, current) => told.push(["found" in answer ? answer.found : "", current]),
+  );
+  partly.want("a");
+  await vi.advanceTimersByTimeAsync(200);
+  expect(told).toEqual([["part of a", true]]);
+  partly.want("b");
+  end();
+  await vi.advanceTimersByTimeAsync(0);
+  expect(told.at(-1)).toEqual(["all of a", false]);
+});
+
 describe("plans of several missions", () => {
   it("are asked for in their order, each with the one before, and only of what changed", async () => {
     const asked: string[] = [];
@@ -82,9 +104,12 @@ describe("plans of several missions", () => {
       (before: string | undefined, mission) => `${before ?? ""}${mission}`,
     );
     const { signal } = new AbortController();
-    expect(await plans('["a","b"]', signal)).toEqual(["A", "AB"]);
-    expect(await plans('["a","c"]', signal)).toEqual(["A", "AC"]);
-    expect(await plans('["b"]', signal)).toEqual(["B"]);
+    const told: string[][] = [];
+    const tell = (part: string[]) => told.push(part);
+    expect(await plans('["a","b"]', signal, tell)).toEqual(["A", "AB"]);
+    expect(told).toEqual([["A"], ["A", "AB"]]);
+    expect(await plans('["a","c"]', signal, tell)).toEqual(["A", "AC"]);
+    expect(await plans('["b"]', signal, tell)).toEqual(["B"]);
     expect(asked).toEqual(["a", "Ab", "Ac", "b"]);
   });
 });

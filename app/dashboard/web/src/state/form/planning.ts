@@ -7,16 +7,18 @@ const LONGEST_WAIT_MS = 450;
 /** What is asked for is let finish for so long although something newer is wanted: else a drag would show nothing. */
 const PATIENCE_MS = 700;
 
+type Ask<T> = (of: string, gone: AbortSignal, tell: (part: T) => void) => Promise<T>;
+
 /**
- * Asks for the plans of several missions, one after the other, each as it follows from the plan before; what did not
- * change since is not asked for again.
+ * Asks for the plans of several missions, one after the other, each as it follows from the plan before, and tells after
+ * each which there are; what did not change since is not asked for again.
  */
 export function plansOf<Mission, Plan>(
   ask: (mission: Mission, gone: AbortSignal) => Promise<Plan>,
   following: (before: Plan | undefined, mission: Mission) => Mission,
-): (of: string, gone: AbortSignal) => Promise<Plan[]> {
+): Ask<Plan[]> {
   let known = new Map<string, Plan>();
-  return async (of, gone) => {
+  return async (of, gone, tell) => {
     const found = new Map<string, Plan>();
     for (const one of JSON.parse(of) as Mission[]) {
       const mission = following([...found.values()].at(-1), one);
@@ -24,6 +26,7 @@ export function plansOf<Mission, Plan>(
       const plan: Plan = known.get(key) ?? (await ask(mission, gone));
       known.set(key, plan);
       found.set(key, plan);
+      tell([...found.values()]);
     }
     known = found;
     return [...found.values()];
@@ -41,7 +44,7 @@ export class LatestAsker<T> {
   #underWay: { of: string; gone: AbortController; begun: number } | null = null;
 
   constructor(
-    readonly ask: (of: string, gone: AbortSignal) => Promise<T>,
+    readonly ask: Ask<T>,
     readonly show: (answer: Answer<T>, current: boolean) => void,
   ) {}
 
@@ -81,7 +84,10 @@ export class LatestAsker<T> {
       this.show(answer, of === this.#wanted);
       if (of !== this.#wanted && this.#timer === undefined) this.#begin();
     };
-    this.ask(of, mine.gone.signal).then(
+    const tell = (part: T) => {
+      if (this.#underWay === mine) this.show({ found: part, of }, of === this.#wanted);
+    };
+    this.ask(of, mine.gone.signal, tell).then(
       (found) => end({ found, of }),
       (error: unknown) => end({ error, of }),
     );

@@ -14,7 +14,7 @@ const LATELY_MS = 15_000;
 
 function show(place: LngLat | null): void {
   if (!place) return;
-  marked.value = place;
+  marked.value = { at: place };
   const [lng, lat] = place;
   destination.value = [lng - ABOUT_DEG, lat - ABOUT_DEG, lng + ABOUT_DEG, lat + ABOUT_DEG];
 }

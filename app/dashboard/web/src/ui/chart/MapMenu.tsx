@@ -84,7 +84,7 @@ export function MapMenu() {
         measured.value = [menu.at];
       })}
       {item("mark", say("mapMenu.mark"), () => {
-        marked.value = menu.at;
+        marked.value = { at: menu.at };
       })}
     </div>
   );

@@ -1,19 +1,14 @@
 import "./MapTools.css";
-import { type Signal, useSignal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef } from "preact/hooks";
-import type { LngLat } from "../../api/types";
 import { wayBetween } from "../../map/geo";
-import { placeOf, placeSample } from "../../state/coordinates";
 import { followOwn, ownFault, whyNoPosition } from "../../state/device/geolocation";
 import { distance } from "../../state/format";
 import {
   coordinateFormat,
   crossovers,
-  destination,
   goingTo,
   in3d,
-  marked,
   measured,
   mission,
   seaFloor,
@@ -28,8 +23,8 @@ import {
   tab,
 } from "../../state/store";
 import { say, sayWith } from "../../words/say";
-import { OwnShip } from "../OwnShip";
 import { Button, flips, sets } from "../parts/Controls";
+import { GoTo } from "./GoTo";
 
 /** Buttons on the map's edge: show the area, measure, what is drawn, look at it in space. */
 export function MapTools({ onFit }: { onFit: () => void }) {
@@ -138,57 +133,6 @@ export function MapTools({ onFit }: { onFit: () => void }) {
         {measuring ? <Measured /> : null}
       </div>
     </>
-  );
-}
-
-/** As much about a place as is shown of it, degrees. */
-const ABOUT = 0.002;
-
-/** Asks for a position in any of the usual ways, goes there and marks it. */
-function GoTo() {
-  const text = useSignal("");
-  const fault = useSignal("");
-  const field = useRef<HTMLInputElement>(null);
-  useEffect(() => field.current?.focus(), []);
-  const show = (at: LngLat) => {
-    marked.value = at;
-    destination.value = [at[0] - ABOUT, at[1] - ABOUT, at[0] + ABOUT, at[1] + ABOUT];
-  };
-  const go = (event: SubmitEvent) => {
-    event.preventDefault();
-    const at = placeOf(text.value);
-    fault.value = at ? "" : say("mapTools.typeAPositionSuchAs", { sample: placeSample() });
-    if (at) show(at);
-  };
-  return (
-    <form class="go-to" onSubmit={go}>
-      <input
-        ref={field}
-        type="text"
-        aria-label={say("mapTools.positionToGoTo")}
-        placeholder={say("mapTools.sample")}
-        aria-invalid={fault.value !== ""}
-        value={text.value}
-        data-testid="go-to-position"
-        onInput={(event) => {
-          text.value = event.currentTarget.value;
-        }}
-      />
-      <button type="submit" class="command" data-testid="go">
-        {say("mapTools.go")}
-      </button>
-      <OwnShip id="go-to" onPlace={show} />
-      {marked.value ? (
-        <Button kind="link-button" onClick={sets(marked, null)}>
-          {say("mapTools.unmark")}
-        </Button>
-      ) : null}
-      {fault.value ? (
-        <span class="fault" role="alert" data-testid="go-to-fault">
-          ▲ {fault.value}
-        </span>
-      ) : null}
-    </form>
   );
 }
 

@@ -193,16 +193,15 @@ export function follow(chart: Chart): () => void {
 
 /** The lines of the plan of what is being described, each cut where its vehicle has to turn back. */
 function planLines(): PlanLines {
-  const { plans, old } = planned.value ?? { plans: [], old: false };
-  const ways = plans.flatMap(({ vehicles }, block) =>
+  const { plans, fresh } = planned.value ?? { plans: [], fresh: 0 };
+  return plans.flatMap(({ vehicles }, block) =>
     vehicles.map((v, i) => {
       const [way, beyond] = cutAt(v.way, v.turn_back_m);
       // Before the next block nobody goes home.
       const home = block === plans.length - 1 ? (v.way_home ?? []) : [];
-      return { colour: vehicleColour(i), way, beyond, home };
+      return { old: block >= fresh, colour: vehicleColour(i), way, beyond, home };
     }),
   );
-  return { old, ways };
 }
 
 /** A place that was asked for, where this device is, and where the own ship is. */
@@ -214,9 +213,9 @@ function pointedOut(): PlaceMark[] {
     ...(asked
       ? [
           {
-            words: place(asked, coordinateFormat.value),
+            words: asked.name ?? place(asked.at, coordinateFormat.value),
             sign: "position" as const,
-            at: asked,
+            at: asked.at,
             radius_m: 0,
           },
         ]

@@ -2,12 +2,14 @@ import "./PreflightDialog.css";
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../../api/client";
+import SPEC from "../../api/mission.json";
 import type { CheckStatus, PreflightView } from "../../api/types";
+import { pointed } from "../../state/format";
 import { act, actionWords, busyWith, refusal, said } from "../../state/session";
 import { mission, preflightOpen, selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Forecast } from "../forecast/Forecast";
-import { Button, sets } from "../parts/Controls";
+import { Button, sets, Typed } from "../parts/Controls";
 import { Dialog } from "../parts/Dialog";
 
 const SIGNS: Record<CheckStatus, string> = { ok: "✓", note: "•", warning: "▲", problem: "✕" };
@@ -18,6 +20,7 @@ const AGAIN_MS = 3000;
 export function PreflightDialog() {
   const found = useSignal<PreflightView | null>(null);
   const fault = useSignal("");
+  const depth = useSignal("");
   const open = preflightOpen.value;
 
   useEffect(() => {
@@ -96,7 +99,17 @@ export function PreflightDialog() {
         ))}
       </ul>
       {open && selectedId.value && mission.value?.spec.kind !== "search" ? (
-        <Forecast of={selectedId.value} ask={(gone) => api.forecast(selectedId.peek() ?? "", gone)} />
+        <>
+          <label class="field">
+            {say("asked.depthOfTheBottomM")}
+            <Typed text={depth} id="preflight-floor_depth_m" placeholder={say("asked.aGuess")} />
+            <small>{SPEC.floor_depth_m.description}</small>
+          </label>
+          <Forecast
+            of={`${selectedId.value} ${depth.value}`}
+            asks={[(gone) => api.forecast(selectedId.peek() ?? "", pointed(depth.value), gone)]}
+          />
+        </>
       ) : null}
     </Dialog>
   );

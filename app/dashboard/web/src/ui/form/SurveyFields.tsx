@@ -1,8 +1,9 @@
 import "./SurveyFields.css";
-import { api } from "../../api/client";
+import { api, type Described } from "../../api/client";
 import SPEC from "../../api/mission.json";
+import type { PlanView } from "../../api/types";
 import { sizeOf } from "../../map/area";
-import { blockTitle, toMissions } from "../../state/form/blocks";
+import { blockTitle, comingFrom, toMissions } from "../../state/form/blocks";
 import {
   allBlocks,
   canPlan,
@@ -12,11 +13,11 @@ import {
   type LengthChoice,
   lengthChoiceOf,
   PLANNER_PRESETS,
-  toMission,
   withLength,
 } from "../../state/form/draft";
 import { FIELDS } from "../../state/form/missionFields";
 import { distance, duration, fixed } from "../../state/format";
+import { planned } from "../../state/store";
 import { say } from "../../words/say";
 import { Forecast } from "../forecast/Forecast";
 import { Planned, usePlan } from "../forecast/Planned";
@@ -137,6 +138,12 @@ function Length() {
   );
 }
 
+/** By what was planned, if that is known, where the vehicles come from into a block. */
+function planBefore(block: number): PlanView | undefined {
+  const { plans, fresh } = planned.peek() ?? { plans: [], fresh: 0 };
+  return block > fresh ? undefined : plans[block - 1];
+}
+
 /** What the mission takes at most, its plan drawn anew with every change, and a simulation of it when asked for. */
 function Expected() {
   const { draft } = useForm();
@@ -144,11 +151,25 @@ function Expected() {
   const found = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
   const whole =
     found !== null && Object.keys(faultsOf({ ...draft, name: draft.name || "forecast" })).length === 0;
-  const mine = whole ? JSON.stringify(toMission({ ...draft, name: "forecast" })) : null;
-  const fault = usePlan(whole ? JSON.stringify(toMissions({ ...draft, name: "forecast" })) : null);
+  const { floor_depth_m } = draft;
+  const described = whole
+    ? toMissions({ ...draft, name: "forecast" }).map((mission): Described => ({ mission, floor_depth_m }))
+    : [];
+  const mine = whole ? JSON.stringify(described) : null;
+  const fault = usePlan(mine);
+  const names = allBlocks(draft).map(blockTitle);
   if (!found) return null;
   return (
     <>
+      <div class="explained">
+        <Text
+          field="floor_depth_m"
+          label={say("asked.depthOfTheBottomM")}
+          placeholder={say("asked.aGuess")}
+          numeric
+        />
+        <small>{SPEC.floor_depth_m.description}</small>
+      </div>
       <p class="hint" data-testid="estimate">
         {say("asked.atMostAndOfTracksAs", {
           seconds: duration(found.seconds),
@@ -160,11 +181,15 @@ function Expected() {
               : say("asked.upToFromTheRecoveryPoint", { farthestM: distance(found.farthest_m) }),
         })}
       </p>
-      <Planned of={found} names={allBlocks(draft).map(blockTitle)} turn={draft.turn} fault={fault} />
+      <Planned of={found} names={names} turn={draft.turn} fault={fault} />
       {mine ? (
         <Forecast
           of={mine}
-          ask={(gone) => api.forecastOf(toMission({ ...draft, name: draft.name || "forecast" }), gone)}
+          names={names}
+          asks={described.map(
+            (one, i) => (gone) =>
+              api.forecastOf({ ...one, mission: comingFrom(planBefore(i), one.mission) }, gone),
+          )}
         />
       ) : null}
     </>

@@ -42,7 +42,7 @@ export function ProfileChart({ cuts, none_m }: { cuts: readonly Cut[]; none_m: n
     at.value = index;
     const [first] = cuts;
     const place = index === null ? undefined : first?.profile.positions[index];
-    if (place) marked.value = [place[0], place[1]];
+    if (place) marked.value = { at: [place[0], place[1]] };
   };
   const points = cuts[0]?.profile.along_m ?? [];
   const here = at.value === null ? undefined : points[at.value];
