@@ -1,14 +1,18 @@
 """How the errors of reckoned positions grow, as rows of a sparse least-squares problem over nodes of the tracks."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import ComplexArray, FloatArray, IntArray
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
 
 HOUR_S = 3600.0
+PLACE_S = 5.0
+"""A vehicle is amid what it sounds within so many seconds."""
+
 FACTORS = (0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
 FACTOR_LOG_SD = 1.0
 """Vehicles drift more or less than usual by a factor whose logarithm has this deviation."""
@@ -21,8 +25,9 @@ RATE_TIMES_S = (200.0, 500.0, 1200.0)
 class DriftModel:
     """How a vehicle's reckoned position drifts from where it is; the same for east and north.
 
-    The error is the sum of a random walk and of a rate that changes slowly (a Gauss-Markov process of first order), as
-    currents and a wrong heading make it.
+    The error is the sum of a random walk, of a rate that changes slowly (a Gauss-Markov process of first order), as
+    currents make it, and of a share of the way since the dive began, as a wrong heading (across) and a wrong scale of
+    speed (along) make it: it grows on each line, and goes back on the next.
 
     Attributes
     ----------
@@ -34,12 +39,18 @@ class DriftModel:
         After so long the rate is mostly another one.
     start_sd_m
         Standard deviation of the error at the begin of a dive.
+    scale_sd
+        Standard deviation of the share of the way that it is off by along it; Doppler logs have 0.2 to 0.4 % of it.
+    heading_sd_rad
+        The same across, by a wrong heading; compasses on vehicles are off by 0.5 to 1 degree.
     """
 
     walk_m: float = 3.0
     rate_mph: float = 15.0
     rate_time_s: float = 600.0
     start_sd_m: float = 1.0
+    scale_sd: float = 0.003
+    heading_sd_rad: float = 0.01
 
     def variants(self) -> list[tuple["DriftModel", float]]:
         """Return the models that may hold where this is what is usual, each with the logarithm of its probability.
@@ -65,11 +76,14 @@ class Nodes:
     vehicle, dive : (m,)
         Dives are numbered over all vehicles; a fix that the vehicle reckons from begins another one.
     time_s : (m,)
+    place_m : (m, 2)
+        East and north by the vehicle's own position, about.
     """
 
     vehicle: IntArray
     dive: IntArray
     time_s: FloatArray
+    place_m: FloatArray
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -90,10 +104,12 @@ class Nodes:
                 vehicle.append(one)
                 dives.append(np.linspace(begin, end, count + 1))
         sizes = [len(times) for times in dives]
+        places = [_places(soundings, one, times) for one, times in zip(vehicle, dives, strict=True)]
         return cls(
             vehicle=np.repeat(np.array(vehicle, dtype=np.int64), sizes),
             dive=np.repeat(np.arange(len(dives)), sizes),
             time_s=np.concatenate([np.zeros(0), *dives]),
+            place_m=np.concatenate([np.zeros((0, 2)), *places]),
         )
 
     def weights(self, vehicle: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -127,37 +143,65 @@ class Nodes:
         return sparse.csr_array((share.ravel(), (at, rows.ravel())), shape=(len(time_s), len(self)))
 
 
-def prior_rows(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csr_array, FloatArray]:
-    """Return what drift and fixes say of errors and rates of one coordinate at a time.
+def _places(soundings: TrackSoundings, vehicle: int, time_s: FloatArray) -> FloatArray:
+    """Return where a vehicle was at the nodes of a dive (n,), (n, 2): amid what it sounded then, else between that."""
+    begin = time_s[0]
+    own = soundings.take(
+        (soundings.vehicle == vehicle) & (soundings.time_s >= begin) & (soundings.time_s <= time_s[-1])
+    )
+    if not len(own):
+        return np.zeros((len(time_s), 2))
+    piece = np.floor((own.time_s - begin) / PLACE_S).astype(np.int64)
+    count = np.bincount(piece)
+    seen = count > 0
+    at, east, north = (
+        np.bincount(piece, column)[seen] / count[seen] for column in (own.time_s - begin, own.east_m, own.north_m)
+    )
+    return np.column_stack([np.interp(time_s - begin, at, east), np.interp(time_s - begin, at, north)])
+
+
+def prior_rows(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csr_array, ComplexArray]:
+    """Return what drift and fixes say of errors and rates, whose real part is east and imaginary one north.
 
     Returns
     -------
-    A matrix (r, 2 m) of weighted rows, errors of all nodes first, then their rates (m/s), and what it is to be
-    multiplied to, (r, 2) for east and north.
+    A matrix (r, u) of weighted rows, of errors of all m nodes first, then of their rates (m/s), then of the share of
+    its way that each dive is off by (real along, imaginary across to port), of which alone they say nothing; and what
+    it is to be multiplied to, (r,).
     """
     m = len(nodes)
     rate_sd = model.rate_mph / HOUR_S
     rows: list[IntArray] = []
     cols: list[IntArray] = []
-    values: list[FloatArray] = []
-    right: list[FloatArray] = []
+    values: list[ComplexArray] = []
+    right: list[ComplexArray] = []
     count = 0
 
-    def add(entries: list[tuple[IntArray, FloatArray]], sd: FloatArray, to: FloatArray | None = None) -> None:
+    def add(entries: list[tuple[IntArray, Any]], sd: FloatArray, to: complex = 0.0) -> None:
         nonlocal count
         n = len(sd)
         for column, value in entries:
             rows.append(count + np.arange(n))
             cols.append(column)
-            values.append(value / sd)
-        right.append(np.zeros((n, 2)) if to is None else to / sd[:, None])
+            values.append(np.asarray(value / sd, dtype=np.complex128))
+        right.append(np.asarray(to / sd, dtype=np.complex128))
         count += n
 
     joined = np.flatnonzero(np.diff(nodes.dive) == 0)
     step = nodes.time_s[joined + 1] - nodes.time_s[joined]
     one = np.ones(len(joined))
+    way = np.diff(nodes.place_m @ (1.0, 1.0j))[joined]
     walk_sd = np.maximum(model.walk_m * np.sqrt(step / HOUR_S), 1e-3)
-    add([(joined + 1, one), (joined, -one), (m + joined, -0.5 * step), (m + joined + 1, -0.5 * step)], walk_sd)
+    add(
+        [
+            (joined + 1, one),
+            (joined, -one),
+            (m + joined, -0.5 * step),
+            (m + joined + 1, -0.5 * step),
+            (2 * m + nodes.dive[joined], -way),
+        ],
+        walk_sd,
+    )
     kept = np.exp(-step / model.rate_time_s)
     add([(m + joined + 1, one), (m + joined, -kept)], rate_sd * np.sqrt(np.maximum(1.0 - kept**2, 1e-6)))
     first = np.flatnonzero(np.diff(nodes.dive, prepend=-1) != 0)
@@ -182,9 +226,9 @@ def prior_rows(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.cs
         at, share = nodes.weights(fixes.vehicle[k : k + 1], fixes.time_s[k : k + 1])
         if len(ends):
             at, share = np.array([[ends[0], ends[0]]]), np.array([[1.0, 0.0]])
-        off = np.array([[fixes.east_m[k], fixes.north_m[k]]])
+        off = complex(fixes.east_m[k], fixes.north_m[k])
         add([(at[:, 0], share[:, 0]), (at[:, 1], share[:, 1])], fixes.sd_m[k : k + 1], off)
     matrix = sparse.csr_array(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(count, 2 * m)
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), shape=(count, 2 * m + len(first))
     )
     return matrix, np.concatenate(right)

@@ -51,15 +51,14 @@ class Solution:
 
 
 class LeastSquares:
-    """The least-squares problem: unknowns are errors and rates of all nodes, east first, then north."""
+    """The least-squares problem: unknowns are those of :func:`prior_rows`, east first, then north."""
 
     def __init__(self, nodes: Nodes, fixes: Fixes, model: DriftModel) -> None:
         self._m = len(nodes)
         self.model = model
-        matrix, right = prior_rows(nodes, fixes, model)
-        self._normal = _of_both(matrix)
-        self._log_prior = _half_log_det(_factors(_of_both(prior_rows(nodes, Fixes.none(), model)[0])))
-        self._right = np.concatenate([matrix.T @ right[:, 0], matrix.T @ right[:, 1]])
+        self._normal, self._right = _normal(nodes, fixes, model)
+        self._each = len(self._right) // 2
+        self._log_prior = _half_log_det(_factors(_normal(nodes, Fixes.none(), model)[0]))
 
     def solve(self, ties: WeighedTies) -> Solution:
         """Return the solution under ties."""
@@ -74,17 +73,17 @@ class LeastSquares:
             for i in range(2):
                 for j in range(2):
                     value = weight * tie.information[i, j]
-                    at = np.broadcast_to((2 * i * self._m + tie.nodes)[:, None], squares.shape)
+                    at = np.broadcast_to((i * self._each + tie.nodes)[:, None], squares.shape)
                     rows.append(at.ravel())
-                    cols.append(np.broadcast_to(2 * j * self._m + tie.nodes, squares.shape).ravel())
+                    cols.append(np.broadcast_to(j * self._each + tie.nodes, squares.shape).ravel())
                     values.append((value * squares).ravel())
-                    right[2 * i * self._m + tie.nodes] += tie.weights * value * target[j]
+                    right[i * self._each + tie.nodes] += tie.weights * value * target[j]
         if rows:
             added = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
             normal = normal + sparse.csc_array(added, shape=normal.shape)
         factors = _factors(normal)
         found = factors.solve(right)
-        offset = np.column_stack([found[: self._m], found[2 * self._m : 3 * self._m]])
+        offset = np.column_stack([found[: self._m], found[self._each : self._each + self._m]])
         log_evidence = self._log_prior - _half_log_det(factors) + 0.5 * float(right @ found)
         return Solution(offset, factors, ties, log_evidence)
 
@@ -95,11 +94,11 @@ class LeastSquares:
         for begin in range(0, k, COLUMNS_AT_ONCE):
             piece = compared[begin : begin + COLUMNS_AT_ONCE].toarray()
             for i in range(2):
-                wide = np.zeros((4 * self._m, len(piece)))
-                wide[2 * i * self._m : (2 * i + 1) * self._m] = piece.T
+                wide = np.zeros((2 * self._each, len(piece)))
+                wide[i * self._each : i * self._each + self._m] = piece.T
                 solved = solution.factors.solve(wide)
                 for j in range(2):
-                    part = solved[2 * j * self._m : (2 * j + 1) * self._m]
+                    part = solved[j * self._each : j * self._each + self._m]
                     found[begin : begin + len(piece), i, j] = np.einsum("km,mk->k", piece, part)
         return 0.5 * (found + found.transpose(0, 2, 1))
 
@@ -151,10 +150,15 @@ class DriftModels:
         return mean, np.sqrt(variance), np.sqrt(before_variance)
 
 
-def _of_both(matrix: sparse.csr_array) -> sparse.csc_array:
-    """Return the normal matrix of rows that say the same of east and north."""
-    normal = sparse.csc_array(matrix.T @ matrix)
-    return sparse.csc_array(sparse.block_diag([normal, normal], format="csc"))
+def _normal(nodes: Nodes, fixes: Fixes, model: DriftModel) -> tuple[sparse.csc_array, FloatArray]:
+    """Return the normal matrix (2 u, 2 u) and its right side (2 u,) without ties."""
+    matrix, right = prior_rows(nodes, fixes, model)
+    normal = sparse.csc_array(matrix.conj().T @ matrix)
+    both = sparse.block_array([[normal.real, -normal.imag], [normal.imag, normal.real]])
+    share = np.arange(normal.shape[0]) >= 2 * len(nodes)
+    precision = np.concatenate([share / model.scale_sd**2, share / model.heading_sd_rad**2])
+    told = matrix.conj().T @ right
+    return sparse.csc_array(both + sparse.diags_array(precision)), np.concatenate([told.real, told.imag])
 
 
 def _factors(normal: sparse.csc_array) -> SuperLU:

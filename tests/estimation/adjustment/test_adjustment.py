@@ -142,14 +142,23 @@ def test_deviations_hold_whatever_vehicles_drift_by() -> None:
     assert np.mean(within) <= 0.98
 
 
-def share_within(times_usual: float) -> float:
-    """How much of two vehicles' ways is within 1.96 deviations, of which only both ends are fixed."""
+def test_deviations_hold_on_long_lines_whose_heading_is_wrong() -> None:
+    """What bends each line by metres and is gone at its end is not seen by fixes at both ends."""
+    assert share_within(0.25, heading_sd_rad=0.01) >= 0.9
+
+
+def share_within(times_usual: float, heading_sd_rad: float = 0.0) -> float:
+    """How much of two vehicles' ways is within 1.96 deviations, of which only both ends are fixed.
+
+    Where their headings are wrong they are lines of 250 m to and fro.
+    """
     rng = np.random.default_rng(11)
     usual = DriftModel()
     end_s, step_s = 1200.0, 10.0
     time_s = np.arange(0.0, end_s + 1.0, step_s)
     n = len(time_s)
     level = np.zeros(2 * n)
+    east = (250.0 - np.abs(1.2 * time_s % 500.0 - 250.0)) * (heading_sd_rad > 0.0)
     within = []
     for _ in range(8):
         rate_time_s = float(rng.choice([200.0, 600.0, 1200.0]))
@@ -159,11 +168,12 @@ def share_within(times_usual: float) -> float:
             rate[:, k] = kept * rate[:, k - 1] + np.sqrt(1.0 - kept**2) * rate[:, k]
         walk = rng.standard_normal((2, n, 2)) * usual.walk_m * np.sqrt(step_s / 3600.0)
         error = times_usual * np.cumsum(walk + rate * usual.rate_mph / 3600.0 * step_s, axis=1)
+        error[:, :, 1] += heading_sd_rad * rng.standard_normal((2, 1)) * east
         # It begins with the error of its fix.
         error += 0.3 * rng.standard_normal((2, 1, 2)) - error[:, :1]
         seen = error[:, -1] + 0.3 * rng.standard_normal((2, 2))
         of = np.repeat(np.arange(2), n)
-        soundings = TrackSoundings(of, np.tile(time_s, 2), level, level, level + 5.0, level + 0.1)
+        soundings = TrackSoundings(of, np.tile(time_s, 2), np.tile(east, 2), level, level + 5.0, level + 0.1)
         fixes = Fixes(
             vehicle=np.repeat(np.arange(2), 2),
             time_s=np.tile([0.0, end_s], 2),
@@ -177,3 +187,23 @@ def share_within(times_usual: float) -> float:
         left = error.reshape(-1, 2) - inner @ found.offset_m
         within.append(np.mean(np.abs(left) <= 1.96 * (inner @ found.sd_m)))
     return float(np.mean(within))
+
+
+@settings(max_examples=10, deadline=None)
+@given(scale=st.floats(-0.005, 0.005), heading_rad=st.floats(-0.03, 0.03), course_rad=st.floats(-3.1, 3.1))
+def test_a_wrong_heading_or_scale_seen_by_fixes_is_taken_out_of_the_whole_dive(
+    scale: float, heading_rad: float, course_rad: float
+) -> None:
+    """What a vehicle is off by grows on its way out and goes on the way back, whichever way it goes."""
+    time_s = np.arange(0.0, 801.0, 5.0)
+    way = np.array([1.0, 0.2j]) @ np.array([100.0 - np.abs(time_s % 400.0 - 200.0) / 2.0, time_s / 8.0])
+    way = way * np.exp(1.0j * course_rad)
+    error = (way - way[0]) * complex(scale, heading_rad)
+    n = len(time_s)
+    of, level = np.zeros(n, np.int64), np.zeros(n)
+    soundings = TrackSoundings(of, time_s, way.real, way.imag, level + 5.0, level + 0.1)
+    at = np.searchsorted(time_s, [0.0, 200.0])
+    fixes = Fixes(of[:2], time_s[at], error[at].real, error[at].imag, np.full(2, 1e-3), np.array([True, False]))
+    still = DriftModel(walk_m=1e-2, rate_mph=1e-2)
+    left = adjusted(soundings, fixes, still).at(0, time_s) @ (1.0, 1.0j) - error
+    assert np.abs(left).max() < 0.05
