@@ -61,6 +61,8 @@ KEPT_TERRAINS = 32
 RAISED_BY_M, CLIMB = 0.05, 4.0
 """A vehicle over a rising bottom is raised by at least so much each time, and by so many times what it is too low more
 than to its least altitude: over a steep bottom it would never come up to it."""
+ROOM_M = 0.5
+"""It goes down to its depth again where that is so much higher above the bottom than it has to be."""
 
 FORSAKEN_S = 60.0
 """A vehicle that is out of reach for so long gives its waypoint up, as DUNE does: its motor is off and it comes up."""
@@ -409,12 +411,14 @@ class SimFleetLink(FleetLink):
                 deployed.adrift = True
 
     def _keep_clear_of_bottom(self, deployed: DeployedVehicle, order: WaypointOrder) -> None:
-        """Raise a vehicle over a rising bottom, again and again."""
-        too_low_m = order.min_altitude_m - deployed.body.state.altitude_m
-        if not too_low_m > 0.0:
-            return
-        depth_m = max(0.0, deployed.body.bottom_m - order.min_altitude_m - CLIMB * too_low_m)
-        if depth_m < deployed.raised_to_m - RAISED_BY_M:
+        """Raise a vehicle over a rising bottom, again and again, and let it go down where that has fallen."""
+        bottom_m, least_m = deployed.body.bottom_m, order.min_altitude_m
+        too_low_m = least_m - deployed.body.state.altitude_m
+        ahead = order.lead if deployed.reached and order.lead is not None else order.position
+        depth_m = max(0.0, bottom_m - least_m - CLIMB * too_low_m)
+        if too_low_m > 0.0 and depth_m < deployed.raised_to_m - RAISED_BY_M:
             deployed.raised_to_m = depth_m
-            ahead = order.lead if deployed.reached and order.lead is not None else order.position
             deployed.head_for(order, ahead, depth_m)
+        elif deployed.raised_to_m < ahead.depth_m and bottom_m - ahead.depth_m > least_m + ROOM_M:
+            deployed.raised_to_m = math.inf
+            deployed.head_for(order, ahead, ahead.depth_m)

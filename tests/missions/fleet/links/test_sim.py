@@ -118,25 +118,29 @@ async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float
         await link.close()
 
 
-async def test_it_keeps_clear_of_a_bottom_that_goes_on_rising(tmp_path: Path) -> None:
+async def test_it_climbs_over_a_bank_and_goes_down_behind_it(tmp_path: Path) -> None:
     events: list[FleetEvent] = []
-    rising = Terrain(np.tile(np.linspace(12.0, 2.5, 101)[:, None], (1, 101)), 1.0)
-    save_npz(rising, tmp_path / "rising.npz")
-    link = SimFleetLink(SimulationSettings(terrain=tmp_path / "rising.npz"), 50.0)
+    # A bank 60 m from the south, and deep water behind it.
+    bank = np.interp(np.arange(101.0), [0.0, 25.0, 70.0, 75.0, 101.0], [9.0, 9.0, 4.0, 9.0, 9.0])
+    floor = Terrain(np.tile(bank[:, None], (1, 101)), 1.0)
+    save_npz(floor, tmp_path / "bank.npz")
+    link = SimFleetLink(SimulationSettings(terrain=tmp_path / "bank.npz"), 50.0)
     await link.start(events.append)
     try:
         link.launch(launch(BatterySpec()))
         await link.engage(NAME)
-        lat, lon = FLOOR.frame.to_geodetic(50, 90)
-        await link.order(WaypointOrder("m", 1, NAME, Position(lat, lon, 8.0), 1.0, 4.0, 1.0))
+        lat, lon = FLOOR.frame.to_geodetic(50, 95)
+        await link.order(WaypointOrder("m", 1, NAME, Position(lat, lon, 7.0), 1.0, 4.0, 1.0))
         await until(
             lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
             "it has arrived",
         )
     finally:
         await link.close()
-    altitudes_m = [e.altitude_m for e in events if isinstance(e, VehicleReport) and e.altitude_m is not None]
-    assert min(altitudes_m) > 0.5, "where a failsafe would bring it up for good"
+    reports = [event for event in events if isinstance(event, VehicleReport)]
+    assert min(e.altitude_m for e in reports if e.altitude_m is not None) > 0.5, "a failsafe would bring it up for good"
+    assert min(e.position.depth_m for e in reports[len(reports) // 3 :]) < 3.2
+    assert reports[-1].position.depth_m > 4.5, "behind the bank it goes down again, to its place among the others"
 
 
 async def test_a_multibeam_tells_of_whole_pings() -> None:
