@@ -109,6 +109,10 @@ Every section is written by the command that stands in it (`--write`).
 )
 
 
+ROW = 20
+"""So many seeds one after the other are told one by one."""
+
+
 def make_parser(doc: str | None, page: Page, *, seeds: Sequence[int] | None = None) -> argparse.ArgumentParser:
     """Options that all have: ``--write``, and ``--seeds`` for what is drawn at random."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -138,7 +142,8 @@ def facts(
     """List what a run was: its command, date, machine, versions and seeds."""
     found = made(command or command_line(hidden), processes)
     if seeds:
-        found["seeds"] = ", ".join(map(str, seeds))
+        of_a_row = len(seeds) > ROW and list(seeds) == list(range(seeds[0], seeds[0] + len(seeds)))
+        found["seeds"] = f"{seeds[0]} to {seeds[-1]}" if of_a_row else ", ".join(map(str, seeds))
     return [f"- {name}: {value}" for name, value in found.items()]
 
 
