@@ -59,6 +59,26 @@ async def test_it_tells_its_energy_and_the_current() -> None:
     assert info.report.current_mps == (0.1, -0.2)
 
 
+async def test_one_that_joins_others_under_way_is_put_to_sea_far_from_them() -> None:
+    link = SimFleetLink(SimulationSettings(), 1.0)
+    await link.start(lambda _event: None)
+    try:
+        places = []
+        for name, mission in (("a", "m"), ("b", "m"), ("c", "other"), ("late", "m")):
+            if name == "late":
+                await link.engage("a")
+                await link.order(replace(order(1, 50, 80), vehicle="a"))
+            link.launch(replace(launch(BatterySpec()), vehicle=name, mission_id=mission, start=None))
+            at = link.true_position(name)
+            places.append(FLOOR.frame.to_local(at.lat_deg, at.lon_deg)[0])
+    finally:
+        await link.close()
+    first, second, third, late = places
+    assert second == pytest.approx(first + 6.0, abs=0.1)
+    assert third == pytest.approx(second + 6.0, abs=0.1)
+    assert late > 80.0
+
+
 async def test_what_breaks_is_told_and_when_it_is_mended() -> None:
     events: list[FleetEvent] = []
     link = SimFleetLink(SimulationSettings(), 1.0)
