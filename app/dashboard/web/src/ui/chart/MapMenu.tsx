@@ -1,5 +1,5 @@
 import "./MapMenu.css";
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { whyNotCommand } from "../../state/access";
 import { distance, place } from "../../state/format";
 import { drawDenser, goVehicle, mapMenu, repeatLine } from "../../state/orders/orders";
@@ -14,7 +14,8 @@ const LINE_PX = 40;
 export function MapMenu() {
   const menu = mapMenu.value;
   const box = useRef<HTMLDivElement>(null);
-  useEffect(() => {
+  // What is seen can be left at once: other effects wait until it is painted.
+  useLayoutEffect(() => {
     if (!menu) return;
     box.current?.querySelector<HTMLElement>("[role=menuitem]:not(:disabled)")?.focus();
     const leave = (event: Event) => {

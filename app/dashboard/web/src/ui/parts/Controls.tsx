@@ -2,7 +2,7 @@
 
 import type { Signal } from "@preact/signals";
 import type { AriaAttributes, ComponentChildren } from "preact";
-import { useEffect } from "preact/hooks";
+import { useLayoutEffect } from "preact/hooks";
 import { whyNotCommand } from "../../state/access";
 
 /** Handlers that give a signal this value, the opposite of what it has, or what they are called with. */
@@ -156,9 +156,9 @@ export function Trouble({ words }: { words: string }) {
   ) : null;
 }
 
-/** Lets Escape, and the end of the part that waits, take back what is waited for. */
+/** Lets Escape, and the end of the part that waits, take back what is waited for, as soon as that is seen. */
 export function useEscape<T>(waiting: Signal<T | null>): void {
-  useEffect(() => {
+  useLayoutEffect(() => {
     const stop = (event: KeyboardEvent) => {
       if (event.key === "Escape") waiting.value = null;
     };
