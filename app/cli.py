@@ -373,7 +373,7 @@ def demo(
         typer.Option(
             min=0.1,
             max=200,
-            help="How much faster than real time [default: 10, less on a slow or busy machine]",
+            help="How much faster than real time [default: 5, less on a slow or busy machine]",
             show_default=False,
         ),
     ] = None,

@@ -7,16 +7,15 @@ clock, the same machine would not.
 import subprocess
 import sys
 
-FASTEST = 10.0
-"""How much faster than real time on a machine with nothing else to do."""
-SLOWEST = 1.0
+FASTEST, SLOWEST = 5.0, 1.0
+"""How much faster than real time at most, and at least."""
 
 PROGRAMS = 2
 """The service and the vehicles: so many programs compute at the same time."""
 MEASURED_S = 0.6
 
-ROUNDS_PER_S = 4.0e6
-"""What each of them gets done on a machine that keeps up with the fastest."""
+ROUNDS_PER_S = 0.4e6
+"""What each of them has to get done for each time that vehicles live faster than the clock."""
 
 _COUNT = f"""
 import time
@@ -43,4 +42,4 @@ def kept_speed() -> float:
 
 def speed_for(rounds_per_s: float) -> float:
     """Return the speed that a machine keeps up with on which a program gets so much done."""
-    return min(max(round(FASTEST * rounds_per_s / ROUNDS_PER_S, 1), SLOWEST), FASTEST)
+    return min(max(round(rounds_per_s / ROUNDS_PER_S, 1), SLOWEST), FASTEST)

@@ -281,8 +281,8 @@ class SimFleetLink(FleetLink):
     def _start(self, launch: Launch, terrain: Terrain) -> tuple[float, float]:
         if launch.start is not None:
             return terrain.frame.to_local(*launch.start)
-        # The first place along the southern border that nobody is near, or the one that is farthest from all: always
-        # that one for who joins others under way, who may just come along.
+        # The first place along the southern border that nobody is near. Who joins others under way, who may come along
+        # there, or finds none gets the one that is farthest from all.
         spacing = min(LAUNCH_SPACING_M, terrain.width_m / 4)
         places = np.arange(LAUNCH_MARGIN_M, terrain.width_m, spacing)
         there = [
@@ -290,8 +290,8 @@ class SimFleetLink(FleetLink):
             for at in (s.position(s.body.true_position) for s in self._deployed.values())
         ]
         away = [min((math.hypot(x - e, LAUNCH_MARGIN_M - n) for e, n in there), default=math.inf) for x in places]
-        team = [s for s in self._deployed.values() if s.mission_id == launch.mission_id]
-        free = np.flatnonzero((np.array(away) >= 0.99 * spacing) & all(s.order is None for s in team))
+        joins = any(s.order is not None for s in self._deployed.values() if s.mission_id == launch.mission_id)
+        free = [] if joins else np.flatnonzero(np.array(away) >= 0.99 * spacing)
         return float(places[free[0] if len(free) else int(np.argmax(away))]), LAUNCH_MARGIN_M
 
     def vehicles(self) -> Sequence[VehicleInfo]:

@@ -49,6 +49,11 @@ def order(step: int, east_m: float, north_m: float, speed_mps: float = 1.0) -> W
     return WaypointOrder("m", step, NAME, Position(lat, lon, 1.0), speed_mps, 4.0, 1.0)
 
 
+def has_arrived(events: list[FleetEvent], step: int = 1) -> bool:
+    reached = [e for e in events if isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED]
+    return step in [report.step for report in reached]
+
+
 async def test_it_tells_its_energy_and_the_current() -> None:
     link = SimFleetLink(SimulationSettings(current_mps=(0.1, -0.2)), 20.0)
     link.launch(launch(BatterySpec(endurance_min=100.0, level_pct=50.0)))
@@ -108,12 +113,10 @@ async def test_one_without_energy_goes_nowhere_until_it_is_charged() -> None:
             lambda: any(isinstance(e, VehicleReport) and e.battery_pct == 0.0 and e.speed_mps == 0.0 for e in events),
             "it lies still",
         )
+        assert not has_arrived(events)
         link.recharge(NAME, 100.0)
         await link.order(order(2, 50, 20))
-        await until(
-            lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
-            "it has arrived",
-        )
+        await until(lambda: has_arrived(events, 2), "it has arrived")
     finally:
         await link.close()
 
@@ -124,16 +127,12 @@ async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float
     link = SimFleetLink(SimulationSettings(current_mps=current), 50.0)
     await link.start(events.append)
 
-    def has_reached(step: int) -> bool:
-        reports = [e for e in events if isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED]
-        return step in [report.step for report in reports]
-
     try:
         link.launch(launch(BatterySpec()))
         await link.engage(NAME)
         for step, (east, north) in enumerate([(50, 60), (80, 60), (20, 60), (20, 20)]):
             await link.order(order(step, east, north))
-            await until(partial(has_reached, step), f"step {step} is reached")
+            await until(partial(has_arrived, events, step), f"step {step} is reached")
     finally:
         await link.close()
 
@@ -151,10 +150,7 @@ async def test_it_climbs_over_a_bank_and_goes_down_behind_it(tmp_path: Path) -> 
         await link.engage(NAME)
         lat, lon = FLOOR.frame.to_geodetic(50, 95)
         await link.order(WaypointOrder("m", 1, NAME, Position(lat, lon, 7.0), 1.0, 4.0, 1.0))
-        await until(
-            lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
-            "it has arrived",
-        )
+        await until(lambda: has_arrived(events), "it has arrived")
     finally:
         await link.close()
     reports = [event for event in events if isinstance(event, VehicleReport)]
@@ -172,10 +168,7 @@ async def test_a_multibeam_tells_of_whole_pings() -> None:
         link.launch(replace(launch(BatterySpec()), sensor=Sensor.MULTIBEAM, noise=0.0, swath=sonar))
         await link.engage(NAME)
         await link.order(order(1, 50, 40))
-        await until(
-            lambda: any(isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED for e in events),
-            "it has arrived",
-        )
+        await until(lambda: has_arrived(events), "it has arrived")
     finally:
         await link.close()
     pings = [event for event in events if isinstance(event, PingReport)]

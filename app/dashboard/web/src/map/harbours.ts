@@ -4,6 +4,7 @@
  */
 
 import type { LngLat } from "../api/types";
+import { fetchedOnce } from "./fetchedOnce";
 import address from "./harbours.tsv?url";
 
 export interface Harbour {
@@ -16,19 +17,11 @@ export interface Harbour {
   others: string;
 }
 
-let asked: Promise<readonly Harbour[]> | null = null;
-
-/** Asks for the harbours once, the largest first; a failure is forgotten, so that the next call asks again. */
-export function harbours(): Promise<readonly Harbour[]> {
-  asked ??= fetch(address)
-    .then((answer) => answer.text())
-    .then(harboursOf)
-    .catch((error: unknown) => {
-      asked = null;
-      throw error;
-    });
-  return asked;
-}
+/** Asks for the harbours, the largest first. */
+export const harbours = fetchedOnce(
+  address,
+  async (answer): Promise<readonly Harbour[]> => harboursOf(await answer.text()),
+);
 
 export function harboursOf(table: string): Harbour[] {
   const lines = table.split("\n").filter((line) => line && !line.startsWith("#"));

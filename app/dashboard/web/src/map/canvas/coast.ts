@@ -8,6 +8,7 @@ import { feature } from "topojson-client";
 import type { GeometryCollection, Topology } from "topojson-specification";
 import address from "world-atlas/land-50m.json?url";
 import type { LngLat } from "../../api/types";
+import { fetchedOnce } from "../fetchedOnce";
 import { type Bounds, boundsOf } from "../geo";
 import type { Paper } from "./mapColours";
 import type { Projection } from "./projection";
@@ -23,19 +24,12 @@ export interface Land {
 
 export const showsCoast = (zoom: number): boolean => zoom < GONE_ZOOM;
 
-let asked: Promise<readonly Land[]> | null = null;
-
-/** Asks for the coasts once; a failure is forgotten, so that the next call asks again. */
-export function coasts(): Promise<readonly Land[]> {
-  asked ??= fetch(address)
-    .then((answer) => answer.json() as Promise<Topology<{ land: GeometryCollection }>>)
-    .then(landsOf)
-    .catch((error: unknown) => {
-      asked = null;
-      throw error;
-    });
-  return asked;
-}
+/** Asks for the coasts. */
+export const coasts = fetchedOnce(
+  address,
+  async (answer): Promise<readonly Land[]> =>
+    landsOf((await answer.json()) as Topology<{ land: GeometryCollection }>),
+);
 
 function landsOf(world: Topology<{ land: GeometryCollection }>): Land[] {
   return feature(world, world.objects.land).features.flatMap(({ geometry }) => {
