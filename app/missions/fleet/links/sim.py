@@ -291,7 +291,7 @@ class SimFleetLink(FleetLink):
         ]
         away = [min((math.hypot(x - e, LAUNCH_MARGIN_M - n) for e, n in there), default=math.inf) for x in places]
         joins = any(s.order is not None for s in self._deployed.values() if s.mission_id == launch.mission_id)
-        free = [] if joins else np.flatnonzero(np.array(away) >= 0.99 * spacing)
+        free = np.flatnonzero(np.array(away) >= (math.inf if joins else 0.99 * spacing))
         return float(places[free[0] if len(free) else int(np.argmax(away))]), LAUNCH_MARGIN_M
 
     def vehicles(self) -> Sequence[VehicleInfo]:
