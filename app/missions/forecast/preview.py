@@ -19,6 +19,7 @@ from app.missions.forecast.plan import SAME_M, Plan, PlannedWay, plan
 from app.missions.forecast.ranges import ForecastRange
 from app.missions.forecast.request import described_team, starts_of
 from app.missions.forecast.whole_survey import WholeSurveyView, whole_view
+from app.missions.live.watchers.vehicles import near_report
 from app.missions.running.admission import check_spec
 from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.views.base import View
@@ -101,8 +102,10 @@ class PlanPreviews:
         check_spec(spec, self._hub.kinds)
         if spec.kind is MissionKind.SEARCH:
             raise InvalidRequestError("kind", NO_PLAN, "plan missions of kind survey")
+        frame = spec.frame()
         members = [
-            replace(member, report=self._hub.info(member.key).report) for member in described_team(self._hub, spec)
+            replace(member, report=near_report(frame, self._hub.info(member.key).report))
+            for member in described_team(self._hub, spec)
         ]
         await self._compilation.planner(spec.planner.name, SingleBeam())
         gone = threading.Event()

@@ -23,6 +23,7 @@ from app.missions.forecast.swarm import SoFar
 from app.missions.forecast.swath_flight import sweeps
 from app.missions.forecast.whole_survey import WholeSurveyView, whole_view, whole_way
 from app.missions.live.mission import LiveMission
+from app.missions.live.watchers.vehicles import near_report
 from app.missions.running.admission import check_spec
 from app.missions.running.team_changes import refuse_ended
 from app.missions.spec.mission import MissionKind, MissionSpec
@@ -113,7 +114,8 @@ class Forecaster:
             step = await mission_queries.last_step(session, live.id)
         sounded = await asyncio.to_thread(sounded_so_far, live)
         flying = live.team.surveying or list(live.team)
-        team = [replace(member, report=member.report or live.hub.info(member.key).report) for member in flying]
+        told = (near_report(live.frame, live.hub.info(member.key).report) for member in flying)
+        team = [replace(member, report=member.report or report) for member, report in zip(flying, told, strict=True)]
         return await self.make(
             live.spec,
             members=team,

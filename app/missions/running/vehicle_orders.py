@@ -28,12 +28,7 @@ async def go(live: LiveMission, name: str, order: GoOrder, actor: str) -> OrderV
     lon, lat = order.position
 
     async def find(_member: Member, flight: Flight) -> FloatArray:
-        try:
-            place_m = book.local_m(lon, lat)
-        except ValueError as error:
-            raise InvalidRequestError(
-                "position", f"it is far from the mission: {error}", "a place in its area"
-            ) from error
+        place_m = _place_m(book, "position", lon, lat)
         region = await live.in_thread(free_region, flight.constraints)
         if not is_free(region, place_m):
             inside = is_free(Polygon(flight.constraints.area), place_m)
@@ -69,7 +64,7 @@ async def repeat_line(live: LiveMission, name: str, order: RepeatOrder, actor: s
 
     async def find(member: Member, _flight: Flight) -> FloatArray:
         lines = await book.lines(member)
-        line = line_now(lines) if order.near is None else line_near(lines, book.local_m(*order.near))
+        line = line_now(lines) if order.near is None else line_near(lines, _place_m(book, "near", *order.near))
         if line is None:
             raise ConflictError(f"vehicle {name!r} has not flown a line yet", "wait until it has")
         return line
@@ -84,10 +79,7 @@ async def survey_denser(live: LiveMission, order: DenserOrder, actor: str) -> Or
     """
     book = live.part(OrderBook)
     ring = np.array(order.area.ring)
-    try:
-        part = Polygon(np.array([book.local_m(lon, lat) for lon, lat in ring]))
-    except ValueError as error:
-        raise InvalidRequestError("area", f"it is far from the mission: {error}", "a part of its area") from error
+    part = Polygon(np.array([_place_m(book, "area", lon, lat) for lon, lat in ring]))
     names = [order.vehicle] if order.vehicle is not None else _nearest_first(live, part)
 
     async def find(member: Member, flight: Flight) -> FloatArray:
@@ -103,6 +95,13 @@ async def survey_denser(live: LiveMission, order: DenserOrder, actor: str) -> Or
             raise InvalidRequestError("area", str(error), "draw another part, or give line_spacing_m") from error
 
     return await book.accept(names, OrderKind.DENSER, find, actor, f"surveys {part.area:.0f} m² denser")
+
+
+def _place_m(book: OrderBook, field: str, lon: float, lat: float) -> FloatArray:
+    try:
+        return book.local_m(lon, lat)
+    except ValueError as error:
+        raise InvalidRequestError(field, f"it is far from the mission: {error}", "a place in its area") from error
 
 
 def _nearest_first(live: LiveMission, part: Polygon) -> list[str]:

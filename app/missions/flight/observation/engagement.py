@@ -12,6 +12,7 @@ from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, VehicleInfo, VehicleRefusedError
 from app.missions.live.mission import LiveMission
+from app.missions.live.watchers.vehicles import near_report
 from app.missions.spec.failsafes import Response
 from app.missions.team import Member
 from app.missions.views.mission import Level
@@ -82,7 +83,7 @@ class Engagement:
                 await self._tell_of_loss(member, info)
             await self._advise(member, info)
             if member.report is None:
-                member.report = info.report
+                member.report = near_report(self._live.frame, info.report)
             if member.engaged and member.unsent and member.busy:
                 # It was out of reach when its waypoint was to be sent.
                 await self._send(member)
@@ -153,7 +154,7 @@ class Engagement:
         member.engaged = member.followed = True
         member.refusal = ""
         member.link = info.state
-        member.report = info.report or member.report
+        member.report = near_report(live.frame, info.report) or member.report
         kinds = [AlarmKind.VEHICLE_REFUSES, AlarmKind.VEHICLE_RESTARTED]
         await live.journal.end(kinds, f"{member.name} follows", vehicle=member.name)
         live.changed.set()

@@ -206,6 +206,11 @@ def local_place(frame: LocalFrame, position: Position) -> tuple[float, float] | 
     return float(east), float(north)
 
 
+def near_report(frame: LocalFrame, report: VehicleReport | None) -> VehicleReport | None:
+    """Return what a vehicle reports, if it is near enough to be on the frame; before its first fix DUNE is at 0, 0."""
+    return None if report is None or local_place(frame, report.position) is None else report
+
+
 def energy_left_pct(member: Member) -> float | None:
     """Return what is left of a vehicle's energy, by its battery or else by the clock; None: not known."""
     left = member.energy.left

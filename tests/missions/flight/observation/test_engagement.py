@@ -1,0 +1,51 @@
+"""Vehicles are asked to follow until they do."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from app.missions.fleet.hub import FleetHub, VehicleKey
+from app.missions.fleet.interface import FleetEvent, Position, VehicleInfo, VehicleReport
+from app.missions.live.vehicle_reports import VehicleReports
+from app.missions.service import MissionService
+from app.missions.spec.mission import MissionSpec
+from app.missions.states import MissionState
+from app.missions.team import Member
+from tests.support.missions.harbour import act, sim_spec, until_step
+
+
+async def test_a_vehicle_without_a_fix_is_no_reason_to_end_the_mission(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before its first fix a vehicle says that it is at 0, 0, which is on no mission's frame."""
+    info, take = FleetHub.info, VehicleReports.take
+
+    def without_a_fix(name: str) -> VehicleReport:
+        return VehicleReport(name, 0.0, Position(0.0, 0.0, 0.0), None, None, None, None)
+
+    def lost(hub: FleetHub, key: VehicleKey) -> VehicleInfo:
+        told = info(hub, key)
+        return replace(told, report=without_a_fix("b")) if key[1] == "b" else told
+
+    def take_lost(reports: VehicleReports, event: FleetEvent, spec: MissionSpec, *, running: bool) -> None:
+        at_zero = isinstance(event, VehicleReport) and event.vehicle == "b"
+        take(reports, without_a_fix("b") if at_zero else event, spec, running=running)
+
+    mission = await service.create(sim_spec("a", "b", steps=30))
+    live = await service.get(mission.id)
+    monkeypatch.setattr(FleetHub, "info", lost)
+    monkeypatch.setattr(VehicleReports, "take", take_lost)
+    foretold: list[Any] = []
+
+    async def make(_spec: MissionSpec, *, members: list[Member], **_: object) -> None:
+        foretold.extend(member.report for member in members)
+
+    monkeypatch.setattr(service.forecaster, "make", make)
+    await service.forecaster.of_mission(live)
+    assert foretold == [None, None]
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 4)
+    assert live.header.state is MissionState.RUNNING
+    assert not live.team.members["b"].legs
+    await act(service, mission.id, "abort")
