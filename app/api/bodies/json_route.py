@@ -12,7 +12,14 @@ from fastapi.routing import APIRoute
 from starlette.responses import Response
 from starlette.types import Scope
 
-from app.api.http.json_text import Bounds, EntryTooLongError, may_be_unstorable, parse, unstorable
+from app.api.http.json_text import (
+    Bounds,
+    EntryTooLongError,
+    NameTwiceError,
+    may_be_unstorable,
+    parse,
+    unstorable,
+)
 from app.api.http.problems import (
     FieldProblem,
     Problem,
@@ -104,6 +111,8 @@ def _malformed(error: Exception, scope: Scope) -> Problem:
         detail = "the body is nested too deep"
     elif isinstance(error, UnicodeDecodeError):
         detail = f"the body is not JSON in UTF-8: {error.reason} at byte {error.start}"
+    elif isinstance(error, NameTwiceError):
+        detail = f"the body names {error.args[0][:80]!r} twice in one object"
     else:
         detail = "the body has a number of too many digits"
     return make_problem(

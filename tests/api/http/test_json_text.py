@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.api.http import json_text
-from app.api.http.json_text import Bounds, EntryTooLongError, may_be_unstorable, parse, unstorable
+from app.api.http.json_text import (
+    Bounds,
+    EntryTooLongError,
+    NameTwiceError,
+    may_be_unstorable,
+    parse,
+    unstorable,
+)
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
@@ -45,6 +52,12 @@ def test_wrong_text_is_refused_at_the_same_place(entries: list[Any], data: st.Da
                 parse(text.encode())
         else:
             assert parse(text.encode()) == expected
+
+
+def test_a_name_that_stands_twice_is_refused_instead_of_taken_by_its_last_value() -> None:
+    with pytest.raises(NameTwiceError, match="max_depth_m"):
+        parse(b'{"limits": {"max_depth_m": 4, "min_depth_m": 1, "max_depth_m": 40}}')
+    assert parse(b'[{"a": 1}, {"a": 2}]') == [{"a": 1}, {"a": 2}]
 
 
 def test_an_entry_longer_than_a_window_is_refused() -> None:
