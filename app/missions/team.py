@@ -150,7 +150,9 @@ class Member:
     misses: int = 0
     """How many legs in a row it did not get to the end of."""
     committed_m: float = 0.0
-    """How long all legs are together that were committed for it."""
+    """How long all legs are together that were committed for it, but for those that it was spared."""
+    spared: int = 0
+    """How many legs were given up before it began them: they take nothing of how far it may be sent."""
     withdrawal: Withdrawal | None = None
     """Why it does not survey; None while it does."""
     energy: Energy = field(default_factory=lambda: Energy(1.0))
@@ -232,7 +234,7 @@ class Member:
         allowance = spec.allowance(self.spec)
         if allowance.metres is not None:
             return max(allowance.metres - self.committed_m, 0.0)
-        return max(allowance.most_legs(spec.limits.max_step_m) - self.legs, 0) * spec.limits.max_step_m
+        return max(allowance.most_legs(spec.limits.max_step_m) - self.legs + self.spared, 0) * spec.limits.max_step_m
 
     def way_ahead_m(self, frame: LocalFrame) -> float:
         """Return how long what is left of its leg is, and the legs after it."""
@@ -291,7 +293,8 @@ class Team:
         member = Member(spec, slot, self.capabilities_of(spec.kind), energy=self.energy_of(spec))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
-            member.legs, member.committed_m, member.flown = before.legs, before.committed_m, before.flown
+            member.legs, member.committed_m, member.spared = before.legs, before.committed_m, before.spared
+            member.flown = before.flown
             member.energy.used_s = before.energy.used_s
         self.members[spec.name] = member
         return member

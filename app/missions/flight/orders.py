@@ -216,7 +216,12 @@ class OrderBook:
         live, planner = self._live, flight.planner
         async with live.database.reading() as session:
             rows = await order_queries.in_states(session, live.id, OPEN)
+            done = await order_queries.in_states(session, live.id, [OrderState.DONE])
         self._skipped_at = {}
+        for row in done:
+            if planner.is_ordered(row.vehicle) and planner.taken.get(row.vehicle) == row.id:
+                # Its memory is as old as the last leg; the legs that are left lead on with the vehicle's own part.
+                planner.drop(row.vehicle)
         for member in live.team:
             member.asked = None
         for row in rows:

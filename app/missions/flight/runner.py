@@ -20,7 +20,7 @@ from app.missions.flight.decisions.deciding import Decider
 from app.missions.flight.decisions.decision import make_constraints, make_planner
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit, committed_leg
-from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.dispatch import GIVEN_UP, Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.observation.engagement import Engagement
@@ -141,18 +141,17 @@ class Runner:
                 return False
             rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
             newest = await mission_queries.newest_waypoints(session, live.id)
-            way_m = await mission_queries.committed_way(session, live.id)
+            way_m, spared = await mission_queries.committed_way(session, live.id, GIVEN_UP)
         await self._remember(step.memory)
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}
         for member in live.team:
             member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
+            member.spared = spared[member.name]
             of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             self._leave_out_passed(member)
-        await live.journal.log(
-            Level.INFO, "resumed", f"going on after step {step.number} of {live.spec.steps}", step=step.number
-        )
+        await live.journal.log(Level.INFO, "resumed", f"going on after step {step.number}", step=step.number)
         return True
 
     async def _remember(self, memory: bytes) -> None:

@@ -1,6 +1,7 @@
 """Queries on missions, their vehicles, steps and waypoints."""
 
 import math
+from collections import Counter
 from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
@@ -83,20 +84,27 @@ async def keep_ending(session: AsyncSession, mission_id: str, ending: dict[str, 
     await session.execute(update(MissionRow).where(MissionRow.id == mission_id).values(ending=ending))
 
 
-async def committed_way(session: AsyncSession, mission_id: str) -> dict[str, float]:
-    """Return how long all legs of each vehicle are together, metres, but for the way to the end of its first one."""
+async def committed_way(session: AsyncSession, mission_id: str, given_up: str) -> tuple[dict[str, float], Counter[str]]:
+    """Return how long all legs of each vehicle are together, metres, but for the way to the end of its first one.
+
+    Legs whose reason begins with ``given_up`` were not begun: they do not count, and how many there are comes second.
+    """
     query = (
-        select(WaypointRow.vehicle, WaypointRow.east_m, WaypointRow.north_m)
+        select(WaypointRow.vehicle, WaypointRow.east_m, WaypointRow.north_m, WaypointRow.reason)
         .where(WaypointRow.mission_id == mission_id)
         .order_by(WaypointRow.vehicle, WaypointRow.step)
     )
     way_m: dict[str, float] = {}
     before: tuple[str, float, float] | None = None
-    for vehicle, east, north in await session.execute(query):
+    spared: Counter[str] = Counter()
+    for vehicle, east, north, reason in await session.execute(query):
+        if reason.startswith(given_up):
+            spared[vehicle] += 1
+            continue
         if before is not None and before[0] == vehicle:
             way_m[vehicle] = way_m.get(vehicle, 0.0) + math.hypot(east - before[1], north - before[2])
         before = (vehicle, east, north)
-    return way_m
+    return way_m, spared
 
 
 async def vehicles_of(session: AsyncSession, mission_id: str) -> Sequence[MissionVehicleRow]:

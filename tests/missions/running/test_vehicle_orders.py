@@ -228,6 +228,30 @@ async def _never(*_: Any) -> None:
     await asyncio.Event().wait()
 
 
+async def test_legs_that_an_order_replaces_take_nothing_of_the_length(
+    service: MissionService, database: Database
+) -> None:
+    spec = sim_spec("a", side_m=80.0, planner=LINES, limits=LIMITS, budget={"km_per_vehicle": 2.0})
+    live = await flying(service, spec, step=6)
+    a = live.team.members["a"]
+    for place in ((70.0, 70.0), (10.0, 70.0), (70.0, 10.0), (10.0, 10.0)):
+        order = await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(*place)), "Ana")
+        await until_over(live, order.id)
+    used_m, ahead_m = 2000.0 - a.way_left_m(live.spec), a.way_ahead_m(live.frame)
+    assert used_m - ahead_m <= a.flown.flown_m + 3 * LIMITS["max_step_m"]
+    # What is taken up again knows that the order is over, and whatever is left of the length.
+    ends = len(await legs_of(database, live, "a"))
+    await act(service, live.id, "pause")
+    await act(service, live.id, "resume")
+    await until_step(service, live.id, ends + 3)
+    used_m, ahead_m = 2000.0 - a.way_left_m(live.spec), a.way_ahead_m(live.frame)
+    assert used_m - ahead_m <= a.flown.flown_m + 3 * LIMITS["max_step_m"]
+    async with database.reading() as session:
+        reasons = await session.scalars(select(WaypointRow.reason).where(WaypointRow.mission_id == live.id))
+        assert not [reason for reason in reasons if "its order was ended" in reason]
+    await act(service, live.id, "abort")
+
+
 async def test_a_team_that_moves_as_one_takes_no_orders(service: MissionService) -> None:
     live = await flying(service, survey("a", "b", limits=LIMITS | {"com_range_m": 500.0}), step=1)
     with pytest.raises(ConflictError, match="move as one team"):

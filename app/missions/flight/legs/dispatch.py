@@ -10,7 +10,7 @@ import structlog
 from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
-from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.commit import LegCommit, way_m
 from app.missions.flight.legs.stragglers import late_at_s, leg_allowed_s, missed, tell_of
 from app.missions.live.mission import LiveMission
 from app.missions.team import Member
@@ -18,6 +18,9 @@ from app.missions.views.mission import Level
 
 HOLD_AFTER_S = 1.0
 """How long a vehicle that has no leg flies straight on, by its clock, before it is sent to circle somewhere."""
+
+GIVEN_UP = "given up: "
+"""How the reason begins for which a leg is missed that its vehicle had not begun."""
 
 MOST_REFUSALS = 5
 """How often a vehicle may refuse the same leg before the next one is tried."""
@@ -174,11 +177,24 @@ class Dispatch:
         misses = member.misses
         self.settle(member, WaypointStatus.MISSED, reason)
         member.misses = misses  # it would have got there
+        return self._note_given_up(member, [*ends, *self._spare(member, ends, reason)])
+
+    def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:
+        """Take the legs back that a vehicle has not begun; returns where they were to end, each (2,).
+
+        ``flown_to_m``: where the leg before them ends, if it has begun one; without one they begin where it is.
+        """
         legs, member.ahead[:] = list(member.ahead), []
+        ends_m = [leg.target_m for leg in legs]
         for leg in legs:
-            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
+            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, GIVEN_UP + reason)
             self._live.journal.waypoint(report)
-        return self._note_given_up(member, [*ends, *(leg.target_m for leg in legs)])
+        if not flown_to_m and member.report is not None:
+            flown_to_m = [member.place_m(self._live.frame)]
+        if legs:
+            member.spared += len(legs)
+            member.committed_m = max(member.committed_m - way_m([*flown_to_m, *ends_m], self._live.spec), 0.0)
+        return ends_m
 
     def _note_given_up(self, member: Member, ends_m: list[FloatArray]) -> list[FloatArray]:
         if member.asked is not None:
@@ -187,14 +203,10 @@ class Dispatch:
 
     async def drop_ahead(self, member: Member, reason: str) -> None:
         """Give up the legs that a vehicle has not begun."""
-        legs, member.ahead[:] = list(member.ahead), []
-        ends_m = [leg.target_m for leg in legs]
+        ends_m = self._spare(member, [], reason)
         if self._persistent and member.asked is None and member.withdrawal is None:
             self.dropped.setdefault(member.name, []).extend(ends_m)
         self._note_given_up(member, ends_m)
-        for leg in legs:
-            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
-            self._live.journal.waypoint(report)
         await self._live.journal.log(
             Level.WARNING,
             "vehicle",
