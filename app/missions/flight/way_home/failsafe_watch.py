@@ -32,6 +32,8 @@ from app.missions.spec.recovery import Homecoming
 from app.missions.team import Member
 from app.missions.views.mission import Level
 
+HEARD_S = 3.0
+"""Who was heard within so long and does not follow obeys somebody else; who is silent may be starting anew."""
 FRESH_S = 5.0
 """Places of two vehicles are compared when they are not older, seconds of the vehicles' time."""
 
@@ -179,7 +181,8 @@ class FailsafeWatch:
         breach = self._live.boundaries.breach(member.name)
         if breach and member.legs and member.withdrawal is None:
             found[Failsafe.GEOFENCE_LEFT] = f"it is {breach}"
-        if member.followed and not member.engaged and member.refusal and link.state is not LinkState.LOST:
+        is_heard = link.age_s is not None and link.age_s <= HEARD_S
+        if member.followed and not member.engaged and member.refusal and is_heard:
             found[Failsafe.OTHER_CONSOLE] = member.refusal.removeprefix(f"{member.name}: ")
         return found
 
