@@ -123,7 +123,7 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["serve"], {"BATHYFLEET_AUTO_MIGRATE": "false"}, 1, "the database is empty"),
         (["serve", "--time-scale", "0"], {}, 2, "greater than 0"),
         (["serve", "--host", "192.0.2.77", "--insecure"], {}, 1, "cannot listen on 192.0.2.77:8080"),
-        (["export", "nowhere"], {}, 1, "0 missions have ids that begin with 'nowhere'. There are: none"),
+        (["export", "nowhere"], {}, 1, "'nowhere'. There are: none, in database /"),
         (["export", "nowhere", "--format", "doc"], {}, 2, "'doc' is not one of tif, nc, bag"),
         (["report", "nowhere", "--out", "x.doc"], {}, 2, "x.doc ends in none of .pdf, .html"),
         (["report", "nowhere", "--lang", "xx"], {}, 2, "'xx' is not one of en, pt"),

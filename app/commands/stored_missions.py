@@ -62,9 +62,12 @@ async def resting_mission(service: "MissionService", begin: str) -> "LiveMission
 
 async def meant_mission(service: "MissionService", begin: str) -> "LiveMission":
     """Return the one mission whose id begins so. Raises CommandError."""
+    from app.storage.upkeep.prepare import name_of
+
     every = await service.missions()
     meant = [summary.id for summary in every if summary.id.startswith(begin)]
     if len(meant) != 1:
         ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
-        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", f"There are: {ids}")
+        remedy = f"There are: {ids}, in database {name_of(service.settings.database_url)}"
+        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", remedy)
     return await service.get(meant[0])

@@ -54,7 +54,7 @@ async def prepare_database(url: str, *, may_upgrade: bool) -> None:
 def of_another_version(url: str, present: str, newest: str) -> DatabaseNotReadyError:
     """Return the error that a database is at a revision that this version does not know."""
     return DatabaseNotReadyError(
-        f"the database {_name(url)} is at revision {present}, which this version does not know (its newest is "
+        f"the database {name_of(url)} is at revision {present}, which this version does not know (its newest is "
         f"{newest}): a newer version wrote it, or another program. Install the version that wrote it, let it go back "
         f"by 'bathyfleet migrate --down-to {newest}' there, or name another database with database_url"
     )
@@ -108,10 +108,12 @@ async def _check_that_empty(url: str) -> None:
     if tables:
         some = ", ".join(tables[:3]) + (", …" if len(tables) > 3 else "")
         raise DatabaseNotReadyError(
-            f"the database {_name(url)} is not one of bathyfleet: it holds other tables ({some}); nothing was changed. "
+            f"the database {name_of(url)} is not one of bathyfleet: it holds other tables ({some}); nothing was changed. "
             "Name another file or database with database_url"
         )
 
 
-def _name(url: str) -> str:
-    return make_url(url).database or url
+def name_of(url: str) -> str:
+    """Return what a person calls a database: its file, or its name on its server."""
+    file = file_of(url)
+    return str(file.resolve()) if file is not None else make_url(url).database or url
