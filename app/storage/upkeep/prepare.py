@@ -108,7 +108,8 @@ async def _check_that_empty(url: str) -> None:
     if tables:
         some = ", ".join(tables[:3]) + (", …" if len(tables) > 3 else "")
         raise DatabaseNotReadyError(
-            f"the database {name_of(url)} is not one of bathyfleet: it holds other tables ({some}); nothing was changed. "
+            f"the database {name_of(url)} is not one of bathyfleet: it holds other tables ({some}); "
+            "nothing was changed. "
             "Name another file or database with database_url"
         )
 
