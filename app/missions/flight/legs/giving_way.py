@@ -9,17 +9,18 @@ import asyncio
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 import structlog
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.motion.steering import steered
 from app.exploration.motion.timeline import Timeline, closest_approach
 from app.missions.fleet.interface import WaypointOrder
 from app.missions.flight.decisions.decision import turn_radius_m
-from app.missions.flight.decisions.separation import motion_along, planned_places, ways_aside
+from app.missions.flight.decisions.separation import planned_places, ways_aside
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.observation.waiting import until_next_look
@@ -132,13 +133,9 @@ class GivingWay:
 
     def _going_on(self, member: Member) -> _Imminent:
         """Return where a vehicle will be on its way."""
-        spec, places = self._live.spec, planned_places(member, self._live)
-        heading_rad = (
-            math.nan if member.report is None or member.report.heading_rad is None else member.report.heading_rad
-        )
-        turning = with_turns(places, heading_rad, turn_radius_m(spec, member.spec))
-        motion = motion_along(turning, spec.speed_of(member.spec), self._live.team.current_mps)
-        motion = Timeline(motion.time_s - self._age_s(member), motion.place_m)
+        places, age_s = planned_places(member, self._live), self._age_s(member)
+        motion = self._steered(member, places, HORIZON_S + age_s)
+        motion = Timeline(motion.time_s - age_s, motion.place_m)
         depths_m = [float(place[2]) for place in places[:2]]
         around_m = self._circle_m(member) if len(places) == 1 else 0.0
         return _Imminent(member, motion, min(depths_m), max(depths_m), around_m)
@@ -225,12 +222,16 @@ class GivingWay:
 
     def _motion_to(self, member: Member, place_m: FloatArray | None) -> Timeline:
         """Return a vehicle's motion to a place where it waits."""
-        depth_m = _depth_m(member)
-        here = np.append(member.place_m(self._live.frame), depth_m)
+        here = np.append(member.place_m(self._live.frame), _depth_m(member))
         if place_m is None or math.dist(place_m, here[:2]) < CLOSING_M:
             return Timeline(np.zeros(1), here[None])
-        takes_s = math.dist(place_m, here[:2]) / self._live.spec.speed_of(member.spec)
-        return Timeline(np.array([0.0, takes_s]), np.vstack([here, np.append(place_m, depth_m)]))
+        return self._steered(member, [here, np.append(place_m, here[2])], HORIZON_S)
+
+    def _steered(self, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
+        spec, told_rad = self._live.spec, None if member.report is None else member.report.heading_rad
+        heading_rad = math.nan if told_rad is None else told_rad
+        speed_mps, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
+        return steered(places, heading_rad, speed_mps, radius_m, self._live.team.current_mps, until_s)
 
     async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
         order = self._committing.waiting_at(member, place_m)
@@ -258,32 +259,6 @@ class GivingWay:
                 member.leg_began_s += waited_s
                 near[name] = on
                 await self._dispatch.send(member)
-
-
-def with_turns(places: list[FloatArray], heading_rad: float, radius_m: float) -> list[FloatArray]:
-    """Return places (3,) of a way, with those that a vehicle overshoots to while it turns at them.
-
-    Parameters
-    ----------
-    heading_rad
-        At the first place; NaN where it is not known.
-    radius_m
-        Of the circles in which it turns: it passes a place where it turns right round by so much.
-    """
-    course = None if math.isnan(heading_rad) else np.array([math.sin(heading_rad), math.cos(heading_rad)])
-    turning = [places[0]]
-    for here, there in pairwise(places):
-        way = there[:2] - here[:2]
-        length_m = float(np.hypot(*way))
-        if length_m < 1e-6:
-            continue
-        along = way / length_m
-        if course is not None:
-            beyond_m = 0.5 * (1.0 - float(course @ along)) * radius_m
-            turning.append(here + np.append(beyond_m * course, 0.0))
-        turning.append(there)
-        course = along
-    return turning
 
 
 def _is_out(member: Member) -> bool:
