@@ -33,6 +33,9 @@ from app.missions.views.mission import Level
 HORIZON_S = 20.0
 """How far ahead vehicles' ways are looked at, seconds of their time."""
 
+WAITING_S = 40.0
+"""How far ahead the others' ways are looked at where a vehicle waits."""
+
 VERTICAL_SHARE = 0.9
 """Vehicles pass above each other that are this part of ``min_vertical_separation_m`` apart: none keeps its depth
 exactly."""
@@ -134,7 +137,7 @@ class GivingWay:
     def _going_on(self, member: Member) -> _Imminent:
         """Return where a vehicle will be on its way."""
         places, age_s = planned_places(member, self._live), self._age_s(member)
-        motion = self._steered(member, places, HORIZON_S + age_s)
+        motion = self._steered(member, places, WAITING_S + age_s)
         motion = Timeline(motion.time_s - age_s, motion.place_m)
         depths_m = [float(place[2]) for place in places[:2]]
         around_m = self._circle_m(member) if len(places) == 1 else 0.0
@@ -171,12 +174,12 @@ class GivingWay:
         now_m = math.dist(one.here_m, other.here_m) - one.around_m - other.around_m
         return nearest_m < min(least_m, now_m - CLOSING_M)
 
-    def _nearest_m(self, one: _Imminent, other: _Imminent) -> float:
+    def _nearest_m(self, one: _Imminent, other: _Imminent, until_s: float = HORIZON_S) -> float:
         """Return how close two come to each other in a moment; inf where one stays above the other."""
         apart_m = max(one.least_m - other.most_m, other.least_m - one.most_m)
         if apart_m >= VERTICAL_SHARE * self._live.spec.limits.min_vertical_separation_m:
             return math.inf
-        nearest_m = closest_approach(one.motion, other.motion, until_s=HORIZON_S).distance_m
+        nearest_m = closest_approach(one.motion, other.motion, until_s=until_s).distance_m
         return nearest_m - one.around_m - other.around_m
 
     async def _keep_apart(self, one: _Imminent, other: _Imminent, near: dict[str, _Imminent]) -> None:
@@ -191,7 +194,7 @@ class GivingWay:
             for place_m in self._places(it.member):
                 motion, around_m = self._motion_to(it.member, place_m), self._circle_m(it.member)
                 waiting = _Imminent(it.member, motion, it.least_m, it.most_m, around_m)
-                nearest_m = min(self._nearest_m(waiting, that) for that in others)
+                nearest_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
                 if nearest_m > best_m:
                     best_m, best = nearest_m, (it.member, place_m)
                 if best_m >= enough_m:
@@ -204,7 +207,7 @@ class GivingWay:
 
     def _may_wait(self, member: Member) -> bool:
         waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
-        return waits and member.present and member.busy and member.name not in self._giving
+        return waits and member.present and member.busy
 
     def _places(self, member: Member) -> list[FloatArray]:
         """Return where a vehicle may wait, each (2,): where it is, else wherever its limits allow."""
@@ -225,7 +228,7 @@ class GivingWay:
         here = np.append(member.place_m(self._live.frame), _depth_m(member))
         if place_m is None or math.dist(place_m, here[:2]) < CLOSING_M:
             return Timeline(np.zeros(1), here[None])
-        return self._steered(member, [here, np.append(place_m, here[2])], HORIZON_S)
+        return self._steered(member, [here, np.append(place_m, here[2])], WAITING_S)
 
     def _steered(self, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
         spec, told_rad = self._live.spec, None if member.report is None else member.report.heading_rad
@@ -237,8 +240,12 @@ class GivingWay:
         order = self._committing.waiting_at(member, place_m)
         if order is None or member.order is None:
             return
-        self._giving[member.name] = _Giving(member.order, asyncio.get_running_loop().time())
+        again = member.name in self._giving
+        if not again:
+            self._giving[member.name] = _Giving(member.order, asyncio.get_running_loop().time())
         await self._dispatch.stay(member, order)
+        if again:
+            return
         words = f"{member.name} gives way to {other.name}"
         await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name)
 
