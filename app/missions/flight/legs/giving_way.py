@@ -27,6 +27,7 @@ from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
+from app.missions.spec.vehicle import Guidance
 from app.missions.team import OUT_OF_REACH, Member
 from app.missions.views.mission import Level
 
@@ -114,7 +115,7 @@ class GivingWay:
     async def look(self) -> None:
         """Look once at everybody."""
         self._giving = {name: giving for name, giving in self._giving.items() if self._still_gives(name, giving)}
-        near = {member.name: self._imminent(member) for member in self._live.team if _is_out(member)}
+        near = {member.name: self._imminent(member) for member in self._may_meet()}
         await self._let_go_on(near)
         settled: set[str] = set()
         for one, other in self._meeting(list(near.values())):
@@ -154,19 +155,26 @@ class GivingWay:
         newest_s = max(one.report.time_s for one in self._live.team if one.report is not None)
         return max(newest_s - member.report.time_s, 0.0)
 
+    def _may_meet(self) -> list[Member]:
+        """Return the vehicles that are so near another one that they may meet it in a moment."""
+        out = [member for member in self._live.team if _is_out(member)]
+        if len(out) < 2:
+            return []
+        here_m = np.array([member.place_m(self._live.frame) for member in out])
+        # What the current does to one it does to the other.
+        reach_m = np.array([(WAITING_S + self._age_s(m)) * self._live.spec.speed_of(m.spec) for m in out])
+        circles_m = np.array([self._circle_m(member) for member in out])
+        room_m = CLEAR * self._live.spec.limits.min_separation_m + circles_m + reach_m
+        near = np.hypot(*(here_m[:, None] - here_m[None]).T) < room_m[:, None] + reach_m[None] + circles_m[None]
+        np.fill_diagonal(near, val=False)
+        return [out[k] for k in np.flatnonzero(near.any(axis=1))]
+
     def _meeting(self, near: list[_Imminent]) -> Iterator[tuple[_Imminent, _Imminent]]:
         """Yield pairs that are about to pass too close to each other."""
-        if len(near) < 2:
-            return
         least_m = self._live.spec.limits.min_separation_m
-        here_m = np.array([one.here_m for one in near])
-        reach_m = HORIZON_S * np.array([self._live.spec.speed_of(one.member.spec) for one in near])
-        # What the current does to one it does to the other.
-        away_m = np.hypot(*(here_m[:, None] - here_m[None]).T)
-        may_meet = away_m < least_m + reach_m[:, None] + reach_m[None]
-        for i, j in combinations(range(len(near)), 2):
-            if may_meet[i, j] and self._too_close(near[i], near[j], least_m):
-                yield near[i], near[j]
+        for one, other in combinations(near, 2):
+            if self._too_close(one, other, least_m):
+                yield one, other
 
     def _too_close(self, one: _Imminent, other: _Imminent, least_m: float) -> bool:
         """Whether two will be closer than that in a moment, and closer than they are now."""
@@ -207,7 +215,8 @@ class GivingWay:
 
     def _may_wait(self, member: Member) -> bool:
         waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
-        return waits and member.present and member.busy
+        # Orders by sound, and plans, take longer than there is.
+        return waits and member.spec.guidance is Guidance.FOLLOW and member.present and member.busy
 
     def _places(self, member: Member) -> list[FloatArray]:
         """Return where a vehicle may wait, each (2,): where it is, else wherever its limits allow."""
@@ -244,7 +253,9 @@ class GivingWay:
         if not again:
             self._giving[member.name] = _Giving(member.order, asyncio.get_running_loop().time())
         await self._dispatch.stay(member, order)
-        if again:
+        if member.waits_m is None:
+            self._giving.pop(member.name, None)  # it refused
+        if again or member.waits_m is None:
             return
         words = f"{member.name} gives way to {other.name}"
         await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name)
