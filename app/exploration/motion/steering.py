@@ -14,7 +14,7 @@ PASSED_WITHIN_M = 3.0
 """A place that a vehicle is beyond counts as passed when it is no farther away than this."""
 
 
-def steered(
+def steered_motion(
     places: list[FloatArray],
     heading_rad: float,
     speed_mps: float,

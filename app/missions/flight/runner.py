@@ -8,7 +8,6 @@ crash between any two moments loses nothing and repeats nothing but the sending,
 import asyncio
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Executor
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.decisions.deciding import Decider
-from app.missions.flight.decisions.decision import make_constraints, make_planner
+from app.missions.flight.decisions.decision import limits_of_decisions, make_constraints, make_planner
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit, committed_leg
 from app.missions.flight.legs.dispatch import Dispatch
@@ -75,9 +74,7 @@ class Runner:
         self._maps = StepMaps(live, executor, time_scale, map_pause_s, maps_ready)
         self._waiting = Waiting(live)
         self._lookout = SearchHooks(live, time_scale, self._waiting.until)
-        # Lines are as they are: whether vehicles meet on them is looked at in time, leg by leg.
-        lines = self._apart and planner.planner.flies_lines
-        decided = replace(constraints, min_separation_m=0.0) if lines else constraints
+        decided = limits_of_decisions(constraints, planner.planner) if self._apart else constraints
         self._decider = Decider(live, decided, planner, self._maps, executor)
         self._committing = LegCommit(live, constraints, leads=not self._lookout.needed)
         self._dispatch = Dispatch(live, hub, self._committing, time_scale, persistent=self._apart)

@@ -16,7 +16,7 @@ import structlog
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.motion.steering import steered
+from app.exploration.motion.steering import steered_motion
 from app.exploration.motion.timeline import Timeline, closest_approach
 from app.missions.fleet.interface import WaypointOrder
 from app.missions.flight.decisions.decision import turn_radius_m
@@ -243,7 +243,7 @@ class GivingWay:
         spec, told_rad = self._live.spec, None if member.report is None else member.report.heading_rad
         heading_rad = math.nan if told_rad is None else told_rad
         speed_mps, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
-        return steered(places, heading_rad, speed_mps, radius_m, self._live.team.current_mps, until_s)
+        return steered_motion(places, heading_rad, speed_mps, radius_m, self._live.team.current_mps, until_s)
 
     async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
         order = self._committing.waiting_at(member, place_m)
