@@ -61,7 +61,7 @@ export function overlaid(): Padding {
   return {
     top: top + FREE_PX,
     right: right + (inRow ? 0 : tools.width) + FREE_PX,
-    bottom: below + (inRow ? tools.height : 0) + FREE_PX,
+    bottom: below + (inRow ? tools.height : 0) + box(".maplibregl-ctrl-scale").height + FREE_PX,
     left: left + FREE_PX,
   };
 }
