@@ -215,7 +215,8 @@ def tablet(guide: Guide, page: Page) -> None:
 
 def harbour(guide: Guide, page: Page) -> None:
     """Going to a harbour by its name, while a vehicle waits for a person."""
-    show(page, guide.survey(0.4))
+    show(page, guide.survey(0.1))
+    by_id(page, "range-low").wait_for()
     by_id(page, f"hold-{HELD[0]}").dispatch_event("click")
     by_id(page, "attention").wait_for()
     by_id(page, "go-to").click()
