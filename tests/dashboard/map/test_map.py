@@ -161,7 +161,7 @@ def test_harbours_are_found_by_name_and_named_on_a_map_that_shows_their_coast(
     expect_name(page, drawn=False)
     field.fill("no such harbour")
     field.press("Enter")
-    expect(by_id(page, "go-to-fault")).to_contain_text("or a harbour’s name")
+    expect(by_id(page, "go-to-fault")).to_contain_text("No harbour is called")
     assert [one for one in watched.addresses if not one.startswith((service.url, "data:", "blob:"))] == []
     assert [words for words in watched.complaints if "getImageData" not in words] == []
 
