@@ -80,7 +80,7 @@ def test_the_map_tells_what_is_known_and_where_it_is(watched: Watched, service: 
     by_id(page, "go-to").click()
     by_id(page, "go-to-position").fill("the quay")
     by_id(page, "go").click()
-    expect(by_id(page, "go-to-fault")).to_contain_text("Type a position such as")
+    expect(by_id(page, "go-to-fault")).to_contain_text("A position is typed such as")
     x, y = go_to(page, "41.1852, -8.7048")
     page.mouse.move(x, y)
     expect(by_id(page, "readout")).to_contain_text(re.compile(r"\d m ± 0\.\d+ m · (\d+ sounding|guessed)"))
