@@ -165,7 +165,8 @@ class SwathFlight:
             swath=swath_task(spec, self._specs, self.builder.coverage()),
         )
         number = int(swarm.legs[i]) + 1
-        decision = decide(number, spec, self._constraints, self._planner, swarm.places(due), known)
+        places = [replace(place, at_rest=craft.idle > 0 and place.moving) for place in swarm.places(due)]
+        decision = decide(number, spec, self._constraints, self._planner, places, known)
         self._take_in(craft)
         name = self._members[i].name
         legs = [leg for leg in decision.legs if leg.vehicle == name and not leg.refusal]
