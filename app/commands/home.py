@@ -165,6 +165,7 @@ async def _flown(
         "touched": len(watch.touched),
         "touched_before": len(watch.touched_before),
         "closest_m": round(watch.closest_m, 1) if math.isfinite(watch.closest_m) else None,
+        "meetings": list(watch.meetings.values()),
         "vehicles": watch.found(),
     }
 

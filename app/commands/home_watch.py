@@ -89,6 +89,8 @@ class Watch:
         """Those of them that touched each other."""
         self.touched_before: set[tuple[str, str]] = set()
         """Vehicles that touched each other while neither was on its way home, for example where they are launched."""
+        self.meetings: dict[tuple[str, str], list[dict[str, Any]]] = {}
+        """Of those that came too close or touched: what both were doing when that was seen first."""
 
     async def keep(self) -> None:
         """Look on until cancelled."""
@@ -116,7 +118,9 @@ class Watch:
             out[member.name] = member, place
         for (a, (one, here)), (b, (other, there)) in combinations(sorted(out.items()), 2):
             returning = any(m.withdrawal is not None and not m.withdrawal.asked for m in (one, other))
-            self._compare((a, b), here, there, returning=returning)
+            if self._compare((a, b), here, there, returning=returning):
+                both = [self._doing(one, here), self._doing(other, there)]
+                self.meetings.setdefault((a, b), both)
 
     def _note(self, member: "Member", seen: Seen, place: Place, left_pct: float, used_pct: float) -> None:
         from app.missions.flown import Phase
@@ -142,20 +146,38 @@ class Watch:
             adrift = self._link.swims(name) and self._link.is_adrift(name)
             (self.drifted_into_zones if adrift else self.in_zones).add(name)
 
-    def _compare(self, pair: tuple[str, str], here: Place, there: Place, *, returning: bool) -> None:
+    def _doing(self, member: "Member", place: Place) -> dict[str, Any]:
+        east_m, north_m, depth_m = (round(one, 1) for one in place)
+        heard = self._link.swims(member.name) and not self._link.is_silent(member.name)
+        order_m = None if member.order is None else round(member.order.position.depth_m, 1)
+        return {
+            "vehicle": member.name,
+            "east_m": east_m,
+            "north_m": north_m,
+            "depth_m": depth_m,
+            "sent_to_depth_m": order_m,
+            "phase": member.flown.phase,
+            "heard": heard,
+        }
+
+    def _compare(self, pair: tuple[str, str], here: Place, there: Place, *, returning: bool) -> bool:
+        """Whether two are closer than they should be."""
         limits = self._live.spec.limits
         aside_m, below_m = math.hypot(here[0] - there[0], here[1] - there[1]), abs(here[2] - there[2])
         if aside_m >= limits.min_separation_m:
             # Vehicles are launched side by side.
             self._been_apart.add(pair)
         if pair not in self._been_apart:
-            return
-        if aside_m < LONG_M and below_m < TALL_M:
+            return False
+        close = aside_m < LONG_M and below_m < TALL_M
+        if close:
             (self.touched if returning else self.touched_before).add(pair)
         if returning and below_m < limits.min_vertical_separation_m / 2:
             self.closest_m = min(self.closest_m, aside_m)
             if aside_m < limits.min_separation_m:
                 self.too_close.add(pair)
+                close = True
+        return close
 
     def _place(self, name: str) -> Place:
         place = self._link.true_position(name)

@@ -322,6 +322,13 @@ class Team:
         return member
 
     @property
+    def current_mps(self) -> tuple[float, float]:
+        """Velocity of the water, east and north: what vehicles tell of it, on average."""
+        told = [m.report.current_mps for m in self if m.report is not None and m.report.current_mps is not None]
+        east, north = np.mean(told, axis=0) if told else (0.0, 0.0)
+        return float(east), float(north)
+
+    @property
     def present(self) -> list[Member]:
         """Those that can be planned for."""
         return [m for m in self.members.values() if m.surveys]

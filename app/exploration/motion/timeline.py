@@ -1,5 +1,6 @@
 """Where vehicles are when, and how close two of them come: pieces of straight lines, flown evenly."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,30 @@ class Timeline(NamedTuple):
     def at(self, time_s: FloatArray) -> FloatArray:
         """Return the places (k, 3) at times (k,)."""
         return np.column_stack([np.interp(time_s, self.time_s, column) for column in self.place_m.T])
+
+
+SLOWEST_SHARE = 0.1
+"""Part of its speed that a vehicle makes good at the least against a current, so that its way ends."""
+
+
+def speed_over_ground_mps(way: FloatArray, speed_mps: float, current_mps: tuple[float, float]) -> float:
+    """Return how fast a vehicle makes good a straight way that heads into the current as much as keeps it there.
+
+    Parameters
+    ----------
+    way : (2,) or (3,)
+        From its beginning to its end: east, north, and what it goes down.
+    speed_mps
+        Through the water.
+    current_mps
+        East and north.
+    """
+    length_m = math.hypot(*way)
+    if length_m < 1e-9 or current_mps == (0.0, 0.0):
+        return speed_mps
+    helps = (way[0] * current_mps[0] + way[1] * current_mps[1]) / length_m
+    aside2 = max(current_mps[0] ** 2 + current_mps[1] ** 2 - helps**2, 0.0)
+    return float(max(math.sqrt(max(speed_mps**2 - aside2, 0.0)) + helps, SLOWEST_SHARE * speed_mps))
 
 
 class Approach(NamedTuple):

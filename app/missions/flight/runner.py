@@ -17,11 +17,12 @@ from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.decisions.deciding import Decider
-from app.missions.flight.decisions.decision import make_constraints, make_planner
+from app.missions.flight.decisions.decision import limits_of_decisions, make_constraints, make_planner
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit, committed_leg
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
+from app.missions.flight.legs.giving_way import GivingWay
 from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
@@ -73,12 +74,14 @@ class Runner:
         self._maps = StepMaps(live, executor, time_scale, map_pause_s, maps_ready)
         self._waiting = Waiting(live)
         self._lookout = SearchHooks(live, time_scale, self._waiting.until)
-        self._decider = Decider(live, constraints, planner, self._maps, executor)
+        decided = limits_of_decisions(constraints, planner.planner) if self._apart else constraints
+        self._decider = Decider(live, decided, planner, self._maps, executor)
         self._committing = LegCommit(live, constraints, leads=not self._lookout.needed)
         self._dispatch = Dispatch(live, hub, self._committing, time_scale, persistent=self._apart)
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
         self._range = EnergyRange(live, constraints, self._committing)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
+        self._giving_way = GivingWay(live, constraints, self._committing, self._dispatch, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
         self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)
@@ -96,6 +99,7 @@ class Runner:
             asyncio.create_task(self._watch.keep()),
             asyncio.create_task(self._withdrawals.keep()),
             asyncio.create_task(self._onboard.keep()),
+            asyncio.create_task(self._giving_way.keep()),
         ]
         try:
             resumed = await self._recover()

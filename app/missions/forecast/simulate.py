@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
+from app.missions.flight.decisions.decision import Knowledge, decide, limits_of_decisions, make_constraints
 from app.missions.flight.own_legs import LEAST_WAY_M
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm, planner_of, poses_apart
@@ -165,6 +165,8 @@ def fly(
     rng = np.random.default_rng([spec.seed, 1])
     swarm = Swarm(spec, members, starts_m, so_far.first_step)
     apart = planner.decides_apart and np.isinf(constraints.com_range_m)
+    if apart:
+        constraints = limits_of_decisions(constraints, planner)
 
     def sound(i: int, poses: FloatArray) -> None:
         apart_m = spacing_m or max(spec.speed_of(members[i].spec) / SOUNDINGS_HZ, terrain.cell_m / SOUNDINGS_A_CELL)

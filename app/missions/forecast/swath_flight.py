@@ -20,6 +20,7 @@ from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.decision import (
     Knowledge,
     decide,
+    limits_of_decisions,
     make_constraints,
     swath_sonar,
     swath_task,
@@ -102,7 +103,8 @@ class SwathFlight:
             self.builder.swath.add_placed(east, north, depth, Uncertainty(sd, np.zeros_like(sd), np.zeros_like(sd)))
         self.builder.build()
         self._cell_m = cell_m
-        self._constraints, self._planner = make_constraints(spec), planner_of(spec, so_far)
+        self._planner = planner_of(spec, so_far)
+        self._constraints = limits_of_decisions(make_constraints(spec), self._planner)
         self.swarm = Swarm(spec, members, starts_m, so_far.first_step)
         self._crafts = [
             self._craft(member, start) for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)

@@ -252,6 +252,10 @@ class SimFleetLink(FleetLink):
         """Whether a vehicle is in the world."""
         return vehicle in self._deployed
 
+    def is_silent(self, vehicle: str) -> bool:
+        """Whether a vehicle is out of reach."""
+        return self._deployed[vehicle].silent_since_s is not None
+
     def is_adrift(self, vehicle: str) -> bool:
         """Whether a vehicle gave its waypoint up as nobody heard it, and has none yet: the current takes it along."""
         return self._deployed[vehicle].adrift

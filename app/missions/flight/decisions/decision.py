@@ -204,6 +204,15 @@ def swath_task(spec: MissionSpec, vehicles: Iterable[VehicleSpec], coverage: Cov
     return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0, altitudes_m)
 
 
+def limits_of_decisions(constraints: Constraints, planner: PlannerBase) -> Constraints:
+    """Return the limits that legs are decided by where every vehicle flies its own.
+
+    Lines are as they are: whether vehicles meet on them is looked at in time, leg by leg. A vehicle at the end of its
+    last leg is in nobody's way for good.
+    """
+    return replace(constraints, min_separation_m=0.0) if planner.flies_lines else constraints
+
+
 def without_zones(spec: MissionSpec, coverage: Coverage) -> Coverage:
     """Return what there is to ensonify without a mission's keep-out zones."""
     if not spec.keep_out:

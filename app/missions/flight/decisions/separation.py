@@ -5,14 +5,14 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.motion.timeline import Approach, Timeline, closest_approach
+from app.exploration.motion.timeline import Approach, Timeline, closest_approach, speed_over_ground_mps
 from app.missions.flight.decisions.decision import Decision
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.energy import ASCENT_MPS
 from app.missions.safety import free_space
 from app.missions.spec.limits import Limits
 from app.missions.spec.mission import MissionSpec
-from app.missions.team import Member
+from app.missions.team import OUT_OF_REACH, Member
 
 DIRECTIONS = 16
 PARTS = (1.0, 0.5)
@@ -22,18 +22,19 @@ PARTS = (1.0, 0.5)
 def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[str, str]:
     """Return the vehicles whose new leg would bring them too close to another one, and how close.
 
-    A vehicle is taken to fly its committed legs at its speed and to stay where the last one ends. Of those with a new
-    leg the one that is too close to most others does without it, then the next, until nobody is too close.
+    A vehicle is taken to fly its committed legs at its speed, in the current, and to stay where the last one ends. Of
+    those with a new leg the one that is too close to most others does without it, then the next, until nobody is too
+    close.
     """
     limits = spec.limits
     if limits.min_separation_m <= 0.0:
         return {}
-    before = {m.name: _motion(m, live, spec) for m in live.team if m.present}
+    before = {m.name: planned_motion(m, live) for m in live.team if m.present}
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
-    speeds = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}
+    speeds, current_mps = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}, live.team.current_mps
     refused: dict[str, str] = {}
     while True:
-        moving = {name: _continued(before[name], end, speeds[name]) for name, end in new.items()}
+        moving = {name: _continued(before[name], end, speeds[name], current_mps) for name, end in new.items()}
         close = [
             (name, other, approach)
             for name in sorted(moving)
@@ -72,7 +73,7 @@ def passes_above(member: Member, live: LiveMission, spec: MissionSpec) -> str:
             continue
         if other.report.position.depth_m > depth_m - limits.min_vertical_separation_m:
             continue
-        nearest = closest_approach(rise, _motion(other, live, spec), until_s=float(rise.time_s[-1]))
+        nearest = closest_approach(rise, planned_motion(other, live), until_s=float(rise.time_s[-1]))
         if nearest.distance_m < limits.min_separation_m + free_space.CIRCLE_M:
             return other.name
     return ""
@@ -106,22 +107,39 @@ def _approach(leg: Timeline, begins_s: float, other: Timeline, limits: Limits) -
     return nearest if nearest.distance_m < float(np.hypot(*apart[:2])) - 1e-6 else None
 
 
-def _motion(member: Member, live: LiveMission, spec: MissionSpec) -> Timeline:
-    """Return a vehicle's motion from now to the end of its last committed leg."""
-    depth_m = member.cruise_depth_m(spec.limits) if member.report is None else member.report.position.depth_m
-    motion = Timeline(np.zeros(1), np.append(member.place_m(live.frame), depth_m)[None])
-    speed_mps = spec.speed_of(member.spec)
-    if member.order is not None and member.target_m is not None and member.busy:
-        end = np.append(member.target_m, member.order.position.depth_m)
-        motion = _continued(motion, end, speed_mps)
-    for leg in member.ahead:
-        motion = _continued(motion, np.append(leg.target_m, leg.position.depth_m), speed_mps)
+def planned_motion(member: Member, live: LiveMission) -> Timeline:
+    """Return a vehicle's motion from when it was heard last to the end of its last committed leg."""
+    return motion_along(planned_places(member, live), live.spec.speed_of(member.spec), live.team.current_mps)
+
+
+def planned_places(member: Member, live: LiveMission) -> list[FloatArray]:
+    """Return where a vehicle was last, and where its committed legs end, each (3,): east, north and depth.
+
+    One that is out of reach flies the leg that it was sent, and goes on with none.
+    """
+    depth_m = member.cruise_depth_m(live.spec.limits) if member.report is None else member.report.position.depth_m
+    places = [np.append(member.place_m(live.frame), depth_m)]
+    if member.order is not None and member.target_m is not None and member.ordered:
+        places.append(np.append(member.target_m, member.order.position.depth_m))
+    if member.link not in OUT_OF_REACH:
+        places += [np.append(leg.target_m, leg.position.depth_m) for leg in member.ahead]
+    return places
+
+
+def motion_along(places: list[FloatArray], speed_mps: float, current_mps: tuple[float, float]) -> Timeline:
+    """Return the motion of a vehicle from the first of some places (3,) to the last; it is at the first at 0 s."""
+    motion = Timeline(np.zeros(1), places[0][None])
+    for place in places[1:]:
+        motion = _continued(motion, place, speed_mps, current_mps)
     return motion
 
 
-def _continued(motion: Timeline, target_m: np.ndarray, speed_mps: float) -> Timeline:
-    length_m = float(np.linalg.norm(target_m - motion.place_m[-1]))
-    arrives_s = motion.time_s[-1] + max(length_m / speed_mps, 1e-3)
+def _continued(
+    motion: Timeline, target_m: FloatArray, speed_mps: float, current_mps: tuple[float, float] = (0.0, 0.0)
+) -> Timeline:
+    way = target_m - motion.place_m[-1]
+    takes_s = float(np.linalg.norm(way)) / speed_over_ground_mps(way, speed_mps, current_mps)
+    arrives_s = motion.time_s[-1] + max(takes_s, 1e-3)
     return Timeline(np.append(motion.time_s, arrives_s), np.vstack([motion.place_m, target_m]))
 
 

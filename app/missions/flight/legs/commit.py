@@ -255,9 +255,19 @@ class LegCommit:
         """Return an order that keeps a vehicle where it is, as deep as it is; None where it has no order to change."""
         if member.report is None or member.order is None:
             return None
-        east_m, north_m = member.place_m(self._live.frame)
-        place = self._position(east_m, north_m, self._depth_below_m(member, 0.0))
-        return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None)
+        return self._waiting(member.order, member.place_m(self._live.frame), self._depth_below_m(member, 0.0))
+
+    def waiting_at(self, member: Member, place_m: FloatArray) -> WaypointOrder | None:
+        """Return an order to wait at a place (2,), as deep as it goes now; None where it has no order to change."""
+        if member.report is None or member.order is None:
+            return None
+        ways = self._turning(member, member.place_m(self._live.frame), place_m)
+        depth_m = self._depth_m(member, member.order.position.depth_m, ways)
+        return self._waiting(member.order, place_m, depth_m)
+
+    def _waiting(self, order: WaypointOrder, place_m: FloatArray, depth_m: float) -> WaypointOrder:
+        place = self._position(float(place_m[0]), float(place_m[1]), depth_m)
+        return replace(order, step=NO_LEG, position=place, lead=None, circle=None)
 
     def _depth_below_m(self, member: Member, depth_m: float) -> float:
         """Return a depth that is not shallower than where a vehicle is now."""

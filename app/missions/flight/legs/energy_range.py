@@ -46,12 +46,7 @@ class EnergyRange:
 
     def take_currents(self) -> None:
         """Take the current to be what the vehicles tell of it, on average; it counts against them, never for them."""
-        told = [
-            m.report.current_mps for m in self._live.team if m.report is not None and m.report.current_mps is not None
-        ]
-        if told:
-            east, north = np.mean(told, axis=0)
-            self.current_mps = (float(east), float(north))
+        self.current_mps = self._live.team.current_mps
 
     def way(self, member: Member) -> FloatArray | None:
         """Return the corners of a vehicle's way home, (n, 2), from about where it is; None: it has none."""

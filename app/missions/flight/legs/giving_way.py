@@ -1,0 +1,288 @@
+"""Has vehicles give way: of two that are about to pass too close to each other one waits, or goes aside.
+
+Legs are decided so that vehicles stay apart, by when each should be where, or by their depths. Currents, waits and
+people change when they are where, and over a shoal bottom vehicles travel less deep than planned. So once more what
+counts is where they are, and where they will be in a moment.
+"""
+
+import asyncio
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import structlog
+
+from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
+from app.exploration.motion.steering import steered_motion
+from app.exploration.motion.timeline import Timeline, closest_approach
+from app.missions.fleet.interface import WaypointOrder
+from app.missions.flight.decisions.decision import turn_radius_m
+from app.missions.flight.decisions.separation import planned_places, ways_aside
+from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.observation.waiting import until_next_look
+from app.missions.live.mission import LiveMission
+from app.missions.recovery.berths import home_of
+from app.missions.recovery.way_home import homeward_ground
+from app.missions.spec.vehicle import Guidance
+from app.missions.team import OUT_OF_REACH, Member
+from app.missions.views.mission import Level
+
+HORIZON_S = 20.0
+"""How far ahead vehicles' ways are looked at, seconds of their time."""
+
+WAITING_S = 40.0
+"""How far ahead the others' ways are looked at where a vehicle waits."""
+
+VERTICAL_SHARE = 0.9
+"""Vehicles pass above each other that are this part of ``min_vertical_separation_m`` apart: none keeps its depth
+exactly."""
+
+CLOSING_M = 0.5
+"""Who comes no nearer than this to one that is close to it already gives no way."""
+
+CLEAR = 1.2
+"""A vehicle goes on when it will stay this many times the least separation away."""
+
+PATIENCE_S = 60.0
+"""How long it gives way at the most, seconds of its time."""
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True)
+class _Imminent:
+    """Where a vehicle will be in the next moment, and at which depths, least and most."""
+
+    member: Member
+    motion: Timeline
+    least_m: float
+    most_m: float
+    around_m: float = 0.0
+    """How far from there it may be: it circles where it waits."""
+
+    @property
+    def here_m(self) -> FloatArray:
+        """Where it is now, (2,)."""
+        return self.motion.at(np.zeros(1))[0, :2]
+
+
+@dataclass
+class _Giving:
+    order: WaypointOrder
+    """What it goes on with."""
+    since_s: float
+    """The event loop's time."""
+
+
+class GivingWay:
+    """Looks at the vehicles of one running mission, and has them give way.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
+
+    def __init__(
+        self,
+        live: LiveMission,
+        constraints: Constraints,
+        committing: LegCommit,
+        dispatch: Dispatch,
+        time_scale: float,
+    ) -> None:
+        self._live = live
+        self._constraints = constraints
+        self._committing = committing
+        self._dispatch = dispatch
+        self._time_scale = time_scale
+        self._giving: dict[str, _Giving] = {}
+
+    async def keep(self) -> None:
+        """Go on until cancelled."""
+        while True:
+            try:
+                if not self._live.halted and self._live.spec.limits.min_separation_m > 0.0:
+                    await self.look()
+            except Exception:
+                log.exception("vehicles' ways could not be looked at")
+            await until_next_look(self._time_scale)
+
+    async def look(self) -> None:
+        """Look once at everybody."""
+        self._giving = {name: giving for name, giving in self._giving.items() if self._still_gives(name, giving)}
+        near = {member.name: self._imminent(member) for member in self._may_meet()}
+        await self._let_go_on(near)
+        settled: set[str] = set()
+        for one, other in self._meeting(list(near.values())):
+            if not settled & {one.member.name, other.member.name}:
+                settled |= {one.member.name, other.member.name}
+                await self._keep_apart(one, other, near)
+
+    def _still_gives(self, name: str, giving: _Giving) -> bool:
+        """Whether a vehicle was not led elsewhere since."""
+        member = self._live.team.get(name)
+        return member is not None and member.ordered and member.order is giving.order and member.waits_m is not None
+
+    def _imminent(self, member: Member) -> _Imminent:
+        """Return where a vehicle will be, as it is led now."""
+        if member.name not in self._giving:
+            return self._going_on(member)
+        depth_m = _depth_m(member)
+        return _Imminent(member, self._motion_to(member, member.waits_m), depth_m, depth_m, self._circle_m(member))
+
+    def _going_on(self, member: Member) -> _Imminent:
+        """Return where a vehicle will be on its way."""
+        places, age_s = planned_places(member, self._live), self._age_s(member)
+        motion = self._steered(member, places, WAITING_S + age_s)
+        motion = Timeline(motion.time_s - age_s, motion.place_m)
+        depths_m = [float(place[2]) for place in places[:2]]
+        around_m = self._circle_m(member) if len(places) == 1 else 0.0
+        return _Imminent(member, motion, min(depths_m), max(depths_m), around_m)
+
+    def _circle_m(self, member: Member) -> float:
+        """Return how wide the circles are in which a vehicle waits."""
+        return max(member.capabilities.circles_m, turn_radius_m(self._live.spec, member.spec))
+
+    def _age_s(self, member: Member) -> float:
+        """Return how much older a vehicle's report is than the newest of the team."""
+        if member.report is None or member.link not in OUT_OF_REACH:
+            return 0.0
+        newest_s = max(one.report.time_s for one in self._live.team if one.report is not None)
+        return max(newest_s - member.report.time_s, 0.0)
+
+    def _may_meet(self) -> list[Member]:
+        """Return the vehicles that are so near another one that they may meet it in a moment."""
+        out = [member for member in self._live.team if _is_out(member)]
+        if len(out) < 2:
+            return []
+        here_m = np.array([member.place_m(self._live.frame) for member in out])
+        # What the current does to one it does to the other.
+        reach_m = np.array([(WAITING_S + self._age_s(m)) * self._live.spec.speed_of(m.spec) for m in out])
+        circles_m = np.array([self._circle_m(member) for member in out])
+        room_m = CLEAR * self._live.spec.limits.min_separation_m + circles_m + reach_m
+        near = np.hypot(*(here_m[:, None] - here_m[None]).T) < room_m[:, None] + reach_m[None] + circles_m[None]
+        np.fill_diagonal(near, val=False)
+        return [out[k] for k in np.flatnonzero(near.any(axis=1))]
+
+    def _meeting(self, near: list[_Imminent]) -> Iterator[tuple[_Imminent, _Imminent]]:
+        """Yield pairs that are about to pass too close to each other."""
+        least_m = self._live.spec.limits.min_separation_m
+        for one, other in combinations(near, 2):
+            if self._too_close(one, other, least_m):
+                yield one, other
+
+    def _too_close(self, one: _Imminent, other: _Imminent, least_m: float) -> bool:
+        """Whether two will be closer than that in a moment, and closer than they are now."""
+        nearest_m = self._nearest_m(one, other)
+        now_m = math.dist(one.here_m, other.here_m) - one.around_m - other.around_m
+        return nearest_m < min(least_m, now_m - CLOSING_M)
+
+    def _nearest_m(self, one: _Imminent, other: _Imminent, until_s: float = HORIZON_S) -> float:
+        """Return how close two come to each other in a moment; inf where one stays above the other."""
+        apart_m = max(one.least_m - other.most_m, other.least_m - one.most_m)
+        if apart_m >= VERTICAL_SHARE * self._live.spec.limits.min_vertical_separation_m:
+            return math.inf
+        nearest_m = closest_approach(one.motion, other.motion, until_s=until_s).distance_m
+        return nearest_m - one.around_m - other.around_m
+
+    async def _keep_apart(self, one: _Imminent, other: _Imminent, near: dict[str, _Imminent]) -> None:
+        """Have one of two give way: rather who surveys than who goes home, the last by name."""
+        pair = sorted((one, other), key=lambda it: (it.member.withdrawal is None, it.member.name), reverse=True)
+        best_m, best = self._nearest_m(one, other) + CLOSING_M, None
+        enough_m = CLEAR * self._live.spec.limits.min_separation_m
+        for it in pair:
+            if not self._may_wait(it.member):
+                continue
+            others = [that for name, that in near.items() if name != it.member.name]
+            for place_m in self._places(it.member):
+                motion, around_m = self._motion_to(it.member, place_m), self._circle_m(it.member)
+                waiting = _Imminent(it.member, motion, it.least_m, it.most_m, around_m)
+                nearest_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
+                if nearest_m > best_m:
+                    best_m, best = nearest_m, (it.member, place_m)
+                if best_m >= enough_m:
+                    break
+            if best_m >= enough_m:
+                break
+        if best is not None:
+            member, place_m = best
+            await self._give_way(member, place_m, other.member if member is one.member else one.member)
+
+    def _may_wait(self, member: Member) -> bool:
+        waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
+        # Orders by sound, and plans, take longer than there is.
+        return waits and member.spec.guidance is Guidance.FOLLOW and member.present and member.busy
+
+    def _places(self, member: Member) -> list[FloatArray]:
+        """Return where a vehicle may wait, each (2,): where it is, else wherever its limits allow."""
+        if member.order is None or member.target_m is None:
+            return []
+        here_m = member.place_m(self._live.frame)
+        depth_m = member.order.position.depth_m
+        constraints, home_m = self._constraints, home_of(member.spec, member.slot, self._live.spec)
+        if member.withdrawal is not None and home_m is not None:
+            constraints = homeward_ground(constraints, home_m)
+        aside = ways_aside(
+            np.append(here_m, depth_m), np.append(member.target_m, depth_m), constraints, self._committing.bottom
+        )
+        return [here_m, *aside[:, :2]]
+
+    def _motion_to(self, member: Member, place_m: FloatArray | None) -> Timeline:
+        """Return a vehicle's motion to a place where it waits."""
+        here = np.append(member.place_m(self._live.frame), _depth_m(member))
+        if place_m is None or math.dist(place_m, here[:2]) < CLOSING_M:
+            return Timeline(np.zeros(1), here[None])
+        return self._steered(member, [here, np.append(place_m, here[2])], WAITING_S)
+
+    def _steered(self, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
+        spec, told_rad = self._live.spec, None if member.report is None else member.report.heading_rad
+        heading_rad = math.nan if told_rad is None else told_rad
+        speed_mps, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
+        return steered_motion(places, heading_rad, speed_mps, radius_m, self._live.team.current_mps, until_s)
+
+    async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
+        order = self._committing.waiting_at(member, place_m)
+        if order is None or member.order is None:
+            return
+        again = member.name in self._giving
+        if not again:
+            self._giving[member.name] = _Giving(member.order, asyncio.get_running_loop().time())
+        await self._dispatch.stay(member, order)
+        if member.waits_m is None:
+            self._giving.pop(member.name, None)  # it refused
+        if again or member.waits_m is None:
+            return
+        words = f"{member.name} gives way to {other.name}"
+        await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name)
+
+    async def _let_go_on(self, near: dict[str, _Imminent]) -> None:
+        """Send vehicles on that would stay clear of the others now, or have waited long."""
+        now_s = asyncio.get_running_loop().time()
+        for name, giving in list(self._giving.items()):
+            if name not in near or not near[name].member.present:
+                continue
+            member = near[name].member
+            waited_s = now_s - giving.since_s
+            on = self._going_on(member)
+            least_m = CLEAR * self._live.spec.limits.min_separation_m
+            clear = not any(self._too_close(on, that, least_m) for other, that in near.items() if other != name)
+            if clear or waited_s * self._time_scale >= PATIENCE_S:
+                del self._giving[name]
+                member.waits_m = None
+                member.leg_began_s += waited_s
+                near[name] = on
+                await self._dispatch.send(member)
+
+
+def _is_out(member: Member) -> bool:
+    """Whether a vehicle is in the water, and not where it was to be in the end."""
+    return member.report is not None and not (member.withdrawal is not None and member.withdrawal.over)
+
+
+def _depth_m(member: Member) -> float:
+    return 0.0 if member.report is None else member.report.position.depth_m

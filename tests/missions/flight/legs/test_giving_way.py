@@ -1,0 +1,177 @@
+"""Vehicles that are about to meet: one gives way, and flies its leg when the other is past."""
+
+import asyncio
+import math
+
+import numpy as np
+import pytest
+
+from app.commands.home import fly_mission
+from app.exploration.lines import lawnmower
+from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.fleet.hub import FleetHub, VehicleKey
+from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, VehicleReport, WaypointOrder
+from app.missions.fleet.interface import WaypointStatus as Status
+from app.missions.flight.decisions.decision import make_constraints
+from app.missions.flight.legs.commit import NO_LEG, LegCommit
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.giving_way import PATIENCE_S, GivingWay
+from app.missions.live.mission import LiveMission
+from app.missions.service import MissionService
+from app.missions.settings import SimulationSettings
+from app.missions.spec.failsafes import Response
+from app.missions.spec.mission import MissionSpec
+from app.missions.team import Member, Withdrawal
+from tests.support.missions.harbour import sim_spec
+from tests.support.missions.specs import LAT, LON
+
+Place = tuple[float, float, float]
+
+HERE, THERE = (5.0, 30.0, 3.0), (50.0, 30.0, 3.0)
+
+
+class Scene:
+    """Two vehicles of a mission that are placed by hand, and what they are ordered."""
+
+    def __init__(self, live: LiveMission, hub: FleetHub, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.live = live
+        self.ordered: list[WaypointOrder] = []
+        constraints = make_constraints(live.spec)
+        committing = LegCommit(live, constraints, leads=False)
+        dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
+        self.giving_way = GivingWay(live, constraints, committing, dispatch, 1.0)
+        for slot, vehicle in enumerate(live.spec.vehicles):
+            member = live.team.get(vehicle.name) or live.team.join(vehicle, slot)
+            member.capabilities = LinkCapabilities(simulated=True)
+            member.followed = member.engaged = True
+
+        async def order(key: VehicleKey, order: WaypointOrder) -> None:
+            self.ordered.append(order)
+
+        monkeypatch.setattr(hub, "order", order)
+
+    def put(self, name: str, at: Place, to: Place, *, time_s: float = 100.0) -> Member:
+        """Let a vehicle be somewhere, and fly to somewhere."""
+        member = self.live.team.members[name]
+        member.link = LinkState.ENGAGED
+        heading_rad = math.atan2(to[0] - at[0], to[1] - at[1])
+        member.report = VehicleReport(name, time_s, self._position(at), heading_rad=heading_rad)
+        order = member.order
+        if order is None:
+            order = WaypointOrder(self.live.id, 1, name, self._position(to), 1.0, 3.0, 1.0)
+            member.set_order(order, np.array(to[:2]))
+            member.leg_began_s = asyncio.get_running_loop().time()
+        member.status = Status.ACKNOWLEDGED
+        return member
+
+    def _position(self, place: Place) -> Position:
+        lat, lon = self.live.frame.to_geographic(np.array(place[0]), np.array(place[1]))
+        return Position(float(lat), float(lon), place[2])
+
+    def where_m(self, order: WaypointOrder) -> tuple[float, float]:
+        """Return where an order leads, east and north."""
+        east, north = self.live.frame.to_local(order.position.lat_deg, order.position.lon_deg)
+        return float(east), float(north)
+
+
+@pytest.fixture
+async def scene(service: MissionService, monkeypatch: pytest.MonkeyPatch) -> Scene:
+    limits = {"max_step_m": 20.0, "min_separation_m": 5.0}
+    live = await service.get((await service.create(sim_spec("a", "b", side_m=60.0, limits=limits))).id)
+    return Scene(live, service.hub, monkeypatch)
+
+
+async def test_of_two_that_head_for_each_other_the_second_gives_way_and_goes_on_when_the_first_is_past(
+    scene: Scene,
+) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    second = scene.put("b", THERE, (1.0, 30.0, 3.0))
+    await scene.giving_way.look()
+    [waits] = scene.ordered
+    assert (waits.vehicle, waits.step) == ("b", NO_LEG)
+    assert abs(scene.where_m(waits)[1] - 30.0) > scene.live.spec.limits.min_separation_m  # off the first one's way
+    assert second.ordered
+
+    # Once the first one is past, its own leg is sent again.
+    scene.put("b", (*scene.where_m(waits), 3.0), (1.0, 30.0, 3.0))
+    scene.put("a", (56.0, 30.0, 3.0), (59.0, 30.0, 3.0))
+    await scene.giving_way.look()
+    assert scene.ordered[-1] is second.order
+    assert second.waits_m is None
+
+
+@pytest.mark.parametrize(
+    ("at", "to"),
+    [
+        ((30.0, 30.0, 4.0), (1.0, 30.0, 4.0)),
+        ((30.0, 40.0, 3.0), (1.0, 40.0, 3.0)),
+        ((30.0, 30.0, 3.0), (55.0, 30.0, 3.0)),
+    ],
+    ids=["a metre deeper", "beside it", "ahead of it, as fast"],
+)
+async def test_who_meets_nobody_flies_on(scene: Scene, at: Place, to: Place) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    scene.put("b", at, to)
+    await scene.giving_way.look()
+    assert scene.ordered == []
+
+
+async def test_a_vehicle_that_climbs_through_anothers_depth_meets_it(scene: Scene) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    scene.put("b", (50.0, 30.0, 6.0), (1.0, 30.0, 0.0))
+    await scene.giving_way.look()
+    assert [order.step for order in scene.ordered] == [NO_LEG]
+
+
+async def test_who_surveys_gives_way_to_who_goes_home(scene: Scene) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    scene.put("b", THERE, (1.0, 30.0, 3.0)).withdrawal = Withdrawal(Response.RETURN, "its energy", led=True)
+    await scene.giving_way.look()
+    assert {order.vehicle for order in scene.ordered} == {"a"}
+
+
+async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: Scene) -> None:
+    scene.put("a", (30.0, 1.0, 3.0), (30.0, 55.0, 3.0), time_s=120.0)
+    # It was 33 m away when it was heard last, ten seconds ago: alone where it was then it would meet nobody.
+    scene.put("b", (1.0, 16.0, 3.0), (59.0, 16.0, 3.0), time_s=110.0).link = LinkState.LOST
+    await scene.giving_way.look()
+    assert {order.vehicle for order in scene.ordered} == {"a"}
+
+
+async def test_who_waits_waits_no_longer_than_a_minute(scene: Scene) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    second = scene.put("b", THERE, (1.0, 30.0, 3.0))
+    await scene.giving_way.look()
+    began_s = second.leg_began_s
+    scene.giving_way._giving["b"].since_s -= PATIENCE_S
+    await scene.giving_way.look()
+    assert scene.ordered[1] is second.order
+    assert second.leg_began_s == pytest.approx(began_s + PATIENCE_S, abs=5.0)
+
+
+def test_vehicles_whose_lines_lead_past_each_other_pass_and_survey(monkeypatch: pytest.MonkeyPatch) -> None:
+    routes = lawnmower.lawnmower_routes
+    # Each has the other's strip, at one depth: neither could set out while the other stood in its way.
+    monkeypatch.setattr(lawnmower, "lawnmower_routes", lambda *given: routes(*given)[::-1])
+    frame, side_m = LocalFrame(LAT, LON), 60.0
+
+    def lon_lat(east_m: float, north_m: float) -> list[float]:
+        return [float(x) for x in reversed(frame.to_geographic(np.array(east_m), np.array(north_m)))]
+
+    ring = [(0.0, 0.0), (side_m, 0.0), (side_m, side_m), (0.0, side_m), (0.0, 0.0)]
+    spec = MissionSpec.model_validate(
+        {
+            "name": "past each other",
+            "area": {"type": "Polygon", "coordinates": [[lon_lat(*corner) for corner in ring]]},
+            "vehicles": [{"name": name, "kind": "sim", "depth_m": 2.0, "endurance_min": 10.0} for name in ("a", "b")],
+            "budget": {"minutes": 60},
+            "speed_mps": 1.5,
+            "recovery": {"point": lon_lat(30.0, -20.0)},
+            "limits": {"max_step_m": 20.0},
+            "planner": {"name": "lawnmower"},
+        }
+    )
+    mission = fly_mission(spec, SimulationSettings(seed=1, current_mps=(0.3, 0.2)), None, 2, 20.0)
+    assert mission["wrong"] == []
+    assert mission["touched_before"] == 0
+    assert min(vehicle["surveyed_pct"] for vehicle in mission["vehicles"].values()) > 45.0
