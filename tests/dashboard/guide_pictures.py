@@ -28,7 +28,7 @@ from tests.support.ports import free_ports
 
 IMAGES = PROJECT / "docs" / "images"
 COLOURS = 192
-WIDE, PHONE = (1440, 900), (390, 844)
+WIDE, UPRIGHT, PHONE = (1440, 900), (820, 1180), (390, 844)
 PATIENCE_MS = 180_000
 SETTLE_MS = 3000
 """For charts and the sea floor to be drawn after what they show has come."""
@@ -39,6 +39,11 @@ ZONE = rectangle(300, 60, 340, 100)
 HOME = lon_lat(-25.0, 20.0)
 HELD = ("lauv-2", "lauv-3")
 PASSING = 263000001
+BOATS: dict[str, tuple[tuple[float, float], dict[str, float]]] = {
+    "boat-1": ((250.0, 130.0), {"position_sd_m": 80.0}),
+    "boat-2": ((-40.0, 190.0), {"battery_pct": 60.0}),
+}
+"""Vehicles that speak REST: where they are, and what they tell once they are under way."""
 BLOCKS = (
     [(520, 200), (800, 220), (790, 420), (530, 400)],
     [(560, 500), (760, 510), (750, 700), (570, 690)],
@@ -109,6 +114,41 @@ class Guide:
         self.wait(mission, lambda one: one["state"] != "running" or one["progress"]["distance_m"] > share * WHOLE_M)
         return mission
 
+    def tell_of_boats(self, mission: str, *, under_way: bool = True) -> None:
+        """Post where the vehicles are that speak REST: in the area at first, then what raises alarms."""
+        items = []
+        for name, (place, facts) in BOATS.items():
+            lon, lat = lon_lat(*(place if under_way else (60.0, place[1])))
+            items.append({"vehicle": name, "lat_deg": lat, "lon_deg": lon, "depth_m": 0.0, "time_s": time.time()})
+            items[-1] |= facts if under_way else {}
+        self.service.post(f"/missions/{mission}/measurements", {"items": items})
+
+    def alarmed(self) -> str:
+        """Where one vehicle does not know where it is, and one left the area."""
+        if "alarmed" not in self.missions:
+            made = self.service.create(
+                name="Roads, west",
+                area=rectangle(0, 0, WIDTH_M, 240),
+                vehicles=[
+                    *({"name": f"scout-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)),
+                    *({"name": name, "kind": "rest"} for name in BOATS),
+                ],
+                planner={"name": "lawnmower"},
+                steps=400,
+                limits={"max_depth_m": 20, "min_altitude_m": 1.5},
+            )
+            self.missions["alarmed"] = made
+            self.tell_of_boats(made, under_way=False)
+            self.service.act(made, "start")
+        mission = self.missions["alarmed"]
+
+        def both(_one: dict[str, Any]) -> bool:
+            self.tell_of_boats(mission)
+            return len(self.service.get("/alarms")) > 1
+
+        self.wait(mission, both)
+        return mission
+
     def flown(self) -> str:
         """The same survey at its end."""
         mission = self.survey(0.0)
@@ -154,6 +194,38 @@ def ships_done(guide: Guide, page: Page) -> None:
 def phone(guide: Guide, page: Page) -> None:
     """The watch on a phone at night."""
     show(page, guide.survey(0.5))
+
+
+def alarms(guide: Guide, page: Page) -> None:
+    """Alarms of a running mission: on the map, on the cards, in the log."""
+    mission = guide.alarmed()
+    show(page, mission)
+    by_id(page, "alarms").wait_for()
+    by_id(page, "toggle-log").click()
+    guide.tell_of_boats(mission)
+
+
+def tablet(guide: Guide, page: Page) -> None:
+    """The same watch on a tablet that stands upright."""
+    mission = guide.alarmed()
+    show(page, mission)
+    by_id(page, "alarms").wait_for()
+    guide.tell_of_boats(mission)
+
+
+def harbour(guide: Guide, page: Page) -> None:
+    """Going to a harbour by its name, while a vehicle waits for a person."""
+    show(page, guide.survey(0.1))
+    by_id(page, "range-low").wait_for()
+    by_id(page, f"hold-{HELD[0]}").dispatch_event("click")
+    by_id(page, "attention").wait_for()
+    by_id(page, "go-to").click()
+    by_id(page, "go-to-position").fill("leix")
+    by_id(page, "harbour-0").wait_for()
+
+
+def harbour_done(_guide: Guide, page: Page) -> None:
+    by_id(page, f"resume-{HELD[0]}").dispatch_event("click")
 
 
 def planning(guide: Guide, page: Page) -> None:
@@ -267,13 +339,16 @@ SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = 
     "phone": (phone, PHONE, "night"),
     "watch": (watch, WIDE, "light"),
     "ships": (ships, WIDE, "light"),
+    "harbour": (harbour, PHONE, "light"),
     "swath": (swath, WIDE, "light"),
     "space": (space, WIDE, "dark"),
     "profile": (profile, WIDE, "light"),
+    "alarms": (alarms, WIDE, "light"),
+    "tablet": (tablet, UPRIGHT, "dark"),
     "charts": (charts, WIDE, "light"),
     "dashboard-replay": (dashboard_replay, WIDE, "light"),
 }
-AFTERWARDS = {"watch": watch_done, "ships": ships_done}
+AFTERWARDS = {"watch": watch_done, "ships": ships_done, "harbour": harbour_done}
 
 
 def keep(picture: bytes, path: Path) -> None:

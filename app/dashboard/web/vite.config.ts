@@ -23,7 +23,7 @@ function compressed(): Plugin {
   };
 }
 
-/** Has browsers fetch the map's code together with the page's own, not after it. */
+/** Has browsers ask for what is shown first before anything else, and fetch the map's code together with the page's own. */
 function preloaded(): Plugin {
   return {
     name: "preloaded",
@@ -31,7 +31,9 @@ function preloaded(): Plugin {
     transformIndexHtml(_, { bundle = {} }) {
       const chunks = Object.values(bundle).filter((part) => part.type === "chunk");
       const chart = chunks.find((chunk) => chunk.name === "chart");
-      if (!chart) throw new Error("the map's code is no part of its own any more");
+      const early = chunks.find((chunk) => chunk.name === "early");
+      if (!chart || !early)
+        throw new Error("the map's code, or what asks first, is no part of its own any more");
       const needed = [chart, ...chunks.filter((c) => chart.imports.includes(c.fileName) && !c.isEntry)];
       const styles = needed.flatMap((chunk) => [...(chunk.viteMetadata?.importedCss ?? [])]);
       const link = (attrs: Record<string, string>) => ({
@@ -40,6 +42,17 @@ function preloaded(): Plugin {
         injectTo: "head" as const,
       });
       return [
+        {
+          tag: "script",
+          attrs: {
+            type: "module",
+            async: true,
+            fetchpriority: "high",
+            crossorigin: "",
+            src: `/${early.fileName}`,
+          },
+          injectTo: "head-prepend" as const,
+        },
         // Only fetched: a module that is preloaded as one is compiled before the page's own code runs.
         ...needed.map((chunk) => link({ rel: "preload", as: "script", href: `/${chunk.fileName}` })),
         ...styles.map((name) => link({ rel: "preload", as: "style", href: `/${name}` })),
@@ -55,6 +68,7 @@ export default defineConfig({
     emptyOutDir: true,
     target: "es2022",
     sourcemap: false,
+    rolldownOptions: { input: { index: "index.html", early: "src/api/early.ts" } },
     // The map library is most of the page; the warning would only repeat that.
     chunkSizeWarningLimit: 1500,
   },

@@ -1,5 +1,7 @@
 """The surveys that are compared: ours, with and without known depths, and the usual ones."""
 
+from collections import Counter
+
 import numpy as np
 
 from app.arrays import FloatArray
@@ -14,7 +16,9 @@ LEG_WIDTHS = 1.0
 LEAST_LEG_M = 5.0
 MOST_LEGS = 20_000
 IDLE_S = 20.0
-"""How long a vehicle without a line waits until it is looked at again."""
+"""How long a vehicle without a line waits until it is looked at again,"""
+MOST_IDLE = 2
+"""and how often in a row there is nothing for it until it is done."""
 DUNE_SAMPLES = 40
 """Altitudes that DUNE's rows take the mean of."""
 LEAST_ALTITUDE_M = 0.3
@@ -31,7 +35,7 @@ def fly_ours(scenario: CoverageScenario, *, known: bool = False) -> Fleet:
     terrain = scenario.terrain
     area = np.array([[0, 0], [terrain.width_m, 0], [terrain.width_m, terrain.height_m], [0, terrain.height_m]])
     survey = SwathSurvey(longer_axis_rad(area.astype(float)), fleet.coverage().cell_m, CRUISE_M + 5.0)
-    idle: set[str] = set()
+    idle: Counter[str] = Counter()
     for _ in range(MOST_LEGS):
         name = min(fleet.crafts, key=lambda one: max(fleet.crafts[one].time_s, fleet.crafts[one].idle_until_s))
         craft = fleet.crafts[name]
@@ -45,8 +49,9 @@ def fly_ours(scenario: CoverageScenario, *, known: bool = False) -> Fleet:
             idle.clear()
             continue
         if end is None:
-            idle.add(name)
-            if len(idle) == len(fleet.crafts):
+            survey.expect_nothing(name)
+            idle[name] += 1
+            if all(idle[one] >= MOST_IDLE for one in fleet.crafts):
                 break
             craft.idle_until_s = max(craft.time_s, craft.idle_until_s) + IDLE_S
             continue

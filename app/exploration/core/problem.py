@@ -97,6 +97,8 @@ class Situation:
         How far each may still fly from its position; None: the remaining steps, each as long as a step may be.
     swath : SwathTask or None
         What is to be ensonified, in a survey with swath sonars.
+    at_rest : frozenset of str
+        Vehicles that flew all their legs so long ago that what they measured there is known.
     """
 
     step: int
@@ -114,6 +116,7 @@ class Situation:
     moving: BoolArray | None = None
     left_m: FloatArray | None = None
     swath: SwathTask | None = None
+    at_rest: frozenset[str] = frozenset()
 
     @property
     def moves(self) -> BoolArray:

@@ -51,7 +51,9 @@ class SwathPlanner(PlannerBase):
         task = team.swath
         if task is None:
             return Proposal(team.positions.copy(), 0.0, done=frozenset(team.vehicles))
-        self._begin(team, task)
+        survey = self._begin(team, task)
+        for name in team.at_rest:
+            survey.expect_nothing(name)
         wish = team.positions[:, :2].copy()
         poses = {
             name: np.array([*team.positions[i, :2], team.headings_rad[i]])
@@ -107,7 +109,7 @@ class SwathPlanner(PlannerBase):
         """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
         return self._survey is not None and self._survey.skip_line(vehicle, here_m)
 
-    def _begin(self, team: Situation, task: SwathTask) -> None:
+    def _begin(self, team: Situation, task: SwathTask) -> SwathSurvey:
         if self._survey is None:
             altitude_m = max(GUESSED_ALTITUDE_M, team.constraints.min_altitude_m)
             guess_m = float(np.median(list(self._cruise.values()))) + altitude_m
@@ -116,6 +118,7 @@ class SwathPlanner(PlannerBase):
             if self._kept is not None:
                 self._survey.recall(self._kept)
                 self._kept = None
+        return self._survey
 
     def _within_sight(self, team: Situation, task: SwathTask, flying: Flying) -> Coverage:
         """Return what is to be ensonified and can be from outside of keep-out zones."""

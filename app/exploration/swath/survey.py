@@ -129,6 +129,11 @@ class SwathSurvey:
             return None
         return self._along(sweep, sweep.course, asked, leg_m, reach_m)
 
+    def expect_nothing(self, vehicle: str) -> None:
+        """Learn that all was measured where a vehicle was sent: what was not seen there is left."""
+        if vehicle in self._sweeps:
+            self._sweeps[vehicle].expected.clear()
+
     def put_back(self, vehicle: str, ends_m: FloatArray, *, keeps_line: bool) -> None:
         """Expect nothing of pieces of lines that end at places (n, 2) and are not flown.
 

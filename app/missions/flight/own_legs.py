@@ -54,6 +54,9 @@ SOON = 1.3
 HARDLY_BEGUN = 0.6
 """A leg is decided together with those of others where no more than this part of a longest leg is left before it."""
 
+TOLD_PCT = 0.1
+"""A mission that leaves more of its area unseen says so when it ends."""
+
 
 class OwnLegs:
     """Flies one running mission, every vehicle on its own time.
@@ -102,6 +105,10 @@ class OwnLegs:
         """When vehicles that got no leg are looked at again, the event loop's time."""
         self._done: set[str] = set()
         """Vehicles for which nothing was left to do when all that was flown had been looked at."""
+        self._idle: set[str] = set()
+        """Vehicles that had flown all their legs when there was nothing for them."""
+        self._left_pct = 0.0
+        """Share of the area that was not ensonified when that was last looked at."""
 
     async def fly(self, *, resumed: bool) -> str:
         """Fly until every vehicle has used up its way; returns why nobody goes on.
@@ -127,8 +134,12 @@ class OwnLegs:
             await asyncio.gather(sending, return_exceptions=True)
         left = any(self._wants_legs(member) for member in self._live.team.surveying)
         if left and self._done:
-            return "nothing is left to ensonify" if self._measured else "nobody can fly a further line"
+            return self._all_seen() if self._measured else "nobody can fly a further line"
         return "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
+
+    def _all_seen(self) -> str:
+        but = f" but {self._left_pct:.1f} % of the area, which lines do not see" if self._left_pct >= TOLD_PCT else ""
+        return f"nothing is left to ensonify{but}"
 
     async def _until_needed(self, sending: asyncio.Task[None]) -> None:
         if sending.done():
@@ -162,7 +173,9 @@ class OwnLegs:
             await self._exchange.look()
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
+        at_rest = {member.name for member in getting if not member.ordered and not member.ahead} & self._idle
         places = [self._place(member, moving=member.name in names) for member in live.team.present]
+        places = [replace(place, at_rest=place.vehicle in at_rest) for place in places]
         # What vehicles measure on legs that they are still to fly may leave something to do.
         all_flown = not any((m.ordered or m.ahead) and not m.misses for m in live.team.present)
         planner = self._decider.planner
@@ -172,7 +185,11 @@ class OwnLegs:
         self._taking_part |= names
         self._again_at_s = {name: at_s for name, at_s in self._again_at_s.items() if name not in names}
         done = names & frozenset().union(*(decision.done for decision in decisions[:1]))
-        self._done = (self._done - names) | done if all_flown else set()
+        self._left_pct = decisions[0].terms.get("left_pct", self._left_pct) if decisions else self._left_pct
+        self._idle -= names
+        self._idle |= {m.name for m in getting if m.name in done and not m.ordered and not m.ahead}
+        # What vehicles were just measuring is not known yet.
+        self._done = (self._done - names) | (done & at_rest if self._measured else done) if all_flown else set()
         self._look_later(names if not decisions else done)
         if not self._measured:
             # What is planned for good leaves nothing to wait for.

@@ -200,6 +200,10 @@ class Swarm:
         depth_m = member.cruise_depth_m(self._spec.limits)
         return [np.append(end, depth_m) for end in member.legs_ahead_m()]
 
+    def is_there(self, i: int, end: FloatArray) -> bool:
+        """Return whether a leg that ends there, (3,), leads nowhere."""
+        return math.hypot(*(end[:2] - self.here[i, :2])) <= STILL_M
+
     def fly(self, i: int, end: FloatArray, *, ahead: bool = False) -> FloatArray:
         """Let one vehicle fly to where its leg ends, (3,); return its poses, (n, 4): east, north, heading, depth.
 
@@ -207,7 +211,7 @@ class Swarm:
         """
         leg = end[:2] - self.here[i, :2]
         leg_m = math.hypot(*leg)
-        still = self._held[i] = leg_m <= STILL_M
+        still = self._held[i] = self.is_there(i, end)
         poses, way_m = np.zeros((0, 3)), 0.0
         if not still:
             self.heading_rad[i] = math.atan2(*leg)

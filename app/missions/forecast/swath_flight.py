@@ -25,7 +25,7 @@ from app.missions.flight.decisions.decision import (
     swath_sonar,
     swath_task,
 )
-from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M
+from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M, SOON
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder
@@ -141,8 +141,8 @@ class SwathFlight:
         for craft in self._crafts:
             craft.idle = 0
         while (able := self._able()) and not over():
-            i = min(able, key=lambda k: float(self.swarm.clock_s[k]))
-            self._next_leg(i)
+            first_s = min(float(self.swarm.clock_s[k]) for k in able)
+            self._next_legs([k for k in able if self.swarm.clock_s[k] <= first_s + (SOON - 1.0) * LEAD_S])
         self._take_all_in()
         self.builder.build()
         return not able
@@ -154,28 +154,35 @@ class SwathFlight:
             if craft.sonar is not None and craft.idle < MOST_IDLE and self.swarm.left_m[i] > LEAST_WAY_M
         ]
 
-    def _next_leg(self, i: int) -> None:
-        swarm, craft, spec = self.swarm, self._crafts[i], self._spec
+    def _next_legs(self, getting: list[int]) -> None:
+        """Decide together for vehicles that come to the ends of their legs at the same time, as at sea, and fly."""
+        swarm, spec = self.swarm, self._spec
         due = np.zeros(len(self._members), dtype=bool)
-        due[i] = True
+        due[getting] = True
         self.builder.build()
         known = Knowledge(
             self.builder.belief(),
             np.zeros((0, 2)),
             swath=swath_task(spec, self._specs, self.builder.coverage()),
         )
-        number = int(swarm.legs[i]) + 1
-        decision = decide(number, spec, self._constraints, self._planner, swarm.places(due), known)
-        self._take_in(craft)
-        name = self._members[i].name
-        legs = [leg for leg in decision.legs if leg.vehicle == name and not leg.refusal]
-        if name in decision.done or not legs:
-            craft.idle += 1
-            swarm.clock_s[i] += IDLE_S
-            return
-        for other in self._crafts:
-            other.idle = 0
-        self._fly_to(i, legs[0].target_m)
+        number = int(swarm.legs[getting].max()) + 1
+        places = [
+            replace(place, at_rest=craft.idle > 0 and place.moving)
+            for place, craft in zip(swarm.places(due), self._crafts, strict=True)
+        ]
+        decision = decide(number, spec, self._constraints, self._planner, places, known)
+        target_m = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal}
+        for i in getting:
+            craft, end = self._crafts[i], target_m.get(self._members[i].name)
+            self._take_in(craft)
+            if self._members[i].name in decision.done or end is None or swarm.is_there(i, end):
+                # Who waits for another one to pass uses up no way: at sea it gets no leg meanwhile.
+                craft.idle += 1
+                swarm.clock_s[i] += IDLE_S
+                continue
+            for other in self._crafts:
+                other.idle = 0
+            self._fly_to(i, end)
 
     def _fly_to(self, i: int, end: FloatArray, *, ahead: bool = False) -> None:
         swarm, craft = self.swarm, self._crafts[i]

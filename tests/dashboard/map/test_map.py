@@ -80,7 +80,7 @@ def test_the_map_tells_what_is_known_and_where_it_is(watched: Watched, service: 
     by_id(page, "go-to").click()
     by_id(page, "go-to-position").fill("the quay")
     by_id(page, "go").click()
-    expect(by_id(page, "go-to-fault")).to_contain_text("Type a position such as")
+    expect(by_id(page, "go-to-fault")).to_contain_text("A position is typed such as")
     x, y = go_to(page, "41.1852, -8.7048")
     page.mouse.move(x, y)
     expect(by_id(page, "readout")).to_contain_text(re.compile(r"\d m ± 0\.\d+ m · (\d+ sounding|guessed)"))
@@ -161,7 +161,7 @@ def test_harbours_are_found_by_name_and_named_on_a_map_that_shows_their_coast(
     expect_name(page, drawn=False)
     field.fill("no such harbour")
     field.press("Enter")
-    expect(by_id(page, "go-to-fault")).to_contain_text("or a harbour’s name")
+    expect(by_id(page, "go-to-fault")).to_contain_text("No harbour is called")
     assert [one for one in watched.addresses if not one.startswith((service.url, "data:", "blob:"))] == []
     assert [words for words in watched.complaints if "getImageData" not in words] == []
 

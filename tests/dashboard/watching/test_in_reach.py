@@ -117,6 +117,29 @@ def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(
     expect_state(page, "running")
 
 
+@pytest.mark.parametrize("size", [(390, 844), (844, 390)], ids=["upright", "lying"])
+def test_what_needs_attention_leaves_the_maps_tools_in_reach_on_a_phone(
+    page: Page, service: Service, size: tuple[int, int]
+) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    mission = service.create(name="Two wait", vehicles=[*PAIR, PAIR[0] | {"name": "sim-3"}])
+    service.act(mission, "start")
+    show(page, mission)
+    for name in ("sim-1", "sim-2"):
+        by_id(page, f"hold-{name}").dispatch_event("click")
+    by_id(page, "attention-more").click()
+    expect(by_id(page, "attention").locator("li")).to_have_count(2)
+    for tool in ("measure", "go-to", "coordinates", "attention-more", "abort"):
+        expect_on_top(page, tool)
+    by_id(page, "go-to").click()
+    # Who types at once types into the field.
+    page.keyboard.type("leix")
+    for part in ("go-to-position", "harbour-0", "go", "attention-more"):
+        expect_on_top(page, part)
+    by_id(page, "harbour-0").click()
+    expect(by_id(page, "go-to-position")).to_have_value("Porto De Leixoes")
+
+
 def test_a_vehicle_that_was_aborted_stays_in_sight_and_can_be_added_again(page: Page, service: Service) -> None:
     mission = service.create(name="Nobody disappears", vehicles=PAIR)
     service.act(mission, "start")

@@ -130,6 +130,30 @@ def test_what_was_refused_is_flown_later(refused: float) -> None:
     assert flown < 1.6 * alone, "without flying everything again"
 
 
+def test_what_was_not_seen_under_way_is_left_when_all_was_flown() -> None:
+    square = Constraints(np.array([[0.0, 0.0], [80.0, 0.0], [80.0, 60.0], [0.0, 60.0]]), max_step_m=25.0)
+    sea, here, blind, rested = Sea(np.full((60, 80), 12.0)), np.array([[2.0, 2.0]]), 0, False
+    planner = create_planner("swath", PlannerOptions(turn_radius_m=5.0))
+    for _ in range(200):
+        asked = replace(situation(sea.coverage(), square, here), at_rest=frozenset({"v0"} if rested else ()))
+        proposal = planner.propose(asked, np.random.default_rng(0))
+        if proposal.done:
+            if rested:
+                break
+            rested = True  # What it measured is known by now.
+            continue
+        rested, end = False, proposal.positions[:, :2].copy()
+        if sea.seen.mean() < 0.5 or blind == 3:
+            sea.fly(here[0], end[0])
+        else:
+            blind += 1
+        here = end
+    else:
+        raise AssertionError("it does not end")
+    assert blind == 3, "its sonar saw nothing on three legs"
+    assert sea.seen.mean() > 0.99
+
+
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_who_is_refused_the_way_to_its_line_is_sent_to_its_beginning_again(interrupted: bool) -> None:
     sea = Sea(np.full((60, 80), 8.0))

@@ -79,6 +79,13 @@ def test_deeper_water_takes_fewer_metres_and_a_short_budget_leaves_ground_unseen
         assert short.whole.distances_m[name] >= way_m
 
 
+def test_vehicles_that_begin_beside_each_other_use_up_no_way_while_one_lets_the_other_pass() -> None:
+    spec = beams(100.0, "abc", cell_m=1.0, limits={"max_step_m": 25.0}, budget={"minutes": 8})
+    found = flown(spec, level(5.0, 100.0))
+    assert found.coverage_pct > 90.0
+    assert min(found.distances_m.values()) > 550.0
+
+
 def test_what_was_imported_is_the_floor_that_lines_are_laid_for() -> None:
     spec = beams()
     east, north = np.meshgrid(np.arange(1.0, 60.0, 2.0), np.arange(1.0, 60.0, 2.0))

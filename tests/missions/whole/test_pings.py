@@ -1,6 +1,7 @@
 """A mission's pings: judged, committed before they count, kept over restarts, moved to files when it ends."""
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.mapping.swath.pings import Pings
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import Position
 from app.missions.live.mission import LiveMission
@@ -55,6 +57,43 @@ async def test_pings_count_once_they_are_committed_apart_from_soundings(live: Li
     await live.swath.complete()
     assert live.builder.swath.beams == 40
     assert await all_times(live) == [ping(number).time_s for number in range(5)]
+
+
+@pytest.mark.parametrize("stored_before", [True, False])
+async def test_no_ping_is_lost_or_counts_twice_where_taking_in_is_given_up(
+    harbour: Harbour, monkeypatch: pytest.MonkeyPatch, stored_before: bool
+) -> None:
+    vehicles = [{"name": name, "kind": "rest", "sensor": "multibeam"} for name in ("a", "b")]
+    spec = MissionSpec.model_validate(spec_json(vehicles=vehicles))
+    live = await harbour.service.get((await harbour.service.create(spec)).id)
+    grid, begun, goes_on, added = live.builder.swath, asyncio.Event(), threading.Event(), threading.Event()
+    loop, add = asyncio.get_running_loop(), grid.add
+
+    def slowly(vehicle: str, pings: Pings) -> None:
+        if begun.is_set():
+            add(vehicle, pings)
+            return
+        loop.call_soon_threadsafe(begun.set)
+        goes_on.wait(30.0)
+        add(vehicle, pings)
+        added.set()
+
+    monkeypatch.setattr(grid, "add", slowly)
+    if not stored_before:
+        await live.swath.complete()
+    for number in range(10):
+        live.receive(ping(number))
+        live.receive(ping(number, vehicle="b"))
+    await live.journal.flush()
+    taking = asyncio.create_task(live.swath.complete())
+    await begun.wait()
+    taking.cancel()  # as when the flight ends while a map is made
+    again = asyncio.create_task(live.swath.complete())
+    await asyncio.wait([again], timeout=0.3)
+    goes_on.set()
+    await asyncio.gather(taking, asyncio.to_thread(added.wait, 30.0), return_exceptions=True)
+    await again
+    assert grid.beams == live.progress().beams == 160
 
 
 async def test_pings_are_written_within_a_moment(live: LiveMission) -> None:

@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from sqlalchemy import select
 
 from app.missions.errors import InvalidRequestError
+from app.missions.flight.decisions import deciding
+from app.missions.flight.decisions.decision import Decision, Place, decide
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
 from app.missions.operations.maps.mission_maps import export
@@ -143,6 +146,45 @@ async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour)
     assert progress.ensonified_pct is not None
     assert progress.ensonified_pct > 99.0
     assert progress.beams > seen
+
+
+async def test_nothing_is_left_only_where_nothing_is_expected_of_legs_that_were_flown(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when a vehicle came to the end of its leg from elsewhere, and saw other ground than it was sent to see."""
+    expecting: list[int] = []
+
+    def expects(number: int, spec: Any, limits: Any, planner: Any, places: list[Place], *more: Any) -> Decision:
+        memory = planner.snapshot()
+        decision = decide(number, spec, limits, planner, places, *more)
+        if (number > 3 and not expecting) or (expecting and not any(place.at_rest for place in places)):
+            planner.restore(memory)
+            expecting.append(number)
+            return replace(decision, legs=[], done=frozenset(place.vehicle for place in places))
+        return decision
+
+    monkeypatch.setattr(deciding, "decide", expects)
+    await harbour_closed.open(simulation={"family": "flat", "seed": 3}, time_scale=30.0)
+    vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0}
+    live = await started(harbour_closed, vehicles=[vehicle])
+    await until_state(harbour_closed.service, live.id, MissionState.FINISHED)
+    await live.build_map()
+    assert expecting
+    assert live.header.reason == "nothing is left to ensonify"
+    assert (live.progress().ensonified_pct or 0.0) > 99.0
+
+
+async def test_a_mission_that_did_not_see_all_says_so_when_it_ends(
+    harbour: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gives_up(*arguments: Any, **more: Any) -> Decision:
+        decision = decide(*arguments, **more)
+        return replace(decision, legs=[], terms={"left_pct": 3.21}, done=frozenset({"a", "b"}))
+
+    monkeypatch.setattr(deciding, "decide", gives_up)
+    live = await started(harbour)
+    await until_state(harbour.service, live.id, MissionState.FINISHED)
+    assert live.header.reason == "nothing is left to ensonify but 3.2 % of the area, which lines do not see"
 
 
 async def test_a_finished_survey_is_shown_without_reading_its_pings(harbour: Harbour) -> None:

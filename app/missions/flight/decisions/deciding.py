@@ -179,6 +179,7 @@ def moved_on(places: list[Place], decision: Decision) -> list[Place]:
                 heading_rad=math.atan2(east, north) if length_m > NO_COURSE_M else place.heading_rad,
                 surfacing_depth_m=float(leg.target_m[2]) if leg.surfacing else math.nan,
                 left_m=max(place.left_m - length_m, 0.0),
+                at_rest=False,
             )
         )
     return later

@@ -78,6 +78,8 @@ class Place:
     """Height above the bottom that it is to keep; NaN: it keeps its depth."""
     turn_radius_m: float = 0.0
     """Of its turning circle."""
+    at_rest: bool = False
+    """Whether it flew all its legs so long ago that what it measured there is known."""
 
     @property
     def surfacing(self) -> bool:
@@ -391,6 +393,7 @@ def _situation(
         moving=None if moving.all() else moving,
         left_m=None if np.isnan(left_m).any() else left_m,
         swath=knowledge.swath,
+        at_rest=frozenset(place.vehicle for place in team if place.at_rest),
     )
 
 

@@ -116,7 +116,11 @@ class LegCommit:
             if member is None or member is not now_of_name or member.left_at is not None:
                 continue
             if not leg.comes_in:
-                member.committed_m += way_m([starts_m[row.vehicle], leg.target_m[:2]], live.spec)
+                begin_m = starts_m[row.vehicle]
+                if not member.ahead and member.target_m is not None and member.status is WaypointStatus.REACHED:
+                    # It was there a little before the end of its last leg, all of which is counted already.
+                    begin_m = member.target_m
+                member.committed_m += way_m([begin_m, leg.target_m[:2]], live.spec)
             if row.status == WaypointStatus.REFUSED:
                 live.waypoints.show_rows([row])
             elif member.withdrawal is None:  # it may have been called home meanwhile

@@ -9,6 +9,7 @@ from app.missions.live.journals.journal import Journal
 from app.missions.maps.swath_grid import SwathGrid
 from app.missions.pings.store import PingStore
 from app.missions.soundings.corrections import Corrections
+from app.storage.concurrency.uncancellable import to_the_end
 
 
 class SwathIntake:
@@ -37,26 +38,41 @@ class SwathIntake:
     async def complete(self) -> None:
         """Return when the grid holds all pings that were committed before."""
         async with self._taking:
-            if not self._begun:
-                async with self._journal.writing:
-                    # What is committed from here on is noted.
-                    until = await self._store.newest_block()
-                    self._begun, self.behind = True, False
-                self._grid.begin_anew()
-                try:
-                    async for vehicle, pings in self._store.all_accepted(until):
-                        await asyncio.to_thread(self._grid.add, vehicle, pings)
-                except BaseException:
-                    self._begun, self.behind = False, True
-                    self._noted.clear()
-                    raise
-            noted, self._noted = self._noted, defaultdict(list)
+            while not self._begun or self._noted:
+                if not self._begun:
+                    await self._read_all()
+                    continue
+                vehicle, some = self._noted.popitem()
+                await self._take(vehicle, Pings.joined(some))
             self.behind = False
-            for vehicle, some in noted.items():
-                await asyncio.to_thread(self._grid.add, vehicle, Pings.joined(some))
+
+    async def _read_all(self) -> None:
+        """Take in what is stored; what is committed meanwhile is noted."""
+        async with self._journal.writing:
+            until = await self._store.newest_block()
+            self._begun = True
+        self._grid.begin_anew()
+        try:
+            async for vehicle, pings in self._store.all_accepted(until):
+                await self._take(vehicle, pings)
+        except BaseException:
+            self._forget()
+            raise
+
+    async def _take(self, vehicle: str, pings: Pings) -> None:
+        # A thread goes on when nobody waits for it any more: what it adds is not to be counted twice.
+        try:
+            await to_the_end(asyncio.to_thread(self._grid.add, vehicle, pings))
+        except Exception:
+            self._forget()
+            raise
+
+    def _forget(self) -> None:
+        """Read all again before the next map: some was not taken in, or is to be placed anew."""
+        self._begun, self.behind = False, True
+        self._noted.clear()
 
     def correct(self, corrections: Corrections) -> None:
         """Place all pings anew, by other corrections, before the next map."""
         self._grid.place = corrections.beams
-        self._begun = False
-        self._noted.clear()
+        self._forget()

@@ -8,8 +8,8 @@ from app.exploration.core.problem import Belief
 from app.exploration.planners import create_planner
 from app.mapping.water.tides import TideTable
 from app.missions.clock import now, told_by
-from app.missions.fleet.interface import Position, VehicleReport
-from app.missions.flight.decisions.decision import Knowledge, Place, decide, make_constraints
+from app.missions.fleet.interface import Position, VehicleReport, WaypointStatus
+from app.missions.flight.decisions.decision import Decision, Knowledge, Leg, Place, decide, make_constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.service import MissionService
 from app.missions.soundings.corrections import Corrections
@@ -117,6 +117,28 @@ async def test_an_order_is_no_deeper_than_the_turn_into_its_leg_and_the_circle_a
     assert held.position.depth_m <= 6.9 - 0.2 * 9.0, "the circle is 10 m wide to either side"
     assert led is not None
     assert led.lead is None or led.lead.depth_m <= led.position.depth_m
+
+
+async def test_what_a_vehicle_leaves_of_a_leg_when_it_arrives_is_not_counted_twice(service: MissionService) -> None:
+    live = await service.get((await service.create(sim_spec("a", budget={"minutes": 10}))).id)
+    committing = LegCommit(live, make_constraints(live.spec), leads=False)
+    member = live.team.join(live.spec.vehicles[0], 0)
+
+    async def commit(number: int, begin: float, end: float) -> None:
+        leg = Leg("a", np.array([10.0, end, 2.0]))
+        origin_m = {"a": np.array([10.0, begin])}
+        await committing.commit(Decision([leg], None, {}, b"", origin_m=origin_m), {"a": number})
+        lat, lon = live.frame.to_geographic(np.array(10.0), np.array(begin))
+        member.report = VehicleReport("a", 0.0, Position(float(lat), float(lon), 2.0))
+        committing.begin_next(member)
+
+    await commit(1, 2.0, 12.0)
+    member.status = WaypointStatus.REACHED
+    await commit(2, 9.5, 22.0)
+    assert member.committed_m == pytest.approx(20.0)
+    member.status = WaypointStatus.MISSED
+    await commit(3, 15.0, 25.0)
+    assert member.committed_m == pytest.approx(30.0), "what was not reached is flown from where its vehicle is"
 
 
 async def test_who_comes_up_at_home_stays_there(service: MissionService) -> None:

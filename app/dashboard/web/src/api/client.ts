@@ -1,4 +1,5 @@
 import { say } from "../words/say";
+import type {} from "./early";
 import type {
   ActionView,
   AlarmReport,
@@ -84,11 +85,22 @@ async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
   return (await response.json()) as T;
 }
 
+/** After so long an answer that was asked for before the page ran tells what was. */
+const EARLY_MS = 10_000;
+
+/** The answer that was asked for while the page was read, once. */
+function takeEarly(address: string, { method = "GET" }: RequestInit): Promise<Response> | undefined {
+  const answer =
+    method === "GET" && performance.now() < EARLY_MS ? globalThis.asked?.get(address) : undefined;
+  globalThis.asked?.delete(address);
+  return answer;
+}
+
 /** The answer to a request; throws what the service refused, or that it does not answer. */
 async function ask(address: string, init: RequestInit): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(address, init);
+    response = await (takeEarly(address, init) ?? fetch(address, init));
   } catch (error) {
     if (init.signal?.aborted) throw error;
     throw new ServiceError(say("service.theServiceDoesNotAnswer"), 0, say("service.checkThatItIsRunningAnd"));

@@ -76,6 +76,17 @@ export function duration(seconds: number | null | undefined): string {
   return `${Math.floor(s / 3600)} h ${pad(Math.floor((s % 3600) / 60))} min`;
 }
 
+const COARSE_FROM_S = 600;
+
+/** From least to most: 3 min 07 s to 4 min 10 s, from ten minutes on in whole ones: 13 to 21 min, 50 min to 1 h 05 min. */
+export function durations(low_s: number, high_s: number): string {
+  const coarse = high_s >= COARSE_FROM_S;
+  const [low, high] = coarse ? [Math.floor(low_s / 60), Math.ceil(high_s / 60)] : [0, 0];
+  if (coarse && low !== high && high < 60) return say("forecast.to", { low, high: `${high} min` });
+  const [a, b] = coarse ? [minutes(60 * low), minutes(60 * high)] : [duration(low_s), duration(high_s)];
+  return a === b ? a : say("forecast.to", { low: a, high: b });
+}
+
 /** Under a minute, 7 min, 2 h 05 min. */
 export function minutes(seconds: number): string {
   return seconds < 60 ? "< 1 min" : seconds < 3600 ? `${Math.floor(seconds / 60)} min` : duration(seconds);

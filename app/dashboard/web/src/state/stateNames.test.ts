@@ -13,6 +13,7 @@ import {
   measuredWords,
   missionWords,
   rangeWords,
+  remaining_s,
   sonarWords,
   vehicleState,
 } from "./stateNames";
@@ -205,4 +206,18 @@ describe("swath sonars", () => {
     expect(measuredWords({ soundings: 0, beams: 1200 })).toContain("beams");
     expect(measuredWords({ soundings: 3, beams: 9 })).toBe("3 soundings, 9 beams");
   });
+});
+
+it("a mission whose vehicles are on their way home lasts until the last is there", () => {
+  const coming = (phase: "returning" | "home", return_needs_s: number | null) => ({
+    active: true,
+    phase,
+    return_needs_s,
+  });
+  expect(remaining_s(90, [coming("returning", 200)])).toBe(90);
+  expect(remaining_s(0, [coming("returning", 200), coming("home", 300), coming("returning", null)])).toBe(
+    200,
+  );
+  expect(remaining_s(0, [])).toBe(0);
+  expect(remaining_s(null, [coming("returning", 200)])).toBeNull();
 });

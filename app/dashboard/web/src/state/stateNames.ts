@@ -169,6 +169,15 @@ export const isThere = ({ withdrawn, phase, failsafes }: Withdrawn): boolean =>
 
 const isHome = (vehicle: Withdrawn): boolean => isThere(vehicle) && vehicle.phase === "home";
 
+type Comer = Pick<VehicleView, "active" | "phase" | "return_needs_s">;
+
+/** What is left of a running mission, seconds: when all is surveyed, until the last vehicle is home; null: not known. */
+export function remaining_s(eta_s: number | null, vehicles: readonly Comer[]): number | null {
+  if (eta_s === null || eta_s >= 1) return eta_s;
+  const coming = vehicles.filter(({ active, phase }) => active && phase === "returning");
+  return Math.max(0, ...coming.map(({ return_needs_s }) => return_needs_s ?? 0));
+}
+
 type Homing = Withdrawn & Pick<VehicleView, "active" | "recovery_point">;
 
 /** Whether any vehicle can be brought home before its mission ends. */

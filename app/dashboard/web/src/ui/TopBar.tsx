@@ -5,7 +5,14 @@ import { decidingFor } from "../state/alarms/waiting";
 import { age, clock, duration } from "../state/format";
 import { elapsedThen } from "../state/past/replay";
 import { act, askAbort, busyWith } from "../state/session";
-import { isAllowed, MISSION_WORDS, missionSign, missionWords, type Tone } from "../state/stateNames";
+import {
+  isAllowed,
+  MISSION_WORDS,
+  missionSign,
+  missionWords,
+  remaining_s,
+  type Tone,
+} from "../state/stateNames";
 import {
   abortDialogOpen,
   abortOne,
@@ -65,7 +72,11 @@ export function TopBar() {
             {present.ending ? null : (
               <Figure
                 label={say("topBar.remaining")}
-                value={present.state === "running" && !past ? duration(present.progress.eta_s) : "–"}
+                value={
+                  present.state === "running" && !past
+                    ? duration(remaining_s(present.progress.eta_s, present.vehicles))
+                    : "–"
+                }
               />
             )}
           </>

@@ -104,6 +104,7 @@ const NO_WORDS = new Set([
   "state/alarms/attention.ts: warning",
   "state/form/draft.ts: the draft has faults",
   "map/canvas/chart.ts: mark",
+  "map/canvas/chart.ts: ship",
   "map/canvas/chart.ts: target",
   "map/canvas/canvasLayers.ts: sheet",
   "map/canvas/canvasLayers.ts: px) scale(",

@@ -86,6 +86,10 @@ export const MAP = {
     en: "Type a position such as {sample}, or a harbour’s name",
     pt: "Escreva uma posição como {sample}, ou o nome de um porto",
   },
+  "mapTools.noHarbourIsCalled": {
+    en: "No harbour is called “{name}”. A position is typed such as {sample}",
+    pt: "Nenhum porto se chama “{name}”. Uma posição escreve-se como {sample}",
+  },
   "mapTools.positionToGoTo": {
     en: "Position or harbour to go to",
     pt: "Posição ou porto para onde ir",

@@ -20,7 +20,7 @@ import { Sheets } from "./canvasLayers";
 import { coasts, showsCoast } from "./coast";
 import { imageOf, paintStill, type StillContent } from "./fixedMarks";
 import { type LaidName, laidNames, paintNames, showsHarbours, sidesOf } from "./harbourNames";
-import { type Box, boxesOf, type Label, placed, type Side } from "./labels";
+import { type Box, boxesOf, boxOf, fitting, type Label, placed, type Side, signOf } from "./labels";
 import { type Look, PAPER } from "./mapColours";
 import {
   type LivelyContent,
@@ -80,6 +80,15 @@ export interface Padding {
 
 /** How near to a sounding a click has to be. */
 const SPOT_PX = 10;
+/** How near to a ship the pointer has to be for her words. */
+const POINTED_PX = 16;
+
+type Keyed = Label & { key: string };
+
+const markKey = ({ sign }: PlaceMark, i: number) => `mark ${i} ${sign}`;
+const targetKey = ({ name }: TargetMark) => `target ${name}`;
+const shipKey = (i: number) => `ship ${i}`;
+
 /** Of MapLibre's own canvas while there is nothing on it: without a graphics card every pixel of it costs time. */
 const EMPTY_RATIO = 0.1;
 
@@ -209,12 +218,18 @@ export class Chart {
     }
     paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]);
     const toTheRight = () => "right" as const;
-    const labels = this.#allLabels(context, at);
-    const taken = boxesOf(labels, labels.map(toTheRight));
-    paintNames(context, at, this.#namesBeside(context, at, taken), PAPER[this.#look]);
+    const labels = this.#labelsOf(context, at);
+    const all = [...labels.always, ...labels.beside];
+    paintNames(
+      context,
+      at,
+      this.#namesBeside(context, at, boxesOf(all, all.map(toTheRight))),
+      PAPER[this.#look],
+    );
     const sides = {
       marks: this.#lively.marks.map(toTheRight),
       targets: this.#lively.targets.map(toTheRight),
+      ships: this.#lively.ships.map(({ alarm }) => (alarm ? "right" : null)),
     };
     paintLively(context, at, { ...this.#lively, pointed: null }, sides, PAPER[this.#look]);
   }
@@ -450,11 +465,14 @@ export class Chart {
     this.#sheets.refresh();
   }
 
-  /** All labels, those of vehicles first. */
-  #allLabels(context: CanvasRenderingContext2D, at: Projection): (Label & { key: string })[] {
-    const { marks, targets } = this.#lively;
+  /**
+   * Labels that are always written, of vehicles first, and those that are where there is room beside them. Each has the
+   * key of its sign, which stands there in any case.
+   */
+  #labelsOf(context: CanvasRenderingContext2D, at: Projection): { always: Keyed[]; beside: Keyed[] } {
+    const { marks, targets, ships, pointed } = this.#lively;
     context.font = WORDS_FONT;
-    const worded = (key: string, place: LngLat, words: string) => ({
+    const worded = (key: string, place: LngLat, words: string): Keyed => ({
       key,
       at: [at.x(place[0]), at.y(place[1])] as Pixel,
       width: context.measureText(words).width,
@@ -462,36 +480,68 @@ export class Chart {
       reach: SIGN_REACH_PX,
       side: this.#sides.get(key) ?? "right",
     });
-    const pinned = [...this.#labels].flatMap(([key, { width, height, reach }]) => {
+    const pinned = [...this.#labels].flatMap(([key, { width, height, reach }]): Keyed[] => {
       const place = this.#pins.get(key)?.getLngLat();
       const side = this.#sides.get(key) ?? "right";
-      return place
-        ? [{ key, at: [at.x(place.lng), at.y(place.lat)] as Pixel, width, height, reach, side }]
-        : [];
+      return place ? [{ key, at: [at.x(place.lng), at.y(place.lat)], width, height, reach, side }] : [];
     });
-    return [
-      ...pinned,
-      ...marks.map((mark, i) => worded(`mark ${i} ${mark.sign}`, mark.at, mark.words)),
-      ...targets.map((target) => worded(`target ${target.name}`, target.at, target.name)),
-    ];
+    const isNear = ([lng, lat]: LngLat) =>
+      pointed !== null && Math.hypot(at.x(pointed[0]) - at.x(lng), at.y(pointed[1]) - at.y(lat)) < POINTED_PX;
+    const shipLabels = (wanted: (ship: ShipMark) => boolean) =>
+      ships.flatMap((ship, i) => (wanted(ship) ? [worded(shipKey(i), ship.at, ship.words)] : []));
+    return {
+      always: [...pinned, ...shipLabels(({ alarm, at }) => alarm || isNear(at))],
+      beside: [
+        // What was asked for before what is there anyway.
+        ...marks
+          .map((mark, i) => ({ sign: mark.sign, label: worded(markKey(mark, i), mark.at, mark.words) }))
+          .sort((a, b) => Number(b.sign === "position") - Number(a.sign === "position"))
+          .map(({ label }) => label),
+        ...targets.map((target) => worded(targetKey(target), target.at, target.name)),
+      ],
+    };
   }
 
-  /** Finds room for all labels and turns those of vehicles to their side; harbours are named where there is some left. */
+  /** Finds room for labels and turns those of vehicles to their side; harbours are named where there is some left. */
   #layLabels(context: CanvasRenderingContext2D, at: Projection): { sides: Sides; names: LaidName[] } {
-    const labels = this.#allLabels(context, at);
-    const sides = placed(labels, this.#covers, at.width, at.height);
-    const names = this.#namesBeside(context, at, [...this.#covers, ...boxesOf(labels, sides)]);
-    this.#sides = new Map([
-      ...labels.map(({ key }, i) => [key, sides[i] as Side] as const),
-      ...sidesOf(names),
-    ]);
-    labels.forEach(({ key }, i) => {
-      const element = this.#pins.get(key)?.getElement();
-      if (element && element.dataset.side !== sides[i]) element.dataset.side = sides[i] as Side;
+    const { always, beside } = this.#labelsOf(context, at);
+    const sides = new Map<string, Side | null>();
+    const [{ width, height }, covers] = [at, this.#covers];
+    placed(always, covers, width, height).forEach((side, i) => {
+      sides.set(always[i]?.key ?? "", side);
     });
-    const { marks, targets } = this.#lively;
-    const own = sides.slice(labels.length - marks.length - targets.length);
-    return { sides: { marks: own.slice(0, marks.length), targets: own.slice(marks.length) }, names };
+    const taken = [
+      ...covers,
+      ...boxesOf(
+        always,
+        always.map(({ key }) => sides.get(key) ?? "right"),
+      ),
+      ...beside.map(signOf),
+    ];
+    fitting(beside, taken, width, height).forEach((side, i) => {
+      sides.set(beside[i]?.key ?? "", side);
+    });
+    const written = beside.flatMap((label) => {
+      const side = sides.get(label.key);
+      return side ? [boxOf(label, side)] : [];
+    });
+    const names = this.#namesBeside(context, at, [...taken, ...written]);
+    for (const [key, side] of [...sides, ...sidesOf(names)]) if (side) this.#sides.set(key, side);
+    for (const { key } of always) {
+      const element = this.#pins.get(key)?.getElement();
+      const side = sides.get(key);
+      if (element && side && element.dataset.side !== side) element.dataset.side = side;
+    }
+    const { marks, targets, ships } = this.#lively;
+    const sideOf = (key: string) => sides.get(key) ?? null;
+    return {
+      sides: {
+        marks: marks.map((mark, i) => sideOf(markKey(mark, i))),
+        targets: targets.map((target) => sideOf(targetKey(target))),
+        ships: ships.map((_, i) => sideOf(shipKey(i))),
+      },
+      names,
+    };
   }
 
   #namesBeside(context: CanvasRenderingContext2D, at: Projection, taken: readonly Box[]): LaidName[] {

@@ -1,7 +1,7 @@
 /** The names of harbours on a map that shows more than the survey: few, where nothing else is written. */
 
 import type { Harbour } from "../harbours";
-import { type Box, boxOf, fitting, type Label, type Side } from "./labels";
+import { type Box, boxOf, type Label, namesFitting, type Side } from "./labels";
 import type { Paper } from "./mapColours";
 import type { Projection } from "./projection";
 import { dot } from "./shapes";
@@ -46,7 +46,7 @@ export function laidNames(
       side: before.get(key) ?? ("right" as const),
     };
   });
-  const sides = fitting(labels, taken, at.width, at.height);
+  const sides = namesFitting(labels, taken, at.width, at.height);
   return labels.flatMap((label, i) => {
     const side = sides[i];
     return side ? [{ ...label, side }] : [];

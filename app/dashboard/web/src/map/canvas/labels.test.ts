@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { boxesOf, boxOf, fitting, type Label, placed } from "./labels";
+import { boxesOf, boxOf, fitting, type Label, namesFitting, placed } from "./labels";
 
 const label = (x: number, y: number, changes: Partial<Label> = {}): Label => ({
   at: [x, y],
@@ -33,12 +33,32 @@ it("where every side is taken the least hidden one is", () => {
   expect(placed([label(2, 200)], [everywhere], 400, 400)).toEqual(["right"]);
 });
 
-it("further labels are written where they cover nothing, and left out elsewhere", () => {
+it("words of signs that stand there anyway are left out where they would cover another label", () => {
+  const vehicle = label(200, 200, { side: "left" });
+  const taken = boxesOf([vehicle], ["left"]);
+  // A ship beside a vehicle: her own sign is in nobody's way, and hers are not written over the vehicle's name.
+  const ship = label(150, 206, { side: "right" });
+  expect(fitting([ship], taken, 400, 400)).toEqual(["above"]);
+  const among = [label(100, 200), label(200, 240), label(150, 170), label(150, 240), label(110, 225)];
+  expect(
+    fitting(
+      [ship],
+      boxesOf(
+        among,
+        among.map(() => "right" as const),
+      ),
+      400,
+      400,
+    ),
+  ).toEqual([null]);
+});
+
+it("names are written where they cover nothing, and left out with their signs elsewhere", () => {
   const taken = boxesOf([label(200, 200)], ["right"]);
   const names = [label(190, 260), label(205, 200), label(200, 262), label(30, 350)].map((one) => ({
     ...one,
     reach: 6,
   }));
-  const sides = fitting(names, taken, 400, 400);
+  const sides = namesFitting(names, taken, 400, 400);
   expect(sides.map((side) => side !== null)).toEqual([true, false, false, true]);
 });

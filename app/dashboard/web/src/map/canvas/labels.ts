@@ -39,14 +39,14 @@ const common = (a: Box, b: Box) =>
 export const boxesOf = (labels: readonly Label[], sides: readonly Side[]): Box[] =>
   labels.flatMap((label, i) => [signOf(label), boxOf(label, sides[i] ?? label.side)]);
 
-const signOf = ({ at: [x, y], reach }: Label): Box => ({
+export const signOf = ({ at: [x, y], reach }: Label): Box => ({
   left: x - reach,
   top: y - reach,
   right: x + reach,
   bottom: y + reach,
 });
 
-/** Sides for those of further labels, the most important first, that cover nothing that is `taken`; null for the others. */
+/** Sides for words of signs that stand there anyway, the most important first: where they cover nothing; null: nowhere. */
 export function fitting(
   labels: readonly Label[],
   taken: readonly Box[],
@@ -55,17 +55,34 @@ export function fitting(
 ): (Side | null)[] {
   const all = [...taken];
   return labels.map((label) => {
-    const sign = signOf(label);
-    const isFree = (box: Box) => all.every((other) => common(box, other) === 0);
-    if (!isFree(sign)) return null;
-    const side = [label.side, ...SIDES].find((one) => {
-      const box = boxOf(label, one);
-      const within = box.left >= 0 && box.top >= 0 && box.right <= width && box.bottom <= height;
-      return within && isFree(box);
-    });
-    if (side) all.push(sign, boxOf(label, side));
-    return side ?? null;
+    const side = freeSide(label, all, width, height);
+    if (side) all.push(boxOf(label, side));
+    return side;
   });
+}
+
+/** The same for names whose signs, too, are only there where they cover nothing. */
+export function namesFitting(
+  labels: readonly Label[],
+  taken: readonly Box[],
+  width: number,
+  height: number,
+): (Side | null)[] {
+  const all = [...taken];
+  return labels.map((label) => {
+    const side = isFree(signOf(label), all) ? freeSide(label, all, width, height) : null;
+    if (side) all.push(signOf(label), boxOf(label, side));
+    return side;
+  });
+}
+
+const isFree = (box: Box, taken: readonly Box[]) => taken.every((other) => common(box, other) === 0);
+
+function freeSide(label: Label, taken: readonly Box[], width: number, height: number): Side | null {
+  const within = ({ left, top, right, bottom }: Box) =>
+    left >= 0 && top >= 0 && right <= width && bottom <= height;
+  const sides = [label.side, ...SIDES].filter((side) => within(boxOf(label, side)));
+  return sides.find((side) => isFree(boxOf(label, side), taken)) ?? null;
 }
 
 /** Sides for labels, the most important first; `covers` are not to be written under, nor the edge of the window over. */

@@ -46,10 +46,11 @@ export interface LivelyContent {
   sketch: Sketch | null;
 }
 
-/** Where the words of signs are written: those of places first, then those of targets. */
+/** Where the words of signs are written; null: there is no room for them. */
 export interface Sides {
-  marks: readonly Side[];
-  targets: readonly Side[];
+  marks: readonly (Side | null)[];
+  targets: readonly (Side | null)[];
+  ships: readonly (Side | null)[];
 }
 
 /** From a sign's middle to its words, and the height of these, pixels. */
@@ -93,7 +94,6 @@ export function paintLively(
     waysHome,
     targets,
     ships,
-    pointed,
     marks,
     spots,
     measure,
@@ -113,7 +113,7 @@ export function paintLively(
     line(context, at, circle(place, radius_m, 72), { colour, width: 1, dash: [4, 3] });
   }
   marks.forEach((mark, i) => {
-    paintMark(context, at, mark, sides.marks[i] ?? "right", paper);
+    paintMark(context, at, mark, sides.marks[i] ?? null, paper);
   });
   for (const tail of tails) way(context, at, tail, paper.casing);
   for (const { ends, colour, opacity } of swaths) {
@@ -127,9 +127,11 @@ export function paintLively(
     line(context, at, points, acknowledged ? { colour, width: 2.5 } : { colour, width: 2, dash: [3, 4] });
   }
   targets.forEach((target, i) => {
-    paintTarget(context, at, target, sides.targets[i] ?? "right", paper);
+    paintTarget(context, at, target, sides.targets[i] ?? null, paper);
   });
-  for (const ship of ships) paintShip(context, at, ship, pointed, paper);
+  ships.forEach((ship, i) => {
+    paintShip(context, at, ship, sides.ships[i] ?? null, paper);
+  });
   for (const { at: place, state, chosen } of spots) {
     const edge = { colour: "#10181d", width: chosen ? 3 : 1.5 };
     dot(context, at, place, chosen ? 9 : 5.5, SPOT_COLOURS[state] ?? "#e0452f", edge);
@@ -163,7 +165,7 @@ function paintTarget(
   context: CanvasRenderingContext2D,
   at: Projection,
   { name, accurate, at: place, ring }: TargetMark,
-  side: Side,
+  side: Side | null,
   paper: Paper,
 ): void {
   line(context, at, ring, { colour: paper.ink, width: accurate ? 2 : 1.5, dash: [6, 4] });
@@ -171,13 +173,11 @@ function paintTarget(
   label(context, at, place, name, side, paper);
 }
 
-const NEAR_PX = 16;
-
 function paintShip(
   context: CanvasRenderingContext2D,
   at: Projection,
   { at: place, ahead, bow_deg, alarm, words }: ShipMark,
-  pointed: LngLat | null,
+  side: Side | null,
   paper: Paper,
 ): void {
   const colour = alarm ? paper.keepOut : paper.ink;
@@ -199,8 +199,7 @@ function paintShip(
     context.fill();
     stroke(context, { colour, width: 2 });
   }
-  const near = pointed !== null && Math.hypot(at.x(pointed[0]) - x, at.y(pointed[1]) - y) < NEAR_PX;
-  if (alarm || near) label(context, at, place, words, "right", paper);
+  label(context, at, place, words, side, paper);
 }
 
 /** A ship's outline: to starboard and ahead, pixels. */
@@ -215,9 +214,10 @@ function label(
   at: Projection,
   place: LngLat,
   words: string,
-  side: Side,
+  side: Side | null,
   paper: Paper,
 ): void {
+  if (!side || !words) return;
   context.font = WORDS_FONT;
   const width = context.measureText(words).width;
   const box = boxOf(
@@ -289,7 +289,7 @@ function paintMark(
   context: CanvasRenderingContext2D,
   at: Projection,
   { at: place, sign, words, radius_m, bow_deg = 0, old = false }: PlaceMark,
-  side: Side,
+  side: Side | null,
   paper: Paper,
 ): void {
   if (radius_m > 0) {
@@ -308,7 +308,7 @@ function paintMark(
   context.fillStyle = old ? paper.casing : (FILLS[sign] ?? paper.casing);
   context.fill();
   stroke(context, { colour: paper.ink, width: 2 });
-  if (words) label(context, at, place, words, side, paper);
+  label(context, at, place, words, side, paper);
 }
 
 function paintSketch(context: CanvasRenderingContext2D, at: Projection, { lines, handles }: Sketch): void {

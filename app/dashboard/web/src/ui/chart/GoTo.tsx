@@ -1,6 +1,6 @@
 import "./GoTo.css";
 import { useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../../api/types";
 import { type Harbour, harbours, harboursNamed } from "../../map/harbours";
 import { placeOf, placeSample } from "../../state/coordinates";
@@ -29,8 +29,9 @@ export function GoTo() {
   /** Which of those that are found is chosen; null: none is offered. */
   const chosen = useSignal<number | null>(null);
   const field = useRef<HTMLInputElement>(null);
+  // Before the first picture of it: who types at once types into the field, not the page's single keys.
+  useLayoutEffect(() => field.current?.focus(), []);
   useEffect(() => {
-    field.current?.focus();
     // Without the service there are no names, which is told elsewhere.
     harbours().then(
       (all) => {
@@ -52,7 +53,12 @@ export function GoTo() {
     const harbour =
       found[chosen.value ?? 0] ?? (at ? undefined : harboursNamed(known.value, text.value, 1)[0]);
     if (harbour) return goToHarbour(harbour);
-    fault.value = at ? "" : say("mapTools.typeAPositionSuchAs", { sample: placeSample() });
+    const [name, sample] = [text.value.trim(), placeSample()];
+    fault.value = at
+      ? ""
+      : /^\D+$/.test(name)
+        ? say("mapTools.noHarbourIsCalled", { name, sample })
+        : say("mapTools.typeAPositionSuchAs", { sample });
     if (at) show(at);
   };
   const onKeyDown = (event: KeyboardEvent) => {

@@ -40,7 +40,7 @@ export const mapFirst = computed(
 );
 
 const OVER_THE_MAP =
-  ".legend, .map-tools, .beside-tools > *, .card, .bottom, .missions, .alarms, .notice, .maplibregl-ctrl-scale, .maplibregl-ctrl-group";
+  ".legend, .map-tools, .beside-tools > *, .over-map > *, .card, .bottom, .missions, .maplibregl-ctrl-scale, .maplibregl-ctrl-group";
 /** Above which the legend lies at the map's upper edge. */
 const UPPER = 0.4;
 
@@ -49,16 +49,19 @@ const FREE_PX = 30;
 
 /** How far panels, tools and the legend reach over the map. */
 export function overlaid(): Padding {
-  const width = (panel: string) => document.querySelector(panel)?.getBoundingClientRect().width ?? 0;
+  const box = (panel: string) => document.querySelector(panel)?.getBoundingClientRect() ?? new DOMRect();
+  const width = (panel: string) => box(panel).width;
   const { top, bottom } = legendReach.peek();
   const [left, right, below] = isNarrow.peek()
     ? [0, 0, bottom]
     : [width(".missions"), width(".cards-column"), mission.peek() ? stripHeight.peek() : 0];
-  const tools = width(".map-tools");
+  // A column on the right, or a row at the bottom, beside or above which the scale lies.
+  const tools = box(".map-tools");
+  const inRow = tools.width > tools.height;
   return {
     top: top + FREE_PX,
-    right: right + tools + FREE_PX,
-    bottom: below + FREE_PX,
+    right: right + (inRow ? 0 : tools.width) + FREE_PX,
+    bottom: below + (inRow ? tools.height : 0) + box(".maplibregl-ctrl-scale").height + FREE_PX,
     left: left + FREE_PX,
   };
 }

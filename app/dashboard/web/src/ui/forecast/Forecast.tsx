@@ -3,7 +3,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { ForecastView } from "../../api/types";
 import { forecastInAll } from "../../state/form/blocks";
-import { distance, duration, metres, percent } from "../../state/format";
+import { distance, duration, durations, metres, percent } from "../../state/format";
 import { said } from "../../state/session";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
@@ -114,7 +114,7 @@ function InAll({ found, names, waiting }: InAllProps) {
           {names.map((name, i) => (
             <tr key={name} data-testid={`forecast-block-${i + 1}`}>
               <th scope="row">{name}</th>
-              <td>{found[i] ? between(found[i].duration_s_range, duration) : missing}</td>
+              <td>{found[i] ? time(found[i].duration_s_range) : missing}</td>
               <td>{found[i] ? between(found[i].coverage_pct_range, percent) : ""}</td>
             </tr>
           ))}
@@ -122,7 +122,7 @@ function InAll({ found, names, waiting }: InAllProps) {
         <tfoot>
           <tr data-testid="forecast-in-all">
             <th scope="row">{say("blocks.inAll")}</th>
-            <td>{all ? between(all.duration_s_range, duration) : missing}</td>
+            <td>{all ? time(all.duration_s_range) : missing}</td>
             <td />
           </tr>
         </tfoot>
@@ -137,6 +137,9 @@ function InAll({ found, names, waiting }: InAllProps) {
     </>
   );
 }
+
+const time = (range: { low: number; high: number } | null): string =>
+  range === null ? duration(null) : durations(range.low, range.high);
 
 /** "low to high" where they differ as they are shown. */
 function between(range: { low: number; high: number } | null, shown: (value: number) => string): string {
@@ -172,7 +175,7 @@ function Figures({ view }: { view: ForecastView }) {
       <dl class="figures">
         <div class="figure">
           <dt>{say("forecast.duration")}</dt>
-          <dd data-testid="forecast-duration">{between(view.duration_s_range, duration)}</dd>
+          <dd data-testid="forecast-duration">{time(view.duration_s_range)}</dd>
         </div>
         <div class="figure">
           <dt>{knownTitle(view)}</dt>

@@ -6,7 +6,7 @@ import { vehicleColour } from "../../map/picture/palette";
 import { comingFrom, inAll, inSequence, type PlannedVehicle, total } from "../../state/form/blocks";
 import type { Estimate, Share } from "../../state/form/draft";
 import { LatestAsker, plansOf } from "../../state/form/planning";
-import { distance, duration, percent } from "../../state/format";
+import { distance, duration, durations, percent } from "../../state/format";
 import { said } from "../../state/session";
 import { fleet, planned } from "../../state/store";
 import { say } from "../../words/say";
@@ -342,8 +342,4 @@ function energyOf(
   return { short: false, words: say("asked.notKnown") };
 }
 
-/** "low to high" where they differ as they are shown. */
-function between({ low, high }: { low: number; high: number }): string {
-  const [a, b] = [duration(low), duration(high)];
-  return a === b ? a : say("forecast.to", { low: a, high: b });
-}
+const between = ({ low, high }: { low: number; high: number }): string => durations(low, high);

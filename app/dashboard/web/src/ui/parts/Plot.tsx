@@ -1,13 +1,16 @@
 import "./Plot.css";
 import "uplot/dist/uPlot.min.css";
-import { useSignal } from "@preact/signals";
+import { signal, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import uPlot from "uplot";
+import type uPlot from "uplot";
 import { csvOf, digits, fileNameOf, lineWords } from "../../state/analysis/plotFile";
 import { clock, plain } from "../../state/format";
 import { language, say } from "../../words/say";
 import { Button, flips } from "./Controls";
 import { save } from "./download";
+
+/** What draws charts: fetched with the first one. */
+const drawing = signal<typeof uPlot | null>(null);
 
 export interface Line {
   label: string;
@@ -51,10 +54,21 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
   const height = large.value ? LARGE_HEIGHT : HEIGHT;
   const shape = `${lines.map((l) => l.label + l.colour).join()} ${unit} ${time} ${range} ${down} ${large.value} ${language.value}`;
 
+  useEffect(() => {
+    import("uplot").then(
+      (module) => {
+        drawing.value = module.default;
+      },
+      // The service is gone, which is told elsewhere.
+      () => undefined,
+    );
+  }, []);
+  const Drawing = drawing.value;
+
   // A new chart only where its lines are others; new values are set below.
   useEffect(() => {
     const element = box.current;
-    if (!element) return;
+    if (!element || !Drawing) return;
     const styles = getComputedStyle(element);
     const axis = {
       stroke: styles.getPropertyValue("--ink-2").trim() || "#667788",
@@ -62,7 +76,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
       ticks: { show: false },
       font: large.value ? "13px sans-serif" : "12px sans-serif",
     };
-    const made = new uPlot(
+    const made = new Drawing(
       {
         width: Math.max(160, element.clientWidth),
         height,
@@ -78,7 +92,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
           ],
         },
         legend: { show: lines.length > 1, live: true },
-        tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), "UTC"),
+        tzDate: (ts) => Drawing.tzDate(new Date(ts * 1000), "UTC"),
         scales: {
           x: { time },
           y: { ...(range ? { range } : {}), dir: down ? -1 : 1 },
@@ -117,7 +131,7 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
       made.destroy();
       chart.current = null;
     };
-  }, [shape]);
+  }, [shape, Drawing]);
 
   useEffect(() => {
     // What was enlarged stays so while more comes.

@@ -1,0 +1,10 @@
+import { expect, it } from "vitest";
+import { durations } from "./format";
+
+it("ranges of time are told in whole minutes from ten minutes on, and are not narrower then", () => {
+  expect(durations(187, 250)).toBe("3 min 07 s to 4 min 10 s");
+  expect(durations(60, 60)).toBe("1 min 00 s");
+  expect(durations(828, 1216)).toBe("13 to 21 min");
+  expect(durations(3020, 3890)).toBe("50 min to 1 h 05 min");
+  expect(durations(900, 900)).toBe("15 min");
+});
