@@ -175,8 +175,11 @@ async def test_this_version_knows_its_missions_and_flies_on(left: str) -> None:
     await migrate.downgrade(left, REVISION)
     assert described(await tables_of(left)) == described(tables)
     after = await contents(left, tables)
-    for name in ("soundings", "positions", "batches", "events", "mission_vehicles"):
+    for name in ("soundings", "positions", "events", "mission_vehicles"):
         assert [row for row in before[name] if row not in after[name]] == [], name
+    # Answers to batches are forgotten a day after they were given; of these those are as they were that are left.
+    keys = {row["key"] for row in before["batches"]}
+    assert [row for row in after["batches"] if row["key"] in keys and row not in before["batches"]] == []
     assert [row["number"] for row in after["steps"] if row["mission_id"] == ids["Under way"]] == [1, 2, 3, 4]
     assert {row["name"]: row["state"] for row in after["missions"]} == {
         "First survey": "finished",

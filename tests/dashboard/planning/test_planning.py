@@ -98,7 +98,7 @@ def test_the_plan_is_drawn_before_the_start_and_follows_the_area_as_it_is_dragge
     click_round(page, [(520, 300), (900, 320), (880, 640), (540, 600)])
     plan, whole = by_id(page, "planned"), by_id(page, "planned-whole")
     expect(plan).to_have_attribute("data-plan", "new")
-    expect(whole).to_contain_text(re.compile(r"Planned: \d.* of tracks in \d+ .* to \d+"))
+    expect(whole).to_contain_text(re.compile(r"Planned: \d.* of tracks in \d+.* to \d+"))
     # Its way home, and its way beside what it may fly at most.
     expect(by_id(page, "share-sim-1")).to_contain_text(re.compile(r"\d+ m of 1\.00 km\d+ m, \d+"))
     expect(by_id(page, "share-sim-1")).to_contain_text("not known")
