@@ -10,29 +10,19 @@ from app.exploration.planner.base import PlannerBase
 from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m
 from app.missions.flight.legs.commit import STILL_M
 from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
+from app.missions.flight.steering import steered
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.team import Member
-from simulator.vehicles.vehicle import LEFT_BEHIND, TOO_CLOSE, VehicleLimits
+from simulator.vehicles.vehicle import VehicleLimits
 
 LEAST_RADIUS_M = 0.5
-
-STEP_M = 1.0
-"""A vehicle's way is made of pieces that are at most so long,"""
-STEPS_OF_RADIUS = 4.0
-"""and of so many on its turning circle's radius."""
-
-PASSED_WITHIN_M = 8.0
-"""Who passes the end of its leg at most this far to the side has come there, as at sea."""
 
 REACTS_S, LEAST_ARRIVAL_M = 0.25, 0.5
 """So long after it has arrived a vehicle turns to its next leg; it arrives within so many metres all the same."""
 
 STILL_S = 1.0
 """So long takes a leg that ends where it begins: its vehicle is there at once."""
-
-MOST_CIRCLES = 2.0
-"""After so many whole circles more than a leg is long a vehicle gives its end up."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +206,9 @@ class Swarm:
         if not still:
             self.heading_rad[i] = math.atan2(*leg)
             arrival_m = max(self._spec.arrival_radius_m - REACTS_S * float(self._speed_mps[i]), LEAST_ARRIVAL_M)
-            poses, way_m = steered(self._poses[i], (float(end[0]), float(end[1])), float(self._radius_m[i]), arrival_m)
+            to_m, radius_m = (float(end[0]), float(end[1])), float(self._radius_m[i])
+            poses, ways_m = steered(self._poses[i], to_m, radius_m, arrival_m)
+            way_m = float(ways_m[-1])
         if len(poses):
             self._poses[i] = (float(poses[-1, 0]), float(poses[-1, 1]), float(poses[-1, 2]))
         if not ahead:
@@ -244,52 +236,6 @@ def planner_of(spec: MissionSpec, so_far: SoFar) -> PlannerBase:
         except ValueError:
             return make_planner(spec)
     return planner
-
-
-def steered(
-    pose: tuple[float, float, float], end: tuple[float, float], radius_m: float, arrival_m: float
-) -> tuple[FloatArray, float]:
-    """Return the poses (n, 3) of a vehicle that steers for a place until it is there, and how long its way is.
-
-    Parameters
-    ----------
-    pose
-        East, north, heading; of one without a heading (NaN) any will do.
-    end
-        East, north.
-    arrival_m
-        It is there within so many metres, or when it has passed the place close by, as seen from where it set out.
-    """
-    east, north, heading = pose
-    to_east, to_north = end[0] - east, end[1] - north
-    away_m = math.hypot(to_east, to_north)
-    if math.isnan(heading):
-        heading = math.atan2(to_east, to_north)
-    step_m = min(STEP_M, radius_m / STEPS_OF_RADIUS)
-    most_m = away_m + MOST_CIRCLES * math.tau * radius_m
-    poses = [(east, north, heading)]
-    way_m, along_m = 0.0, 0.0
-    off_east, off_north, off_m = to_east, to_north, away_m
-    leaving = False
-    while off_m > arrival_m and not (along_m >= away_m and off_m <= PASSED_WITHIN_M) and way_m < most_m:
-        piece_m = min(step_m, max(off_m - arrival_m, 0.01))
-        aside_east, aside_north = radius_m * math.cos(heading), -radius_m * math.sin(heading)
-        to_centre_m = min(
-            math.hypot(off_east - aside_east, off_north - aside_north),
-            math.hypot(off_east + aside_east, off_north + aside_north),
-        )
-        leaving = to_centre_m < (LEFT_BEHIND if leaving else TOO_CLOSE) * radius_m
-        if not leaving:
-            turn = math.remainder(math.atan2(off_east, off_north) - heading, math.tau)
-            heading += max(-piece_m / radius_m, min(turn, piece_m / radius_m))
-        east += piece_m * math.sin(heading)
-        north += piece_m * math.cos(heading)
-        way_m += piece_m
-        poses.append((east, north, heading))
-        off_east, off_north = end[0] - east, end[1] - north
-        off_m = math.hypot(off_east, off_north)
-        along_m = ((east - pose[0]) * to_east + (north - pose[1]) * to_north) / away_m
-    return np.array(poses), way_m
 
 
 def poses_apart(poses: FloatArray, apart_m: float) -> FloatArray:

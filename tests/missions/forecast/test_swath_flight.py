@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 
 from app.estimation.swath import SwathSonar
+from app.missions.flight.steering import steered
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.request import _view, _whole, starts_of
 from app.missions.forecast.simulate import Forecast, fly_over
-from app.missions.forecast.swarm import Flown, SoFar, circle_m, steered
+from app.missions.forecast.swarm import Flown, SoFar, circle_m
 from app.missions.forecast.swath_flight import swath_of, sweeps
 from app.missions.forecast.whole_survey import batteries
 from app.missions.recovery.failsafes import with_reserve_s
@@ -180,7 +181,8 @@ def test_a_vehicle_turns_in_its_circle_and_comes_where_it_is_sent(
     heading: float, east: float, north: float, radius: float
 ) -> None:
     end = 3.0 + east, -2.0 + north
-    poses, way_m = steered((3.0, -2.0, heading), end, radius, 1.0)
+    poses, ways_m = steered((3.0, -2.0, heading), end, radius, 1.0)
+    way_m = ways_m[-1]
     assert math.hypot(poses[-1, 0] - end[0], poses[-1, 1] - end[1]) <= max(8.0, 2.0 * radius)
     pieces_m = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     assert way_m == pytest.approx(pieces_m.sum())
@@ -225,6 +227,6 @@ def test_ways_are_as_long_as_a_simulated_vehicle_flies_them(course_deg: float, a
             craft.advance(0.1)
             before, here = here, craft.position
             flown_m += math.hypot(here.east_m - before.east_m, here.north_m - before.north_m)
-        poses, piece_m = steered(pose, end, circle_m(spec, spec.vehicles[0]), 2.0)
-        pose, way_m = (float(poses[-1, 0]), float(poses[-1, 1]), float(poses[-1, 2])), way_m + piece_m
+        poses, ways_m = steered(pose, end, circle_m(spec, spec.vehicles[0]), 2.0)
+        pose, way_m = (float(poses[-1, 0]), float(poses[-1, 1]), float(poses[-1, 2])), way_m + ways_m[-1]
     assert way_m == pytest.approx(flown_m, rel=0.06)

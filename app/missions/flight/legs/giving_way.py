@@ -16,7 +16,6 @@ import structlog
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.exploration.motion.steering import steered_motion
 from app.exploration.motion.timeline import Timeline, closest_approach
 from app.missions.fleet.interface import WaypointOrder
 from app.missions.flight.decisions.decision import turn_radius_m
@@ -24,6 +23,7 @@ from app.missions.flight.decisions.separation import planned_places, ways_aside
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.observation.waiting import until_next_look
+from app.missions.flight.steering import steered_motion
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground

@@ -47,31 +47,29 @@ export const signOf = ({ at: [x, y], reach }: Label): Box => ({
 });
 
 /** Sides for words of signs that stand there anyway, the most important first: where they cover nothing; null: nowhere. */
-export function fitting(
-  labels: readonly Label[],
-  taken: readonly Box[],
-  width: number,
-  height: number,
-): (Side | null)[] {
-  const all = [...taken];
-  return labels.map((label) => {
-    const side = freeSide(label, all, width, height);
-    if (side) all.push(boxOf(label, side));
-    return side;
-  });
-}
+export const fitting = (labels: readonly Label[], taken: readonly Box[], width: number, height: number) =>
+  sidesOf(labels, taken, width, height, () => []);
 
 /** The same for names whose signs, too, are only there where they cover nothing. */
-export function namesFitting(
+export const namesFitting = (
   labels: readonly Label[],
   taken: readonly Box[],
   width: number,
   height: number,
+) => sidesOf(labels, taken, width, height, (label) => [signOf(label)]);
+
+function sidesOf(
+  labels: readonly Label[],
+  taken: readonly Box[],
+  width: number,
+  height: number,
+  newBoxes: (label: Label) => Box[],
 ): (Side | null)[] {
   const all = [...taken];
   return labels.map((label) => {
-    const side = isFree(signOf(label), all) ? freeSide(label, all, width, height) : null;
-    if (side) all.push(signOf(label), boxOf(label, side));
+    const signs = newBoxes(label);
+    const side = signs.every((box) => isFree(box, all)) ? freeSide(label, all, width, height) : null;
+    if (side) all.push(...signs, boxOf(label, side));
     return side;
   });
 }

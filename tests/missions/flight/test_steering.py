@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.exploration.motion.steering import STEP_S, steered_motion
+from app.missions.flight.steering import PASSED_WITHIN_M, STEP_M, steered_motion
 
 SPEED_MPS, RADIUS_M = 1.5, 5.0
 AWAY = st.floats(20.0, 60.0)
@@ -25,13 +25,13 @@ def test_it_comes_to_its_place_in_whatever_current_and_turns_no_tighter_than_it_
     current = (current_mps * math.sin(set_rad), current_mps * math.cos(set_rad))
     end = place(away_m, bearing_rad, 5.0)
     motion = steered_motion([np.array([0.0, 0.0, 1.0]), end], heading_rad, SPEED_MPS, RADIUS_M, current, 400.0)
-    assert math.dist(motion.place_m[-1, :2], end[:2]) <= 3.0
+    assert math.dist(motion.place_m[-1, :2], end[:2]) <= PASSED_WITHIN_M
     assert np.all((motion.place_m[:, 2] >= 1.0) & (motion.place_m[:, 2] <= 5.0 + 1e-9))
     through_m = np.diff(motion.place_m[:, :2], axis=0) - np.diff(motion.time_s)[:, None] * np.array(current)
     assert np.hypot(*through_m.T) == pytest.approx(SPEED_MPS * np.diff(motion.time_s))
     headings_rad = np.arctan2(*through_m.T)
     turned_rad = np.abs(np.angle(np.exp(1j * np.diff(headings_rad))))
-    assert np.all(turned_rad <= SPEED_MPS * STEP_S / RADIUS_M + 1e-6)
+    assert np.all(turned_rad <= STEP_M / RADIUS_M + 1e-6)
 
 
 @given(AWAY, ANGLE)
@@ -51,5 +51,5 @@ def test_who_turns_right_round_swings_out_by_the_radius_of_its_turn() -> None:
 
 def test_it_looks_no_farther_ahead_than_asked() -> None:
     motion = steered_motion([np.zeros(3), np.array([900.0, 0.0, 0.0])], math.nan, SPEED_MPS, RADIUS_M, (0.0, 0.0), 20.0)
-    assert 20.0 <= motion.time_s[-1] <= 20.0 + STEP_S
+    assert 20.0 <= motion.time_s[-1] <= 20.0 + STEP_M / SPEED_MPS
     assert motion.place_m[-1, 0] == pytest.approx(SPEED_MPS * motion.time_s[-1])
