@@ -125,8 +125,11 @@ class VehicleReports:
         self._changed.set()
 
     def _count_way(self, member: Member, report: VehicleReport, place: tuple[float, float], spec: MissionSpec) -> None:
-        """Add what a vehicle has flown since its last report, if that can have been."""
+        """Note what a vehicle is at, and add what it has flown since its last report, if that can have been."""
         flown = member.flown
+        way_left_m = member.way_left_m(spec)
+        flown.left_m = way_left_m + member.way_ahead_m(self._frame)
+        flown.phase = self._phase(member, way_left_m)
         before = None if member.report is None else local_place(self._frame, member.report.position)
         if member.report is None or before is None:
             return
@@ -137,11 +140,8 @@ class VehicleReports:
         if member.ordered and member.leg_start_m is not None and member.target_m is not None:
             leg = place_of(member.leg_start_m), place_of(member.target_m)
         flown.add_way(before, place, leg)
-        way_left_m = member.way_left_m(spec)
-        flown.left_m = way_left_m + member.way_ahead_m(self._frame)
         if not member.ordered and member.legs and way_left_m > 0.0:
             flown.idle_s += passed_s
-        flown.phase = self._phase(member, way_left_m)
 
     def _count_energy(self, member: Member, report: VehicleReport, policy: SurfacePolicy | None) -> None:
         """Count what a vehicle has used since its last report."""

@@ -2,6 +2,7 @@
 
 from app.missions.errors import ConflictError
 from app.missions.flight.orders import OrderBook
+from app.missions.flown import Phase
 from app.missions.live.mission import LiveMission
 from app.missions.running.supervisor import MissionSupervisor
 from app.missions.spec.failsafes import Response
@@ -74,6 +75,7 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
         if member.is_home:
             member.energy.renew()
         member.withdrawal = None
+        member.flown.phase = Phase.TRANSIT
         member.ahead.clear()
         member.set_order(None)
     await live.journal.log(Level.INFO, "recovery", f"{name} goes on with the survey", vehicle=name, actor=actor)

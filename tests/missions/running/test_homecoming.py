@@ -143,8 +143,29 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     await until(lambda: live.team.members["b"].legs > other + 2, "b goes on meanwhile")
     assert live.team.members["a"].legs == before
     await service.send_on(live, "a", "Ana")
+    assert await phase_of(service, mission, "a") is not Phase.HOME
     await until(lambda: live.team.members["a"].legs > before + 2, "a surveys again")
-    assert await phase_of(service, mission, "a") in (Phase.SURVEY, Phase.TRANSIT)
+
+    async def surveys() -> bool:
+        return await phase_of(service, mission, "a") in (Phase.SURVEY, Phase.TRANSIT)
+
+    await until(surveys, "a is seen to survey again")
+    await act(service, mission.id, "abort")
+
+
+async def test_what_a_vehicle_is_at_is_known_when_its_clock_has_jumped(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=OUTSIDE, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    member = live.team.members["a"]
+    report = member.report
+    assert report is not None
+    flown_m = member.flown.flown_m
+    member.flown.phase = Phase.HOME
+    live.reports.take(replace(report, time_s=report.time_s + 3600.0), live.spec, running=True)
+    assert member.flown.phase in (Phase.SURVEY, Phase.TRANSIT)
+    assert member.flown.flown_m == flown_m, "where it was meanwhile nobody knows"
     await act(service, mission.id, "abort")
 
 
