@@ -109,7 +109,8 @@ def test_the_plan_is_drawn_before_the_start_and_follows_the_area_as_it_is_dragge
     page.mouse.down()
     for k in range(1, 11):
         page.mouse.move(880 + 12 * k, 640 + 8 * k)
-    # The button is still down.
+    # The button is still down, and the corner is where the pointer is: it was 89 m x 82 m.
+    expect(page.get_by_text(re.compile(r"^10\d m x 9\d m, "))).to_be_visible()
     expect(whole).not_to_have_text(told)
     expect(plan).to_have_attribute("data-plan", "new")
     assert middle_of(page) != drawn

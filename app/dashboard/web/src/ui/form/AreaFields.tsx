@@ -26,20 +26,24 @@ export function AreaFields() {
   const others = useSignal<readonly (readonly LngLat[])[]>([]);
   const corners = cornersOf(draft);
   const size = corners.length > 2 ? sizeOf(corners) : null;
-  const dragged = useRef<readonly LngLat[] | null>(null);
+  // Of what is being edited, as it was and as it became: while a corner is dragged effects come late.
+  const edited = useRef(new WeakSet<readonly LngLat[]>());
   const busy = drawing.value !== null;
   useEffect(() => {
-    if (draft.source !== "drawn" || draft.ring.length < 3 || busy) editing.value = null;
-    else if (draft.ring !== dragged.current) {
+    if (draft.source !== "drawn" || draft.ring.length < 3 || busy) {
+      edited.current = new WeakSet();
+      editing.value = null;
+    } else if (!edited.current.has(draft.ring)) {
+      const rings = new WeakSet([draft.ring]);
+      edited.current = rings;
       editing.value = {
         ring: draft.ring,
         onChanged: (ring) => {
-          dragged.current = ring;
+          rings.add(ring);
           set({ ring });
         },
       };
     }
-    if (busy) dragged.current = null;
   }, [draft.source, draft.ring, busy]);
   useEffect(
     () => () => {
