@@ -19,10 +19,12 @@ from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.decisions.deciding import Decider
 from app.missions.flight.decisions.decision import limits_of_decisions, make_constraints, make_planner
 from app.missions.flight.decisions.step_maps import StepMaps
+from app.missions.flight.legs.asides import Asides
 from app.missions.flight.legs.commit import LegCommit, committed_leg
 from app.missions.flight.legs.dispatch import GIVEN_UP, Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.giving_way import GivingWay
+from app.missions.flight.legs.keeping_off import KeepingOff, KeepOutZones
 from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
@@ -81,7 +83,10 @@ class Runner:
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
         self._range = EnergyRange(live, constraints, self._committing)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
-        self._giving_way = GivingWay(live, constraints, self._committing, self._dispatch, time_scale)
+        zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
+        asides = Asides(live, self._committing, self._dispatch)
+        self._keeping_off = KeepingOff(live, constraints, zones, asides, time_scale)
+        self._giving_way = GivingWay(live, constraints, self._committing, zones, asides, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
         self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)
@@ -99,6 +104,7 @@ class Runner:
             asyncio.create_task(self._watch.keep()),
             asyncio.create_task(self._withdrawals.keep()),
             asyncio.create_task(self._onboard.keep()),
+            asyncio.create_task(self._keeping_off.keep()),
             asyncio.create_task(self._giving_way.keep()),
         ]
         try:

@@ -17,17 +17,15 @@ import structlog
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.motion.timeline import Timeline, closest_approach
-from app.missions.fleet.interface import WaypointOrder
 from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.decisions.separation import planned_places, ways_aside
+from app.missions.flight.legs.asides import Asides, Because, depth_now_m, steered_ahead
 from app.missions.flight.legs.commit import LegCommit
-from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.legs.keeping_off import KeepOutZones
 from app.missions.flight.observation.waiting import until_next_look
-from app.missions.flight.steering import steered_motion
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
-from app.missions.spec.vehicle import Guidance
 from app.missions.team import OUT_OF_REACH, Member
 from app.missions.views.mission import Level
 
@@ -70,14 +68,6 @@ class _Imminent:
         return self.motion.at(np.zeros(1))[0, :2]
 
 
-@dataclass
-class _Giving:
-    order: WaypointOrder
-    """What it goes on with."""
-    since_s: float
-    """The event loop's time."""
-
-
 class GivingWay:
     """Looks at the vehicles of one running mission, and has them give way.
 
@@ -92,15 +82,16 @@ class GivingWay:
         live: LiveMission,
         constraints: Constraints,
         committing: LegCommit,
-        dispatch: Dispatch,
+        zones: KeepOutZones,
+        asides: Asides,
         time_scale: float,
     ) -> None:
         self._live = live
         self._constraints = constraints
         self._committing = committing
-        self._dispatch = dispatch
+        self._zones = zones
+        self._asides = asides
         self._time_scale = time_scale
-        self._giving: dict[str, _Giving] = {}
 
     async def keep(self) -> None:
         """Go on until cancelled."""
@@ -114,7 +105,6 @@ class GivingWay:
 
     async def look(self) -> None:
         """Look once at everybody."""
-        self._giving = {name: giving for name, giving in self._giving.items() if self._still_gives(name, giving)}
         near = {member.name: self._imminent(member) for member in self._may_meet()}
         await self._let_go_on(near)
         settled: set[str] = set()
@@ -123,22 +113,17 @@ class GivingWay:
                 settled |= {one.member.name, other.member.name}
                 await self._keep_apart(one, other, near)
 
-    def _still_gives(self, name: str, giving: _Giving) -> bool:
-        """Whether a vehicle was not led elsewhere since."""
-        member = self._live.team.get(name)
-        return member is not None and member.ordered and member.order is giving.order and member.waits_m is not None
-
     def _imminent(self, member: Member) -> _Imminent:
         """Return where a vehicle will be, as it is led now."""
-        if member.name not in self._giving:
+        if member.waits_m is None:
             return self._going_on(member)
-        depth_m = _depth_m(member)
+        depth_m = depth_now_m(member)
         return _Imminent(member, self._motion_to(member, member.waits_m), depth_m, depth_m, self._circle_m(member))
 
     def _going_on(self, member: Member) -> _Imminent:
         """Return where a vehicle will be on its way."""
         places, age_s = planned_places(member, self._live), self._age_s(member)
-        motion = self._steered(member, places, WAITING_S + age_s)
+        motion = steered_ahead(self._live, member, places, WAITING_S + age_s)
         motion = Timeline(motion.time_s - age_s, motion.place_m)
         depths_m = [float(place[2]) for place in places[:2]]
         around_m = self._circle_m(member) if len(places) == 1 else 0.0
@@ -196,11 +181,13 @@ class GivingWay:
         best_m, best = self._nearest_m(one, other) + CLOSING_M, None
         enough_m = CLEAR * self._live.spec.limits.min_separation_m
         for it in pair:
-            if not self._may_wait(it.member):
+            if not self._asides.may_lead(it.member, Because.VEHICLE):
                 continue
             others = [that for name, that in near.items() if name != it.member.name]
             for place_m in self._places(it.member):
                 motion, around_m = self._motion_to(it.member, place_m), self._circle_m(it.member)
+                if self._zones.entered_by(motion.place_m[:, :2]):
+                    continue
                 waiting = _Imminent(it.member, motion, it.least_m, it.most_m, around_m)
                 nearest_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
                 if nearest_m > best_m:
@@ -212,11 +199,6 @@ class GivingWay:
         if best is not None:
             member, place_m = best
             await self._give_way(member, place_m, other.member if member is one.member else one.member)
-
-    def _may_wait(self, member: Member) -> bool:
-        waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
-        # Orders by sound, and plans, take longer than there is.
-        return waits and member.spec.guidance is Guidance.FOLLOW and member.present and member.busy
 
     def _places(self, member: Member) -> list[FloatArray]:
         """Return where a vehicle may wait, each (2,): where it is, else wherever its limits allow."""
@@ -234,36 +216,20 @@ class GivingWay:
 
     def _motion_to(self, member: Member, place_m: FloatArray | None) -> Timeline:
         """Return a vehicle's motion to a place where it waits."""
-        here = np.append(member.place_m(self._live.frame), _depth_m(member))
+        here = np.append(member.place_m(self._live.frame), depth_now_m(member))
         if place_m is None or math.dist(place_m, here[:2]) < CLOSING_M:
             return Timeline(np.zeros(1), here[None])
-        return self._steered(member, [here, np.append(place_m, here[2])], WAITING_S)
-
-    def _steered(self, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
-        spec, told_rad = self._live.spec, None if member.report is None else member.report.heading_rad
-        heading_rad = math.nan if told_rad is None else told_rad
-        speed_mps, radius_m = spec.speed_of(member.spec), turn_radius_m(spec, member.spec)
-        return steered_motion(places, heading_rad, speed_mps, radius_m, self._live.team.current_mps, until_s)
+        return steered_ahead(self._live, member, [here, np.append(place_m, here[2])], WAITING_S)
 
     async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
-        order = self._committing.waiting_at(member, place_m)
-        if order is None or member.order is None:
-            return
-        again = member.name in self._giving
-        if not again:
-            self._giving[member.name] = _Giving(member.order, asyncio.get_running_loop().time())
-        await self._dispatch.stay(member, order)
-        if member.waits_m is None:
-            self._giving.pop(member.name, None)  # it refused
-        if again or member.waits_m is None:
-            return
-        words = f"{member.name} gives way to {other.name}"
-        await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name)
+        if await self._asides.lead(member, place_m, Because.VEHICLE):
+            words = f"{member.name} gives way to {other.name}"
+            await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name)
 
     async def _let_go_on(self, near: dict[str, _Imminent]) -> None:
         """Send vehicles on that would stay clear of the others now, or have waited long."""
         now_s = asyncio.get_running_loop().time()
-        for name, giving in list(self._giving.items()):
+        for name, giving in self._asides.of(Because.VEHICLE).items():
             if name not in near or not near[name].member.present:
                 continue
             member = near[name].member
@@ -272,17 +238,10 @@ class GivingWay:
             least_m = CLEAR * self._live.spec.limits.min_separation_m
             clear = not any(self._too_close(on, that, least_m) for other, that in near.items() if other != name)
             if clear or waited_s * self._time_scale >= PATIENCE_S:
-                del self._giving[name]
-                member.waits_m = None
-                member.leg_began_s += waited_s
                 near[name] = on
-                await self._dispatch.send(member)
+                await self._asides.lead_on(member)
 
 
 def _is_out(member: Member) -> bool:
     """Whether a vehicle is in the water, and not where it was to be in the end."""
     return member.report is not None and not (member.withdrawal is not None and member.withdrawal.over)
-
-
-def _depth_m(member: Member) -> float:
-    return 0.0 if member.report is None else member.report.position.depth_m

@@ -1,88 +1,36 @@
 """Vehicles that are about to meet: one gives way, and flies its leg when the other is past."""
 
-import asyncio
-import math
-
 import numpy as np
 import pytest
 
 from app.commands.home import fly_mission
 from app.exploration.lines import lawnmower
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.fleet.hub import FleetHub, VehicleKey
-from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, VehicleReport, WaypointOrder
-from app.missions.fleet.interface import WaypointStatus as Status
-from app.missions.flight.decisions.decision import make_constraints
-from app.missions.flight.legs.commit import NO_LEG, LegCommit
-from app.missions.flight.legs.dispatch import Dispatch
-from app.missions.flight.legs.giving_way import PATIENCE_S, GivingWay
-from app.missions.live.mission import LiveMission
+from app.missions.fleet.interface import LinkState
+from app.missions.flight.legs.asides import Because
+from app.missions.flight.legs.commit import NO_LEG
+from app.missions.flight.legs.giving_way import PATIENCE_S
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
-from app.missions.team import Member, Withdrawal
+from app.missions.team import Withdrawal
 from tests.support.missions.harbour import sim_spec
+from tests.support.missions.placed import Place, PlacedVehicles
 from tests.support.missions.specs import LAT, LON
-
-Place = tuple[float, float, float]
 
 HERE, THERE = (5.0, 30.0, 3.0), (50.0, 30.0, 3.0)
 
 
-class Scene:
-    """Two vehicles of a mission that are placed by hand, and what they are ordered."""
-
-    def __init__(self, live: LiveMission, hub: FleetHub, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.live = live
-        self.ordered: list[WaypointOrder] = []
-        constraints = make_constraints(live.spec)
-        committing = LegCommit(live, constraints, leads=False)
-        dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
-        self.giving_way = GivingWay(live, constraints, committing, dispatch, 1.0)
-        for slot, vehicle in enumerate(live.spec.vehicles):
-            member = live.team.get(vehicle.name) or live.team.join(vehicle, slot)
-            member.capabilities = LinkCapabilities(simulated=True)
-            member.followed = member.engaged = True
-
-        async def order(key: VehicleKey, order: WaypointOrder) -> None:
-            self.ordered.append(order)
-
-        monkeypatch.setattr(hub, "order", order)
-
-    def put(self, name: str, at: Place, to: Place, *, time_s: float = 100.0) -> Member:
-        """Let a vehicle be somewhere, and fly to somewhere."""
-        member = self.live.team.members[name]
-        member.link = LinkState.ENGAGED
-        heading_rad = math.atan2(to[0] - at[0], to[1] - at[1])
-        member.report = VehicleReport(name, time_s, self._position(at), heading_rad=heading_rad)
-        order = member.order
-        if order is None:
-            order = WaypointOrder(self.live.id, 1, name, self._position(to), 1.0, 3.0, 1.0)
-            member.set_order(order, np.array(to[:2]))
-            member.leg_began_s = asyncio.get_running_loop().time()
-        member.status = Status.ACKNOWLEDGED
-        return member
-
-    def _position(self, place: Place) -> Position:
-        lat, lon = self.live.frame.to_geographic(np.array(place[0]), np.array(place[1]))
-        return Position(float(lat), float(lon), place[2])
-
-    def where_m(self, order: WaypointOrder) -> tuple[float, float]:
-        """Return where an order leads, east and north."""
-        east, north = self.live.frame.to_local(order.position.lat_deg, order.position.lon_deg)
-        return float(east), float(north)
-
-
 @pytest.fixture
-async def scene(service: MissionService, monkeypatch: pytest.MonkeyPatch) -> Scene:
+async def scene(service: MissionService, monkeypatch: pytest.MonkeyPatch) -> PlacedVehicles:
     limits = {"max_step_m": 20.0, "min_separation_m": 5.0}
     live = await service.get((await service.create(sim_spec("a", "b", side_m=60.0, limits=limits))).id)
-    return Scene(live, service.hub, monkeypatch)
+    return PlacedVehicles(live, service.hub, monkeypatch)
 
 
 async def test_of_two_that_head_for_each_other_the_second_gives_way_and_goes_on_when_the_first_is_past(
-    scene: Scene,
+    scene: PlacedVehicles,
 ) -> None:
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     second = scene.put("b", THERE, (1.0, 30.0, 3.0))
@@ -109,28 +57,28 @@ async def test_of_two_that_head_for_each_other_the_second_gives_way_and_goes_on_
     ],
     ids=["a metre deeper", "beside it", "ahead of it, as fast"],
 )
-async def test_who_meets_nobody_flies_on(scene: Scene, at: Place, to: Place) -> None:
+async def test_who_meets_nobody_flies_on(scene: PlacedVehicles, at: Place, to: Place) -> None:
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     scene.put("b", at, to)
     await scene.giving_way.look()
     assert scene.ordered == []
 
 
-async def test_a_vehicle_that_climbs_through_anothers_depth_meets_it(scene: Scene) -> None:
+async def test_a_vehicle_that_climbs_through_anothers_depth_meets_it(scene: PlacedVehicles) -> None:
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     scene.put("b", (50.0, 30.0, 6.0), (1.0, 30.0, 0.0))
     await scene.giving_way.look()
     assert [order.step for order in scene.ordered] == [NO_LEG]
 
 
-async def test_who_surveys_gives_way_to_who_goes_home(scene: Scene) -> None:
+async def test_who_surveys_gives_way_to_who_goes_home(scene: PlacedVehicles) -> None:
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     scene.put("b", THERE, (1.0, 30.0, 3.0)).withdrawal = Withdrawal(Response.RETURN, "its energy", led=True)
     await scene.giving_way.look()
     assert {order.vehicle for order in scene.ordered} == {"a"}
 
 
-async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: Scene) -> None:
+async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: PlacedVehicles) -> None:
     scene.put("a", (30.0, 1.0, 3.0), (30.0, 55.0, 3.0), time_s=120.0)
     # It was 33 m away when it was heard last, ten seconds ago: alone where it was then it would meet nobody.
     scene.put("b", (1.0, 16.0, 3.0), (59.0, 16.0, 3.0), time_s=110.0).link = LinkState.LOST
@@ -138,12 +86,12 @@ async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: Scene) -> N
     assert {order.vehicle for order in scene.ordered} == {"a"}
 
 
-async def test_who_waits_waits_no_longer_than_a_minute(scene: Scene) -> None:
+async def test_who_waits_waits_no_longer_than_a_minute(scene: PlacedVehicles) -> None:
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     second = scene.put("b", THERE, (1.0, 30.0, 3.0))
     await scene.giving_way.look()
     began_s = second.leg_began_s
-    scene.giving_way._giving["b"].since_s -= PATIENCE_S
+    scene.asides.of(Because.VEHICLE)["b"].since_s -= PATIENCE_S
     await scene.giving_way.look()
     assert scene.ordered[1] is second.order
     assert second.leg_began_s == pytest.approx(began_s + PATIENCE_S, abs=5.0)

@@ -1,0 +1,100 @@
+"""Leads vehicles aside from their legs for a while, and on again."""
+
+import asyncio
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from app.arrays import FloatArray
+from app.exploration.motion.timeline import Timeline
+from app.missions.fleet.interface import WaypointOrder
+from app.missions.flight.decisions.decision import turn_radius_m
+from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.dispatch import Dispatch
+from app.missions.flight.steering import steered_motion
+from app.missions.live.mission import LiveMission
+from app.missions.spec.vehicle import Guidance
+from app.missions.team import Member
+
+
+class Because(StrEnum):
+    """Why a vehicle is led aside."""
+
+    VEHICLE = "another vehicle is about to pass"
+    ZONE = "it would turn into a keep-out zone"
+
+
+@dataclass
+class Aside:
+    """A vehicle that is led aside."""
+
+    because: Because
+    order: WaypointOrder
+    """What it goes on with."""
+    since_s: float
+    """The event loop's time."""
+
+
+class Asides:
+    """The vehicles of one running mission that are led aside: each for one reason at a time."""
+
+    def __init__(self, live: LiveMission, committing: LegCommit, dispatch: Dispatch) -> None:
+        self._live = live
+        self._committing = committing
+        self._dispatch = dispatch
+        self._led: dict[str, Aside] = {}
+
+    def of(self, because: Because) -> dict[str, Aside]:
+        """Return who is led aside for a reason, by name; those who were led elsewhere since are forgotten."""
+        self._led = {name: aside for name, aside in self._led.items() if self._lasts(name, aside)}
+        return {name: aside for name, aside in self._led.items() if aside.because is because}
+
+    def may_lead(self, member: Member, because: Because) -> bool:
+        """Whether a vehicle that has a leg can be led aside by orders that it gets at once."""
+        waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
+        # Orders by sound, and plans, take longer than there is.
+        follows = waits and member.spec.guidance is Guidance.FOLLOW and member.present and member.busy
+        led = self._led.get(member.name)
+        return follows and (led is None or led.because is because)
+
+    async def lead(self, member: Member, place_m: FloatArray, because: Because) -> bool:
+        """Lead a vehicle to a place (2,) where it stays; whether it flew its leg until now, and takes this order."""
+        order = self._committing.waiting_at(member, place_m)
+        if order is None or member.order is None:
+            return False
+        begins = member.name not in self._led
+        if begins:
+            self._led[member.name] = Aside(because, member.order, asyncio.get_running_loop().time())
+        await self._dispatch.stay(member, order)
+        if member.waits_m is None:
+            self._led.pop(member.name, None)  # it refused
+        return begins and member.waits_m is not None
+
+    async def lead_on(self, member: Member) -> None:
+        """Have a vehicle go on with its leg."""
+        aside = self._led.pop(member.name)
+        member.waits_m = None
+        member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
+        await self._dispatch.send(member)
+
+    def _lasts(self, name: str, aside: Aside) -> bool:
+        member = self._live.team.get(name)
+        return member is not None and member.ordered and member.order is aside.order and member.waits_m is not None
+
+
+def steered_ahead(live: LiveMission, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
+    """Return how a vehicle will steer for one place (3,) after the other in the current, from where it heads now."""
+    heading_rad = None if member.report is None else member.report.heading_rad
+    return steered_motion(
+        places,
+        math.nan if heading_rad is None else heading_rad,
+        live.spec.speed_of(member.spec),
+        turn_radius_m(live.spec, member.spec),
+        live.team.current_mps,
+        until_s,
+    )
+
+
+def depth_now_m(member: Member) -> float:
+    """Return how deep a vehicle is, as far as it told."""
+    return 0.0 if member.report is None else member.report.position.depth_m
