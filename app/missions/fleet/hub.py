@@ -1,6 +1,7 @@
 """All links together: which vehicles exist, how they are, and which mission hears of which vehicle."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import structlog
 
@@ -29,6 +30,12 @@ SWITCHED_OFF = LinkCapabilities(ready_before_start=True)
 log = structlog.get_logger(__name__)
 
 
+class _Claim(NamedTuple):
+    mission_id: str
+    called: str
+    sink: EventSink
+
+
 class FleetHub:
     """Routes commands to the link that reaches a vehicle, and its events to the mission that claimed it."""
 
@@ -37,7 +44,7 @@ class FleetHub:
         polled = {kind: link.polled_vehicles for kind, link in self._links.items()}
         self.polled = {kind: vehicles for kind, vehicles in polled.items() if vehicles is not None}
         """By kind: who is told of the requests of vehicles that poll."""
-        self._claims: dict[VehicleKey, tuple[str, EventSink]] = {}
+        self._claims: dict[VehicleKey, _Claim] = {}
 
     async def start(self) -> None:
         """Open every link."""
@@ -95,18 +102,23 @@ class FleetHub:
     def claimed_by(self, key: VehicleKey) -> str | None:
         """Return the id of the mission a vehicle takes part in."""
         claim = self._claims.get(key)
-        return claim[0] if claim else None
+        return claim.mission_id if claim else None
 
-    def claim(self, key: VehicleKey, mission_id: str, sink: EventSink) -> None:
+    def owner_of(self, key: VehicleKey) -> str:
+        """Return what the mission that a vehicle takes part in is called; '' without one."""
+        claim = self._claims.get(key)
+        return claim.called if claim else ""
+
+    def claim(self, key: VehicleKey, mission_id: str, sink: EventSink, *, name: str) -> None:
         """Give a vehicle's events to a mission. Raises ConflictError when another one has it."""
         owner = self.claimed_by(key)
         if owner not in (None, mission_id):
             raise ConflictError(
-                f"vehicle {key[1]!r} takes part in mission {owner}",
+                f"vehicle {key[1]!r} takes part in mission {self.owner_of(key)}",
                 f"finish or abort that mission, or take the vehicle out of it: "
                 f"DELETE /api/v1/missions/{owner}/vehicles/{key[1]}",
             )
-        self._claims[key] = (mission_id, sink)
+        self._claims[key] = _Claim(mission_id, called(name, mission_id), sink)
 
     def release(self, key: VehicleKey, mission_id: str) -> None:
         """Give up a vehicle; nothing happens when the mission does not have it."""
@@ -165,6 +177,11 @@ class FleetHub:
         def receive(event: FleetEvent) -> None:
             claim = self._claims.get((kind, event.vehicle))
             if claim is not None:
-                claim[1](event)
+                claim.sink(event)
 
         return receive
+
+
+def called(name: str, mission_id: str) -> str:
+    """Return how people are told of a mission: its name need not be unique."""
+    return f"{name!r} ({mission_id})"

@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from pyproj import Geod
 from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
 from app.arrays import FloatArray
 from app.missions.clock import now
-from app.missions.fleet.interface import LinkState
+from app.missions.fleet.interface import LinkState, Position
 from app.missions.flight.decisions.decision import INSET_M, from_outside, make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
@@ -19,7 +20,6 @@ from app.missions.preflight.swath import swath_checks
 from app.missions.safety.free_space import WAITING_CIRCLE_M, way_in
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
-from app.missions.team import Member
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
 
 FAR_M = 500.0
@@ -78,7 +78,7 @@ def _vehicles(live: LiveMission) -> Iterator[CheckView]:
                 id=f"link.{member.name}",
                 title=title,
                 status=PROBLEM,
-                message=f"it takes part in mission {owner}",
+                message=f"it takes part in mission {live.hub.owner_of(member.key)}",
                 remedy="This mission follows that one, and begins by itself when that one is flown to its end"
                 if owner == live.spec.after
                 else "Finish or abort that mission, or take the vehicle out of one of them",
@@ -129,11 +129,16 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
     constraints = make_constraints(live.spec)
     inner = Polygon(constraints.area)
     for member in live.team:
-        place = _place(live, member)
-        if place is None:
+        report = member.report or live.hub.info(member.key).report
+        if report is None:
             continue
-        distance = area.distance(place)
         name, title = f"place.{member.name}", f"Place of {member.name}"
+        en = local_place(live.frame, report.position)
+        if en is None:
+            yield _far_away(live, report.position, name, title)
+            continue
+        place = Point(en)
+        distance = area.distance(place)
         if any(zone.contains(place) for zone in zones):
             yield CheckView(
                 id=name,
@@ -167,12 +172,19 @@ def _en_m(place: Point) -> FloatArray:
     return np.array([place.x, place.y])
 
 
-def _place(live: LiveMission, member: Member) -> Point | None:
-    report = member.report or live.hub.info(member.key).report
-    if report is None:
-        return None
-    place = local_place(live.frame, report.position)
-    return Point(place) if place is not None else Point(1e7, 1e7)
+def _far_away(live: LiveMission, position: Position, name: str, title: str) -> CheckView:
+    """Return what is told of a vehicle so far away that the mission's flat frame does not reach it."""
+    frame = live.frame
+    _, _, away_m = Geod(ellps="WGS84").inv(
+        frame.origin_lon_deg, frame.origin_lat_deg, position.lon_deg, position.lat_deg
+    )
+    return CheckView(
+        id=name,
+        title=title,
+        status=WARNING,
+        message=f"it is {away_m / 1000.0:.0f} km from the area",
+        remedy="Is it the right vehicle, and the right area? It may also have no fix yet",
+    )
 
 
 def _depths(live: LiveMission) -> Iterator[CheckView]:

@@ -6,7 +6,7 @@ import numpy as np
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.errors import ConflictError
-from app.missions.fleet.hub import FleetHub
+from app.missions.fleet.hub import FleetHub, called
 from app.missions.fleet.interface import Deployment, LinkState, VehicleRefusedError
 from app.missions.live.mission import LiveMission
 from app.missions.search.site import simulated_world
@@ -27,15 +27,15 @@ def free_elsewhere(live: LiveMission, vehicles: Sequence[VehicleSpec] | None = N
     async def check(session: AsyncSession) -> None:
         await processes.stand_in_line(session)
         taken = await processes.missions_with_vehicles(session, AT_SEA, wanted, live.id)
-        for (_, name), mission_id in taken.items():
-            raise _taken(name, mission_id)
+        for (_, name), mission in taken.items():
+            raise _taken(name, called(*mission))
 
     return check
 
 
-def _taken(vehicle: str, mission_id: str) -> ConflictError:
+def _taken(vehicle: str, mission: str) -> ConflictError:
     return ConflictError(
-        f"vehicle {vehicle!r} takes part in mission {mission_id}",
+        f"vehicle {vehicle!r} takes part in mission {mission}",
         "finish or abort that mission, or take the vehicle out of one of them",
     )
 
@@ -53,7 +53,7 @@ class Claims:
         for member in live.team:
             owner = self._hub.claimed_by(member.key)
             if owner not in (None, live.id):
-                raise _taken(member.name, owner)
+                raise _taken(member.name, self._hub.owner_of(member.key))
 
     def check_links(self, live: LiveMission) -> None:
         """Refuse to start while a vehicle that has to be ready before is not. Raises ConflictError."""
@@ -81,7 +81,7 @@ class Claims:
     def claim(self, live: LiveMission, vehicle: VehicleSpec) -> None:
         """Take one vehicle, whose link prepares it. Raises ConflictError."""
         key = (vehicle.kind, vehicle.name)
-        self._hub.claim(key, live.id, live.receive)
+        self._hub.claim(key, live.id, live.receive, name=live.spec.name)
         try:
             self._hub.deploy(_deployment(live, vehicle))
         except VehicleRefusedError as error:

@@ -81,7 +81,8 @@ class TeamChanges:
         owner = self._hub.claimed_by(member.key)
         if owner is not None:
             raise ConflictError(
-                f"the mission is {live.header.state}, and vehicle {member.name!r} takes part in mission {owner} now",
+                f"the mission is {live.header.state}, and vehicle {member.name!r} takes part in mission "
+                f"{self._hub.owner_of(member.key)} now",
                 f"stop it there: POST /api/v1/missions/{owner}/vehicles/{member.name}/abort",
             )
         return await self._supervisor.stop_vehicle(live, member)

@@ -62,11 +62,11 @@ async def stand_in_line(session: AsyncSession) -> None:
 
 async def missions_with_vehicles(
     session: AsyncSession, states: Sequence[str], vehicles: Iterable[tuple[str, str]], other_than: str
-) -> dict[tuple[str, str], str]:
-    """Return which of the vehicles (kind, name) take part in which other mission in any of ``states``."""
+) -> dict[tuple[str, str], tuple[str, str]]:
+    """Return which of the vehicles (kind, name) take part in another mission in any of ``states``: its name and id."""
     wanted = set(vehicles)
     query = (
-        select(MissionVehicleRow.spec, MissionVehicleRow.name, MissionVehicleRow.mission_id)
+        select(MissionVehicleRow.spec, MissionVehicleRow.name, MissionRow.name, MissionRow.id)
         .join(MissionRow, MissionRow.id == MissionVehicleRow.mission_id)
         .where(
             MissionRow.state.in_(states),
@@ -76,5 +76,5 @@ async def missions_with_vehicles(
         )
     )
     rows = await session.execute(query)
-    found = {(str(spec["kind"]), name): mission_id for spec, name, mission_id in rows}
-    return {key: mission_id for key, mission_id in found.items() if key in wanted}
+    found = {(str(spec["kind"]), vehicle): (name, mission_id) for spec, vehicle, name, mission_id in rows}
+    return {key: mission for key, mission in found.items() if key in wanted}

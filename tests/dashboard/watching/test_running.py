@@ -84,7 +84,7 @@ def test_the_checklist_names_what_stands_in_the_way_and_lets_go_once_it_is_gone(
     expect(by_id(page, "preflight")).to_have_attribute("data-ready", "false")
     link = by_id(page, "check-link.rover")
     expect(link).to_have_attribute("data-status", "problem")
-    expect(link).to_contain_text(f"it takes part in mission {first}")
+    expect(link).to_contain_text(f"it takes part in mission 'First come' ({first})")
     expect(by_id(page, "check-tide")).to_contain_text("no tide is applied")
     expect(by_id(page, "confirm-start")).to_be_disabled()
     service.act(first, "abort")

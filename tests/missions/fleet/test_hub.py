@@ -49,9 +49,9 @@ async def test_events_reach_the_mission_that_claimed_the_vehicle_and_no_other(
 ) -> None:
     first: list[FleetEvent] = []
     second: list[FleetEvent] = []
-    hub.claim(A, "m1", first.append)
-    hub.claim((VehicleKind.REST, "b"), "m2", second.append)
-    hub.claim((VehicleKind.SIM, "a"), "m2", second.append)
+    hub.claim(A, "m1", first.append, name="One")
+    hub.claim((VehicleKind.REST, "b"), "m2", second.append, name="Two")
+    hub.claim((VehicleKind.SIM, "a"), "m2", second.append, name="Two")
     rest.heard(report())
     assert report() in first
     assert second == []
@@ -61,15 +61,15 @@ async def test_events_reach_the_mission_that_claimed_the_vehicle_and_no_other(
 
 
 async def test_a_vehicle_belongs_to_one_mission_at_a_time(hub: FleetHub) -> None:
-    hub.claim(A, "m1", lambda _: None)
-    hub.claim(A, "m1", lambda _: None)
-    with pytest.raises(ConflictError, match="'a' takes part in mission m1") as caught:
-        hub.claim(A, "m2", lambda _: None)
+    hub.claim(A, "m1", lambda _: None, name="One")
+    hub.claim(A, "m1", lambda _: None, name="One")
+    with pytest.raises(ConflictError, match=r"'a' takes part in mission 'One' \(m1\)") as caught:
+        hub.claim(A, "m2", lambda _: None, name="Two")
     assert "DELETE" in caught.value.remedy
     hub.release(A, "m2")
     assert hub.claimed_by(A) == "m1"
     hub.release(A, "m1")
-    hub.claim(A, "m2", lambda _: None)
+    hub.claim(A, "m2", lambda _: None, name="Two")
     assert hub.claimed_by(A) == "m2"
 
 
@@ -78,7 +78,7 @@ async def test_what_is_known_of_a_vehicle(hub: FleetHub, rest: RestFleetLink) ->
     assert "never heard of" in hub.info(A).reason
     rest.heard(report())
     assert (hub.info(A).state, hub.info(A).report) == (LinkState.READY, report())
-    hub.claim(A, "m1", lambda _: None)
+    hub.claim(A, "m1", lambda _: None, name="One")
     assert [(info.name, owner) for info, owner in hub.vehicles()] == [("a", "m1")]
 
 
