@@ -84,8 +84,8 @@ class LocalFrame:
         if not np.all(near):
             i = np.unravel_index(int(np.argmin(near)), near.shape)
             raise ValueError(
-                f"position ({lat[i]}, {lon[i]}) is not within {MAX_EXTENT_M / 1000:.0f} km of the frame's "
-                f"origin ({self.origin_lat_deg}, {self.origin_lon_deg})"
+                f"position ({lat[i]}, {lon[i]}) is not within {MAX_EXTENT_M / 1000:.0f} km of "
+                f"({self.origin_lat_deg}, {self.origin_lon_deg}), where the map begins: choose a smaller area"
             )
         return east, north
 

@@ -82,7 +82,9 @@ class VehicleView(View):
         default="", description="Where it is that it must not be: in a keep-out zone or outside the area; else empty"
     )
     link: LinkState
-    reason: str = Field(default="", description="What is missing or wrong, and what to do; empty when all is well")
+    reason: str = Field(
+        default="", description="What is missing or wrong and what to do, or why it waits; empty: all is well"
+    )
     age_s: float | None = Field(default=None, description="Seconds since last heard; null: never")
     address: str | None = None
     imc_id: int | None = None

@@ -12,6 +12,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleReport
+from app.missions.flown import Phase
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.safety.free_space import CIRCLE_M
 from app.missions.spec.mission import MissionSpec
@@ -78,7 +79,7 @@ class VehicleViews:
             left_at=member.left_at,
             breach=self._breach(member.name),
             link=info.state,
-            reason=_reason(member, info),
+            reason=_reason(member, info) or _waits_for_the_others(member, self._spec),
             age_s=None if heard_s is None else rounded(max(now().timestamp() - heard_s, 0.0), 2),
             address=info.address,
             imc_id=info.imc_id,
@@ -195,6 +196,14 @@ def _reason(member: Member, info: VehicleInfo) -> str:
     launched = member.capabilities.simulated and info.state is LinkState.UNKNOWN and member.report is not None
     # Nothing is to be done about a simulated vehicle that was put away with its mission.
     return member.refusal.removeprefix(f"{member.name}: ") or ("" if launched else info.reason)
+
+
+def _waits_for_the_others(member: Member, spec: MissionSpec) -> str:
+    """Return why a vehicle that follows us is sent nowhere any more; '' where it surveys."""
+    begun = member.present and member.withdrawal is None and member.legs > 0
+    if not begun or member.flown.phase is not Phase.STOPPED or member.way_left_m(spec) > 0.0:
+        return ""
+    return "it has flown all of the length that it was given, and waits for the others"
 
 
 def local_place(frame: LocalFrame, position: Position) -> tuple[float, float] | None:

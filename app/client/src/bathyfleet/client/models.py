@@ -2506,7 +2506,7 @@ class VehicleView(Model):
     """Where it is that it must not be: in a keep-out zone or outside the area; else empty"""
     link: LinkState
     reason: str
-    """What is missing or wrong, and what to do; empty when all is well"""
+    """What is missing or wrong and what to do, or why it waits; empty: all is well"""
     age_s: float | None
     """Seconds since last heard; null: never"""
     address: str | None

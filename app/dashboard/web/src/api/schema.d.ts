@@ -7374,7 +7374,7 @@ export interface components {
             link: components["schemas"]["LinkState"];
             /**
              * Reason
-             * @description What is missing or wrong, and what to do; empty when all is well
+             * @description What is missing or wrong and what to do, or why it waits; empty: all is well
              * @default
              */
             reason: string;
