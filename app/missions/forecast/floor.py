@@ -44,6 +44,9 @@ DEPTH_SD = 0.4
 CELLS = 2500
 """Cells of a forecast's map at most: more make it slower, hardly other."""
 
+SMOOTH_SHARE = 0.4
+"""Of what an early map doubts so much is left between its soundings where the floor is smoother than it has it."""
+
 FLOOR_CELLS = 40_000
 """Cells of a floor at most: what is sounded of one with larger cells is smoother than the sea is."""
 
@@ -119,9 +122,10 @@ def floors_of(spec: MissionSpec, rows: FloatArray, deepest_m: float, depth_m: fl
             # Outside of the area, and where no map reaches, it goes on from the nearest place that is known.
             near = tuple(distance_transform_edt(~has, return_distances=False, return_indices=True))
             inner, hills = z[: grid.rows, : grid.cols], unit[: grid.rows, : grid.cols]
-            # Early maps of smooth floors doubt too much, those of rough ones do not: every other floor bounds it.
+            # Early maps of smooth floors doubt too much, those of rough ones do not: every other floor bounds it, and
+            # of the rest every other one has a part of it only.
             most_m = relief * middle if number % 2 == 0 else math.inf
-            rough_m = np.minimum(doubt, most_m)
+            rough_m = np.minimum(doubt * (SMOOTH_SHARE if number % 4 == 3 else 1.0), most_m)
             left = between(hills)
             apart_m = left * math.sqrt(np.mean(rough_m[has] ** 2) / max(float(np.mean(left[has] ** 2)), 1e-12))
             inner[:] = known[near] + np.where(has, apart_m, relief * middle * (hills - hills[near]))

@@ -17,7 +17,14 @@ from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
 from app.missions.flight.decisions.decision import make_constraints
 from app.missions.forecast.floor import forecast_cell_m, thinned
-from app.missions.forecast.ranges import DEVIATION_SD, WAY_SD, ForecastRange, range_of, with_unforeseen
+from app.missions.forecast.ranges import (
+    DEVIATION_SD,
+    WAY_SD,
+    ForecastRange,
+    coverages_with_unforeseen,
+    range_of,
+    with_unforeseen,
+)
 from app.missions.forecast.simulate import SOUNDINGS_A_CELL, Forecast, floors_under, fly_over, forecast
 from app.missions.forecast.swarm import SoFar
 from app.missions.forecast.swath_flight import sweeps
@@ -288,7 +295,8 @@ def _view(
 
     sds = with_unforeseen([f.mean_sd_m for f in flights if f.mean_sd_m is not None], DEVIATION_SD)
     durations = with_unforeseen([flight.duration_s for flight in flights], WAY_SD)
-    coverages, remainders = [flight.coverage_pct for flight in flights], [flight.remaining_pct for flight in flights]
+    coverages = [flight.coverage_pct for flight in flights]
+    remainders = [flight.remaining_pct for flight in flights]
     ways = {
         name: with_unforeseen([flight.distances_m[name] for flight in flights], WAY_SD)
         for name in flights[0].distances_m
@@ -301,7 +309,7 @@ def _view(
             for name, way in ways.items()
         ],
         coverage_pct=_median(coverages),
-        coverage_pct_range=range_of(coverages),
+        coverage_pct_range=range_of(coverages_with_unforeseen(coverages)),
         remaining_pct=_median(remainders),
         remaining_pct_range=range_of(remainders),
         mean_sd_m=_median(sds) if sds else None,

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
-from app.missions.forecast.ranges import ForecastRange, range_of
+from app.missions.forecast.ranges import WAY_SD, ForecastRange, range_of, with_unforeseen
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import with_reserve_s
@@ -146,12 +146,12 @@ def whole_view(flights: list[dict[str, WholeWay]], *, within_budget: bool) -> Wh
     """Return what flights over several floors came to, by vehicles' names."""
     names = list(flights[0])
     counts = {name: [flight[name].batteries for flight in flights] for name in names}
-    durations = [max(way.seconds for way in flight.values()) for flight in flights]
-    distances = [sum(way.distance_m for way in flight.values()) for flight in flights]
+    durations = with_unforeseen([max(way.seconds for way in flight.values()) for flight in flights], WAY_SD)
+    distances = with_unforeseen([sum(way.distance_m for way in flight.values()) for flight in flights], WAY_SD)
     vehicles = []
     for name in names:
         known = [count for count in counts[name] if count is not None]
-        ways_m = [flight[name].distance_m for flight in flights]
+        ways_m = with_unforeseen([flight[name].distance_m for flight in flights], WAY_SD)
         vehicles.append(
             WholeVehicleView(
                 vehicle=name,

@@ -131,7 +131,10 @@ def test_ranges_span_what_came_over_the_floors() -> None:
     view = request._view(spec, Forecast(flights, floors), "", 8)
     assert view.coverage_pct == 50.0
     # Of eleven figures the lowest is exceeded by all but one in twelve others: a little more than it is 10 %.
-    assert (view.coverage_pct_range.low, view.coverage_pct_range.high) == (pytest.approx(2.0), pytest.approx(98.0))
+    assert (view.coverage_pct_range.low, view.coverage_pct_range.high) == (
+        pytest.approx(2.0, abs=0.2),
+        pytest.approx(98.0, abs=0.2),
+    )
     assert view.duration_s_range.low < view.duration_s < view.duration_s_range.high
     assert view.mean_sd_m_range is not None
     assert 0.09 < view.mean_sd_m_range.low < view.mean_sd_m_range.high < 1.1
