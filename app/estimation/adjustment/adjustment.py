@@ -182,7 +182,7 @@ def adjusted(
         held_out = found.compare(held, by_fixes, tried)
         by_ties = held_out is not None and held_out.speaks_for_ties
         state = found.run(tried, np.ones(len(sections), dtype=bool), LAST_ROUNDS) if by_ties else by_fixes
-        offset, sd, before_sd = models.average(state.ties)
+        offset, sd, before_sd = models.average(state.ties, pool)
         shown = found.shown(state.ties if by_ties else tried.ties, offset, held, by_ties)
     return AdjustedTracks(nodes, offset, sd, before_sd, shown, held_out, by_ties)
 

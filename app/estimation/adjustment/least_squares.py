@@ -1,5 +1,6 @@
 """Errors of nodes by ties, fixes and how positions drift: one sparse least-squares problem, and several weighed."""
 
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -135,18 +136,22 @@ class DriftModels:
         )
         return replace(models[0], walk_m=walk, rate_mph=rate, rate_time_s=rate_time_s)
 
-    def average(self, ties: WeighedTies) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def average(self, ties: WeighedTies, pool: Executor) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return errors of nodes (m, 2) under ties, their deviations, and those by no fix or tie, over all models."""
         kept = np.flatnonzero(self._chance >= LEAST_SHARE * self._chance.max())
         chance = self._chance[kept] / self._chance[kept].sum()
-        solutions = [self._problems[k].solve(ties) for k in kept]
-        offsets = np.array([one.offset_m for one in solutions])
-        deviations = np.array([self._problems[k].deviations(one) for k, one in zip(kept, solutions, strict=True)])
+
+        def of_model(k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+            problem = self._problems[k]
+            solution = problem.solve(ties)
+            reckoned = LeastSquares(self._nodes, Fixes.none(), problem.model)
+            before = reckoned.deviations(reckoned.solve(WeighedTies.none()))
+            return solution.offset_m, problem.deviations(solution), before
+
+        offsets, deviations, before = map(np.array, zip(*pool.map(of_model, kept.tolist()), strict=True))
         mean = np.einsum("h,hmi->mi", chance, offsets)
         variance = np.einsum("h,hmi->mi", chance, deviations**2 + (offsets - mean) ** 2)
-        reckoned = [LeastSquares(self._nodes, Fixes.none(), self._problems[k].model) for k in kept]
-        before = [problem.deviations(problem.solve(WeighedTies.none())) for problem in reckoned]
-        before_variance = np.einsum("h,hmi->mi", chance, np.array(before) ** 2)
+        before_variance = np.einsum("h,hmi->mi", chance, before**2)
         return mean, np.sqrt(variance), np.sqrt(before_variance)
 
 
