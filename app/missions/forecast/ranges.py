@@ -12,8 +12,8 @@ WAY_SD = 0.035
 """Standard deviation, as a share, of how much longer or shorter ways come out than they are flown ahead: vehicles wait
 for others, turn wider and drift."""
 
-DEVIATION_SD = 0.05
-"""The same of a map's mean deviation: fewer soundings are flown ahead than at sea."""
+DEVIATION_SD = 0.15
+"""The same of a map's mean deviation: fewer soundings are flown ahead than at sea, over larger cells."""
 
 COVERAGE_SD_PCT = 0.2
 """Standard deviation, in percentage points, of how much more or less of an area is covered than is flown ahead: a
