@@ -2,12 +2,16 @@
 
     python -m benchmarks.mapping.adjustment [--terrains FOLDER] [--set own|unseen] [--seeds 0 1 2] [--drifts 3 6 10]
         [--single-beam] [--jobs 2] [--write]
+    python -m benchmarks.mapping.adjustment --hour [--seeds 0 1 2] [--write]
 
 The surveys of ``bathyfleet evaluate adjust``, two vehicles each. *own* are the floors of a folder, of which some were
 looked at while the adjustment was made; *unseen* generated floors, one of each family, none of which was. Every row
 is one floor: means of all seeds and drifts and in brackets the worst, after over before, where before is by reckoned
 positions; how often ties were used (else fixes alone); and how many of the errors that are left lie within their 95
 %. ``relief`` is the RMS of the floor about a plane: floors of less than 0.3 m are summed up as flat.
+
+``--hour`` tells how long it takes to adjust what four vehicles with swath sonars measured in an hour, one after the
+other.
 """
 
 import argparse
@@ -28,6 +32,7 @@ from simulator.floors.terrain import Terrain
 from simulator.floors.terrain_files import load_terrain
 
 UNSEEN_SEED, UNSEEN_SIDE_M = 9203, 100.0
+HOUR_SIDE_M, HOUR_FAMILY, HOUR_VEHICLES = 290.0, "rugged", 4
 FLAT_M = 0.3
 RATIOS = ("position_error_ratio", "rmse_ratio", "ties_rms_ratio")
 NAMES = dict(zip(RATIOS, ("position", "map", "held-out ties"), strict=True))
@@ -65,6 +70,19 @@ def row(runs: Sequence[dict[str, Any]]) -> str:
     return f"{', '.join(parts)}, by ties {by_ties} of {len(runs)}, within {within:.0f} %"
 
 
+def hour(seeds: Sequence[int], file: Path | None) -> None:
+    """Print how long adjusting an hour's tracks takes."""
+    rows = {}
+    for seed in seeds:
+        terrain = generate(HOUR_FAMILY, UNSEEN_SEED + seed, width_m=HOUR_SIDE_M, height_m=HOUR_SIDE_M)
+        scenario = DriftScenario(terrain, 6.0, vehicles=HOUR_VEHICLES, seed=seed, largest_m=HOUR_SIDE_M)
+        [run] = run_jobs([AdjustJob(scenario)], 1)
+        by = "ties" if run["by_ties"] else "fixes"
+        rows[f"seed {seed}"] = f"{run['minutes']:.0f} minutes each: {run['seconds']:.1f} s, by {by}"
+        print(rows[f"seed {seed}"])
+    write_section(file, ADJUSTMENT, "How long an hour of four vehicles takes", rows, seeds=seeds)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and print it."""
     parser = make_parser(__doc__, ADJUSTMENT, seeds=(0, 1, 2))
@@ -73,7 +91,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--drifts", type=float, nargs="+", default=[6.0], help="metres, RMS, at the end of a dive")
     parser.add_argument("--single-beam", action="store_true")
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--hour", action="store_true", help="how long an hour's tracks take")
     options = parser.parse_args(arguments)
+    if options.hour:
+        hour(options.seeds, options.write)
+        return
     if options.set == "own" and options.terrains is None:
         parser.error("--set own needs --terrains FOLDER")
     jobs = {

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
 from app.arrays import FloatArray, IntArray
@@ -38,14 +39,15 @@ class Solution:
     Attributes
     ----------
     offset_m
-    factors
-        Of the normal matrix.
+    normal, factors
+        The normal matrix (2 u, 2 u), and its factors.
     ties
     log_evidence
         Logarithm of how probable what was measured is by the drift model, less what is the same for all models.
     """
 
     offset_m: FloatArray
+    normal: sparse.csc_array
     factors: SuperLU
     ties: WeighedTies
     log_evidence: float
@@ -86,7 +88,7 @@ class LeastSquares:
         found = factors.solve(right)
         offset = np.column_stack([found[: self._m], found[self._each : self._each + self._m]])
         log_evidence = self._log_prior - _half_log_det(factors) + 0.5 * float(right @ found)
-        return Solution(offset, factors, ties, log_evidence)
+        return Solution(offset, normal, factors, ties, log_evidence)
 
     def covariances(self, solution: Solution, compared: sparse.csr_array) -> FloatArray:
         """Return the covariances (k, 2, 2) of combinations (k, m) of the nodes' errors."""
@@ -104,10 +106,24 @@ class LeastSquares:
         return 0.5 * (found + found.transpose(0, 2, 1))
 
     def deviations(self, solution: Solution) -> FloatArray:
-        """Return the standard deviations (m, 2) of the nodes' errors."""
-        every_node = sparse.csr_array(sparse.identity(self._m, format="csr"))
-        covariances = self.covariances(solution, every_node)
-        return np.asarray(np.sqrt(np.maximum(np.einsum("kii->ki", covariances), 0.0)))
+        """Return the standard deviations (m, 2) of the nodes' errors.
+
+        Nodes that nothing connects, as those of vehicles without ties, have a column of the inverse in common.
+        """
+        _, part = connected_components(solution.normal, directed=False)
+        variance = np.zeros((self._m, 2))
+        for i in range(2):
+            unknown = i * self._each + np.arange(self._m)
+            order = np.argsort(part[unknown], kind="stable")
+            _, first, size = np.unique(part[unknown][order], return_index=True, return_counts=True)
+            column = np.empty(self._m, dtype=np.int64)
+            column[order] = np.arange(self._m) - np.repeat(first, size)
+            for begin in range(0, int(size.max()), COLUMNS_AT_ONCE):
+                here = np.flatnonzero((column >= begin) & (column < begin + COLUMNS_AT_ONCE))
+                wide = np.zeros((2 * self._each, int(column[here].max()) - begin + 1))
+                wide[unknown[here], column[here] - begin] = 1.0
+                variance[here, i] = solution.factors.solve(wide)[unknown[here], column[here] - begin]
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 class DriftModels:

@@ -21,7 +21,6 @@ OVERLAP = 0.4
 SINGLE_SPACING_M = 5.0
 CROSSLINES = 3
 LARGEST_M = 250.0
-"""Of larger sea floors a square of this side is surveyed, about their middle."""
 
 ROLL_SD_RAD = float(np.radians(0.1))
 RANGE_SD, RANGE_SD_PCT = 0.03, 0.5
@@ -48,6 +47,8 @@ class DriftScenario:
     swath
         Whether they have swath sonars; else single beams.
     seed
+    largest_m
+        Of larger sea floors a square of this side is surveyed, about their middle.
     """
 
     terrain: Terrain
@@ -55,6 +56,7 @@ class DriftScenario:
     vehicles: int = 2
     swath: bool = True
     seed: int = 0
+    largest_m: float = LARGEST_M
 
     @property
     def spacing_m(self) -> float:
@@ -67,7 +69,7 @@ class DriftScenario:
     def rectangle_m(self) -> tuple[float, float, float, float]:
         """West, south, east and north of what is surveyed."""
         terrain = self.terrain
-        wide, high = min(terrain.width_m, LARGEST_M), min(terrain.height_m, LARGEST_M)
+        wide, high = min(terrain.width_m, self.largest_m), min(terrain.height_m, self.largest_m)
         west, south = 0.5 * (terrain.width_m - wide), 0.5 * (terrain.height_m - high)
         return west, south, west + wide, south + high
 

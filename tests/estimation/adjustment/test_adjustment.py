@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse
 
 from app.arrays import FloatArray
 from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
+from app.estimation.adjustment.drift import Nodes
+from app.estimation.adjustment.least_squares import LeastSquares, WeighedTies
+from app.estimation.adjustment.ties import Outcome, Tie
 
 Bottom = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -207,3 +211,18 @@ def test_a_wrong_heading_or_scale_seen_by_fixes_is_taken_out_of_the_whole_dive(
     still = DriftModel(walk_m=1e-2, rate_mph=1e-2)
     left = adjusted(soundings, fixes, still).at(0, time_s) @ (1.0, 1.0j) - error
     assert np.abs(left).max() < 0.05
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_deviations_are_those_of_each_node_by_itself(tied: bool) -> None:
+    soundings, fixes = swaths(hills)
+    nodes = Nodes.along(soundings, fixes, 30.0)
+    problem = LeastSquares(nodes, fixes, DriftModel())
+    ties = WeighedTies.none()
+    if tied:
+        both = np.array([2, len(nodes) - 3])
+        tie = Tie(np.zeros(2), np.diag([4.0, 1.0]), both, np.array([1.0, -1.0]), Outcome.USED, 0.0)
+        ties = WeighedTies([tie], np.array([[0.5, -0.2]]), np.ones(1))
+    solution = problem.solve(ties)
+    each = problem.covariances(solution, sparse.csr_array(np.eye(len(nodes))))
+    np.testing.assert_allclose(problem.deviations(solution) ** 2, np.einsum("kii->ki", each), rtol=1e-6)
