@@ -16,6 +16,9 @@ from app.missions.live.mission import LiveMission
 from app.missions.spec.vehicle import Guidance
 from app.missions.team import Member
 
+HORIZON_S = 20.0
+"""How far ahead vehicles' ways are looked at, seconds of their time."""
+
 
 class Because(StrEnum):
     """Why a vehicle is led aside."""
@@ -54,7 +57,7 @@ class Asides:
         waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
         # Orders by sound, and plans, take longer than there is.
         follows = waits and member.spec.guidance is Guidance.FOLLOW and member.present and member.busy
-        led = self._led.get(member.name)
+        led = self._now(member.name)
         return follows and (led is None or led.because is because)
 
     async def lead(self, member: Member, place_m: FloatArray, because: Because) -> bool:
@@ -62,7 +65,7 @@ class Asides:
         order = self._committing.waiting_at(member, place_m)
         if order is None or member.order is None:
             return False
-        begins = member.name not in self._led
+        begins = self._now(member.name) is None
         if begins:
             self._led[member.name] = Aside(because, member.order, asyncio.get_running_loop().time())
         await self._dispatch.stay(member, order)
@@ -72,10 +75,18 @@ class Asides:
 
     async def lead_on(self, member: Member) -> None:
         """Have a vehicle go on with its leg."""
-        aside = self._led.pop(member.name)
+        aside = self._now(member.name)
+        if aside is None:
+            return
+        del self._led[member.name]
         member.waits_m = None
         member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
         await self._dispatch.send(member)
+
+    def _now(self, name: str) -> Aside | None:
+        """Return what a vehicle is led aside from now: it may have got another order while others were looked at."""
+        aside = self._led.get(name)
+        return aside if aside is not None and self._lasts(name, aside) else None
 
     def _lasts(self, name: str, aside: Aside) -> bool:
         member = self._live.team.get(name)

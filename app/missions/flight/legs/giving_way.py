@@ -19,7 +19,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.motion.timeline import Timeline, closest_approach
 from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.decisions.separation import planned_places, ways_aside
-from app.missions.flight.legs.asides import Asides, Because, depth_now_m, steered_ahead
+from app.missions.flight.legs.asides import HORIZON_S, Asides, Because, depth_now_m, steered_ahead
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.keeping_off import KeepOutZones
 from app.missions.flight.observation.waiting import until_next_look
@@ -28,9 +28,6 @@ from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.team import OUT_OF_REACH, Member
 from app.missions.views.mission import Level
-
-HORIZON_S = 20.0
-"""How far ahead vehicles' ways are looked at, seconds of their time."""
 
 WAITING_S = 40.0
 """How far ahead the others' ways are looked at where a vehicle waits."""
@@ -214,10 +211,10 @@ class GivingWay:
         )
         return [here_m, *aside[:, :2]]
 
-    def _motion_to(self, member: Member, place_m: FloatArray | None) -> Timeline:
+    def _motion_to(self, member: Member, place_m: FloatArray) -> Timeline:
         """Return a vehicle's motion to a place where it waits."""
         here = np.append(member.place_m(self._live.frame), depth_now_m(member))
-        if place_m is None or math.dist(place_m, here[:2]) < CLOSING_M:
+        if math.dist(place_m, here[:2]) < CLOSING_M:
             return Timeline(np.zeros(1), here[None])
         return steered_ahead(self._live, member, [here, np.append(place_m, here[2])], WAITING_S)
 

@@ -18,16 +18,13 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.decisions.separation import planned_places
-from app.missions.flight.legs.asides import Asides, Because, depth_now_m, steered_ahead
+from app.missions.flight.legs.asides import HORIZON_S, Asides, Because, depth_now_m, steered_ahead
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.team import Member
 from app.missions.views.mission import Level
-
-HORIZON_S = 20.0
-"""How far ahead a vehicle's way is looked at, seconds of its time."""
 
 CLEARANCE_M = 1.0
 """A vehicle is led aside, and on again, by ways that keep off zones by so much: none steers exactly as foreseen."""

@@ -70,6 +70,20 @@ async def test_who_gives_way_is_not_led_aside_for_a_zone_as_well(scene: PlacedVe
     assert len(scene.ordered) == 1
 
 
+async def test_a_vehicle_that_got_another_order_meanwhile_keeps_that(
+    scene: PlacedVehicles,
+) -> None:
+    vehicle = scene.put("a", (18.0, 30.0, 3.0), (19.0, 5.0, 3.0), heading_rad=math.radians(25.0))
+    assert await scene.asides.lead(vehicle, np.array([10.0, 30.0]), Because.ZONE)
+    scene.put("a", (18.0, 30.0, 3.0), (5.0, 30.0, 3.0), anew=True)
+    await scene.asides.lead_on(vehicle)
+    assert len(scene.ordered) == 1
+    # Led aside from that one, it begins anew.
+    assert await scene.asides.lead(vehicle, np.array([10.0, 30.0]), Because.VEHICLE)
+    await scene.asides.lead_on(vehicle)
+    assert scene.ordered[-1] is vehicle.order
+
+
 @given(
     way=st.lists(st.tuples(st.floats(0.0, 60.0), st.floats(0.0, 60.0)), min_size=1, max_size=6),
 )
