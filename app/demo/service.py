@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -12,6 +13,15 @@ from app.settings import Settings
 
 class DemoError(Exception):
     """The demonstration cannot go on; the message says why and what to do."""
+
+
+def remove_old(settings: Settings, database: Path) -> None:
+    """Remove the database of an earlier demonstration. Raises StartupError while that one may be running."""
+    from app.main import listen
+
+    listen(settings).close()
+    for old in database.parent.glob(f"{database.name}*"):
+        old.unlink()
 
 
 async def serve_during(

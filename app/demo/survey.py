@@ -24,7 +24,7 @@ from rich.table import Table
 from rich.text import Text
 
 from app.arrays import FloatArray
-from app.demo.service import DemoError, check, client, get, post, serve_during
+from app.demo.service import DemoError, check, client, get, post, remove_old, serve_during
 from app.evaluation.survey.baselines import Baseline, lawnmower_baselines
 from app.exploration.core.constraints import Constraints
 from app.mapping.compare import difference
@@ -101,10 +101,9 @@ class _Demo:
 
     async def run(self) -> int:
         options, console = self._options, self._console
-        self._log_to_file()
-        for old in self._folder.glob("mission.db*"):
-            old.unlink()
         settings = self._settings()
+        remove_old(settings, self._folder / "mission.db")
+        self._log_to_file()
         self._write_config(settings)
         console.print(
             f"Sea floor: {self._terrain.name}, {self._terrain.width_m:g} x {self._terrain.height_m:g} m, "

@@ -8,9 +8,9 @@ import httpx
 import pytest
 from rich.console import Console
 
-from app.demo.service import client, get, serve_during
+from app.demo.service import client, get, remove_old, serve_during
 from app.missions.settings import ImcSettings
-from app.settings import Settings
+from app.settings import Settings, StartupError
 
 
 def settings(folder: Path) -> Settings:
@@ -52,3 +52,17 @@ async def test_no_request_goes_over_a_connection_that_the_service_may_be_closing
 
     assert await serve_during(settings(tmp_path), work, keep_serving=False, console=Console(quiet=True)) is True
     assert kept == [0, 0, 0]
+
+
+async def test_a_second_demonstration_leaves_the_database_of_the_one_that_is_running(tmp_path: Path) -> None:
+    database = tmp_path / "demo.db"
+
+    async def work(url: str) -> None:
+        taken = settings(tmp_path).model_copy(update={"port": httpx.URL(url).port})
+        with pytest.raises(StartupError, match="cannot listen on"):
+            remove_old(taken, database)
+        assert database.exists()
+
+    assert await serve_during(settings(tmp_path), work, keep_serving=False, console=Console(quiet=True)) is True
+    remove_old(settings(tmp_path), database)
+    assert not database.exists()
