@@ -16,10 +16,11 @@ from tests.support.paths import PROJECT
 
 @dataclass(frozen=True)
 class Page:
-    """A page of results: its name below ``docs/results`` and what stands above its sections."""
+    """A page of results: its name below ``docs/results``, what stands above its sections, whether the clock matters."""
 
     name: str
     head: str = ""
+    timed: bool = False
 
     @property
     def path(self) -> Path:
@@ -36,14 +37,17 @@ one machine, on which other programs may run beside: processor time and ratios s
 machine that was busy is told by `load_of_the_machine`, the mean number of programs that wanted a core: where that is
 well above the number of cores, paces and times say nothing, and `service_cores` says what the service got.
 """,
+    timed=True,
 )
 IMC = Page(
     "imc.md",
     """# The IMC bridge: what was measured
 
 Every section is written by the command that stands in it (`--write`). Vehicles are the simulator's fake DUNE nodes on
-real UDP sockets of the same machine, which take part of its processor themselves.
+real UDP sockets of the same machine, which take part of its processor themselves. `load_of_the_machine` is the mean
+number of programs that wanted one of its cores.
 """,
+    timed=True,
 )
 FLIGHT = Page(
     "flight.md",
@@ -159,7 +163,7 @@ def write_section(
     """Write the section ``title`` of a page, in the place of an older one; nothing where no file is asked for."""
     if file is None:
         return
-    if page is LOAD:
+    if page.timed:
         figures = figures | {"load_of_the_machine": round(os.getloadavg()[1], 1)}
     lines = [f"## {title}", "", *facts(seeds=seeds, hidden=hidden)]
     lines += ["", "| | |", "| --- | --- |", *(f"| {name} | {_shown(value)} |" for name, value in figures.items()), ""]

@@ -39,7 +39,9 @@ attackers are other processes and connections of the same machine, which take pa
 `live_p99_ms` is how long `/health/live` took meanwhile, on new connections, in 99 of 100 cases; it is asked to be
 at most 250. `memory_after` is the service's resident memory once the attack is over, over what it was before; it is
 asked to be at most 1.10. `gained` lists what the attacker got; nothing is asked for.
+`load_of_the_machine` is the mean number of programs that wanted one of its cores.
 """,
+    timed=True,
 )
 MOST_LIVE_MS = 250.0
 MOST_MEMORY = 1.10

@@ -30,7 +30,9 @@ Every section is written by the command that stands in it (`--write`). The servi
 process of its own with the database it has in the field; polling vehicles repeat what was not answered, IMC vehicles
 are the simulator's fake DUNE nodes. In every scene it is asserted that no accepted sounding is lost or stored twice,
 that every waypoint lies in the area, that no vehicle is sent to an earlier step again, and that log and page say why.
+`load_of_the_machine` is the mean number of programs that wanted one of its cores, the scene's own among them.
 """,
+    timed=True,
 )
 
 Scene = Callable[[Path, int], Coroutine[Any, Any, dict[str, Any]]]
