@@ -10,7 +10,7 @@ import httpx
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from app.demo.service import DemoError, check, client, get, post, remove_old, serve_during
+from app.demo.service import DemoError, check, claimed, client, get, post, serve_during
 from app.missions.search.examples import example
 from app.settings import Settings
 from app.storage import private
@@ -57,9 +57,9 @@ class _SearchDemo:
             output_dir=folder,
             imc=ImcSettings(enabled=False),
         )
-        remove_old(settings, folder / "search.db")
-        logs.configure("info", "json", private.open_new(folder / "service.log"))
-        done = await serve_during(settings, self._search, keep_serving=options.keep_serving, console=self._console)
+        with claimed(settings, folder / "search.db"):
+            logs.configure("info", "json", private.open_new(folder / "service.log"))
+            done = await serve_during(settings, self._search, keep_serving=options.keep_serving, console=self._console)
         if not done:
             self._console.print(f"Stopped. What was seen is kept in [bold]{folder / 'search.db'}[/].")
             return 130

@@ -1,7 +1,8 @@
 """What demonstrations share: the real service in this process while something is done with it over REST."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import contextlib
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,19 +10,46 @@ import httpx
 from rich.console import Console
 
 from app.settings import Settings
+from app.storage.processes.process_lock import LockHeldError, ProcessLock, is_held
+
+NOBODYS = 0
+"""Services on a database are numbered from 1: this lock is none of theirs, and holds before one has begun."""
 
 
 class DemoError(Exception):
     """The demonstration cannot go on; the message says why and what to do."""
 
 
-def remove_old(settings: Settings, database: Path) -> None:
-    """Remove the database of an earlier demonstration. Raises StartupError while that one may be running."""
+@contextlib.contextmanager
+def claimed(settings: Settings, database: Path) -> Iterator[None]:
+    """Remove the database of an earlier demonstration, and let no other one have it meanwhile.
+
+    Raises
+    ------
+    StartupError
+        When the port is taken.
+    DemoError
+        When another demonstration has the database, or a service that goes on with one.
+    """
     from app.main import listen
 
     listen(settings).close()
-    for old in database.parent.glob(f"{database.name}*"):
-        old.unlink()
+    try:
+        if any(map(is_held, database.parent.glob(f"{database.name}-process-*"))):
+            raise LockHeldError
+        path = database.with_name(f"{database.name}-process-{NOBODYS}")
+        lock = ProcessLock(path, NOBODYS)
+    except LockHeldError:
+        raise DemoError(
+            f"{database} is in use by another demonstration, or by a service that goes on with one: "
+            "end that one first, or name another folder with --output"
+        ) from None
+    try:
+        for old in set(database.parent.glob(f"{database.name}*")) - {path}:
+            old.unlink()
+        yield
+    finally:
+        lock.release()
 
 
 async def serve_during(

@@ -24,7 +24,7 @@ from rich.table import Table
 from rich.text import Text
 
 from app.arrays import FloatArray
-from app.demo.service import DemoError, check, client, get, post, remove_old, serve_during
+from app.demo.service import DemoError, check, claimed, client, get, post, serve_during
 from app.evaluation.survey.baselines import Baseline, lawnmower_baselines
 from app.exploration.core.constraints import Constraints
 from app.mapping.compare import difference
@@ -102,15 +102,15 @@ class _Demo:
     async def run(self) -> int:
         options, console = self._options, self._console
         settings = self._settings()
-        remove_old(settings, self._folder / "mission.db")
-        self._log_to_file()
-        self._write_config(settings)
-        console.print(
-            f"Sea floor: {self._terrain.name}, {self._terrain.width_m:g} x {self._terrain.height_m:g} m, "
-            f"{self._terrain.min_depth_m:.1f} to {self._terrain.max_depth_m:.1f} m deep"
-        )
-        async with self._simulator():
-            done = await serve_during(settings, self._fly, keep_serving=options.keep_serving, console=console)
+        with claimed(settings, self._folder / "mission.db"):
+            self._log_to_file()
+            self._write_config(settings)
+            console.print(
+                f"Sea floor: {self._terrain.name}, {self._terrain.width_m:g} x {self._terrain.height_m:g} m, "
+                f"{self._terrain.min_depth_m:.1f} to {self._terrain.max_depth_m:.1f} m deep"
+            )
+            async with self._simulator():
+                done = await serve_during(settings, self._fly, keep_serving=options.keep_serving, console=console)
         self._outcome.interrupted = not done
         if self._outcome.interrupted:
             self._say_how_to_go_on()

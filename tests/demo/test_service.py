@@ -8,7 +8,7 @@ import httpx
 import pytest
 from rich.console import Console
 
-from app.demo.service import client, get, remove_old, serve_during
+from app.demo.service import DemoError, claimed, client, get, serve_during
 from app.missions.settings import ImcSettings
 from app.settings import Settings, StartupError
 
@@ -59,10 +59,14 @@ async def test_a_second_demonstration_leaves_the_database_of_the_one_that_is_run
 
     async def work(url: str) -> None:
         taken = settings(tmp_path).model_copy(update={"port": httpx.URL(url).port})
-        with pytest.raises(StartupError, match="cannot listen on"):
-            remove_old(taken, database)
+        with pytest.raises(StartupError, match="cannot listen on"), claimed(taken, database):
+            pass
+        with pytest.raises(DemoError, match="in use by another demonstration"), claimed(settings(tmp_path), database):
+            pass
         assert database.exists()
 
+    with claimed(settings(tmp_path), database), pytest.raises(DemoError), claimed(settings(tmp_path), database):
+        pass
     assert await serve_during(settings(tmp_path), work, keep_serving=False, console=Console(quiet=True)) is True
-    remove_old(settings(tmp_path), database)
-    assert not database.exists()
+    with claimed(settings(tmp_path), database):
+        assert not database.exists()
