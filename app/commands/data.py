@@ -301,7 +301,8 @@ def adjust(
 
         view = with_missions(command_settings(database_url=database), run, changing="adjust", mission=mission)
     if not view.applied:
-        typer.echo("positions are taken as they came")
+        told = "" if undo else f": no fix is known, and of {view.ties_rejected} sections none tells enough"
+        typer.echo(f"positions are taken as they came{told}")
         return
     how = f"{view.ties_used} ties and {view.fixes} fixes" if view.by_ties else f"{view.fixes} fixes alone"
     typer.echo(f"tracks are adjusted by {how}; {view.ties_rejected} ties were rejected")

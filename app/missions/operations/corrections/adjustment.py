@@ -80,6 +80,8 @@ def adjustment_view(live: LiveMission) -> AdjustmentView:
 async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> AdjustmentView:
     """Find by how much the vehicles' positions were off, and apply it in place of what was applied before.
 
+    Without a fix, and where ties do not tell enough, nothing is moved and nothing applied.
+
     Raises
     ------
     ConflictError
@@ -103,17 +105,14 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
         )
         view = await asyncio.to_thread(_view, found, names, len(fixes), live.frame, actor)
         nodes = {name: _nodes(found, number) for number, name in enumerate(names)}
-        adjustment = TrackAdjustment(nodes, view.model_dump(mode="json"))
-        row = AdjustmentRow(mission_id=live.id, made_at=now(), actor=actor, content=adjustment.pack())
-
-        async def store(session: AsyncSession) -> None:
-            await _remove(session, live.id)
-            session.add(row)
-
-        await recorrect(live, live.spec, live.gate.corrections.table, adjustment, store)
-    how = f"{view.ties_used} ties and {view.fixes} fixes" if view.by_ties else f"{view.fixes} fixes alone"
-    most = max((track.max_m for track in view.tracks), default=0.0)
-    message = f"tracks adjusted by {how}, by {most:.1f} m at most, asked for by {actor}"
+        adjustment = TrackAdjustment(nodes, view.model_dump(mode="json")) if view.applied else None
+        if adjustment is not None or live.gate.corrections.adjustment is not None:
+            await _apply(live, adjustment, actor)
+    message = f"the tracks' adjustment, asked for by {actor}, moved nothing: no fix is known, and no tie tells enough"
+    if view.applied:
+        how = f"{view.ties_used} ties and {view.fixes} fixes" if view.by_ties else f"{view.fixes} fixes alone"
+        most = max(track.max_m for track in view.tracks)
+        message = f"tracks adjusted by {how}, by {most:.1f} m at most, asked for by {actor}"
     await live.journal.log(Level.INFO, "corrections", message, actor=actor)
     return view
 
@@ -123,20 +122,23 @@ async def undo(live: LiveMission, actor: str) -> AdjustmentView:
     async with live.correcting:
         if live.gate.corrections.adjustment is None:
             return adjustment_view(live)
-
-        async def store(session: AsyncSession) -> None:
-            await _remove(session, live.id)
-
-        await recorrect(live, live.spec, live.gate.corrections.table, None, store)
+        await _apply(live, None, actor)
     await live.journal.log(Level.INFO, "corrections", f"the tracks' adjustment was undone by {actor}", actor=actor)
     return adjustment_view(live)
 
 
-async def _remove(session: AsyncSession, mission_id: str) -> None:
-    known = await session.get(AdjustmentRow, mission_id)
-    if known is not None:
-        await session.delete(known)
-        await session.flush()
+async def _apply(live: LiveMission, adjustment: TrackAdjustment | None, actor: str) -> None:
+    """Place every sounding anew, and store by what, in place of what was applied before."""
+
+    async def store(session: AsyncSession) -> None:
+        known = await session.get(AdjustmentRow, live.id)
+        if known is not None:
+            await session.delete(known)
+            await session.flush()
+        if adjustment is not None:
+            session.add(AdjustmentRow(mission_id=live.id, made_at=now(), actor=actor, content=adjustment.pack()))
+
+    await recorrect(live, live.spec, live.gate.corrections.table, adjustment, store)
 
 
 async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings, Places]:
@@ -316,10 +318,11 @@ def _view(found: AdjustedTracks, names: list[str], fixes: int, frame: LocalFrame
     used = [tie for tie in found.ties if tie.outcome == "used"]
     both = [tie for tie in found.ties if math.isfinite(tie.before_m) and math.isfinite(tie.after_m)]
     held = found.held_out
+    applied = found.by_ties or fixes > 0
     return AdjustmentView(
-        applied=True,
-        made_at=now(),
-        actor=actor,
+        applied=applied,
+        made_at=now() if applied else None,
+        actor=actor if applied else None,
         by_ties=found.by_ties,
         fixes=fixes,
         tracks=tracks,

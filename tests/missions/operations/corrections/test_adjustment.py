@@ -4,6 +4,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.missions.operations.corrections.adjustment import adjust, adjustment_view, undo
+from app.missions.operations.history import events_after
 from app.missions.operations.measurements import measure
 from app.missions.views.measurements.adjustment import AdjustmentRequest, FixRequest
 from tests.support.missions.harbour import Harbour
@@ -45,3 +46,23 @@ async def test_a_restart_places_soundings_as_before_it_and_an_undo_as_they_came(
     await undo(live, "Ana")
     assert not adjustment_view(live).applied
     np.testing.assert_allclose(await depths(), raw, atol=1e-6)
+
+
+async def test_what_moves_nothing_is_not_said_to_be_applied(harbour: Harbour) -> None:
+    mission = (await harbour.service.create(make_spec())).id
+    live = await harbour.service.get(mission)
+    items = measured(80, wrong=None)[:80]
+    await measure(live, items)
+    fix = FixRequest(
+        vehicle="a", time_s=items[-1].time_s, lat_deg=items[-1].lat_deg + OFF_DEG, lon_deg=items[-1].lon_deg, sd_m=0.2
+    )
+    assert (await adjust(live, AdjustmentRequest(fixes=[fix]), "Ana")).applied
+
+    found = await adjust(live, AdjustmentRequest(), "Ana")
+    assert not found.applied
+    assert found.made_at is None
+    assert found.actor is None
+    assert all(track.max_m == 0 for track in found.tracks)
+    assert (await events_after(live))[-1].message.startswith("the tracks' adjustment, asked for by Ana, moved nothing")
+    await harbour.reopen()
+    assert not adjustment_view(await harbour.service.get(mission)).applied
