@@ -197,7 +197,9 @@ def _row(line: str, layout: _Layout, number: int) -> tuple[float, ...]:
             seen = "it is not a number" if column < len(cells) else f"the line has only {len(cells)} columns"
             what = {"down": "depth", "up": "height"}.get(name, name)
             raise ReadError(
-                f"line {number}, column {column + 1} ({what})", seen, "write a number, or leave the line out"
+                f"line {number}, column {column + 1} ({what})",
+                seen,
+                "write a number with a decimal point, or leave the line out",
             )
         values.append(value)
     return tuple(values)

@@ -467,6 +467,8 @@ class LiveMission:
 
     def _eta_s(self) -> float | None:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
+        if self.header.state in ENDED:
+            return 0.0
         if self.search is not None:
             return max(self.search.left_s(), 0.0) / self._time_scale
         if self.reports.leg_s is None:
@@ -474,7 +476,7 @@ class LiveMission:
         committed = [len(m.ahead) + m.ordered for m in self.team]
         leg_m = self.spec.limits.max_step_m
         left = [m.way_left_m(self.spec) / leg_m for m in self.team.present] or [self.spec.steps - self.header.step]
-        return (max(left) + max(committed, default=0)) * self.reports.leg_s
+        return (max(0.0, *left) + max(committed, default=0)) * self.reports.leg_s
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""

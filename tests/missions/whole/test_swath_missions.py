@@ -172,6 +172,7 @@ async def test_nothing_is_left_only_where_nothing_is_expected_of_legs_that_were_
     assert expecting
     assert live.header.reason == "nothing is left to ensonify"
     assert (live.progress().ensonified_pct or 0.0) > 99.0
+    assert live.progress().eta_s == 0.0
 
 
 async def test_a_mission_that_did_not_see_all_says_so_when_it_ends(
@@ -185,6 +186,7 @@ async def test_a_mission_that_did_not_see_all_says_so_when_it_ends(
     live = await started(harbour)
     await until_state(harbour.service, live.id, MissionState.FINISHED)
     assert live.header.reason == "nothing is left to ensonify but 3.2 % of the area, which lines do not see"
+    assert live.progress().eta_s == 0.0
 
 
 async def test_a_finished_survey_is_shown_without_reading_its_pings(harbour: Harbour) -> None:

@@ -83,7 +83,9 @@ async def only_vehicle(live: LiveMission, vehicle: str | None) -> str:
         present = sorted(await sounding_queries.vehicles_of(session, live.id, Verdict.ACCEPTED))
     if vehicle is None and len(present) == 1:
         return present[0]
+    if not present:
+        raise InvalidRequestError("vehicle", "no vehicle has an accepted sounding", "beams of swath sonars are in its pings")
     if vehicle not in present:
         said = "several vehicles have soundings" if vehicle is None else f"{vehicle!r} has no accepted sounding"
-        raise InvalidRequestError("vehicle", said, "name one of " + (", ".join(present) or "none so far"))
+        raise InvalidRequestError("vehicle", said, f"name one of {', '.join(present)}")
     return vehicle
