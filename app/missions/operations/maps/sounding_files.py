@@ -84,7 +84,9 @@ async def only_vehicle(live: LiveMission, vehicle: str | None) -> str:
     if vehicle is None and len(present) == 1:
         return present[0]
     if not present:
-        raise InvalidRequestError("vehicle", "no vehicle has an accepted sounding", "beams of swath sonars are in its pings")
+        raise InvalidRequestError(
+            "vehicle", "no vehicle has an accepted sounding", "what swath sonars measured is under pings"
+        )
     if vehicle not in present:
         said = "several vehicles have soundings" if vehicle is None else f"{vehicle!r} has no accepted sounding"
         raise InvalidRequestError("vehicle", said, f"name one of {', '.join(present)}")
