@@ -171,6 +171,10 @@ class OwnLegs:
         unhurried_s = 2.0 * DECISIONS_AHEAD * self._decider.takes_s
         if not self._watched and all(self._lasts_s(member) > unhurried_s for member in getting):
             await self._exchange.look()
+            # Writing may take as long as the disk is full: who fell silent meanwhile gets none.
+            getting = self._who_gets_legs()
+            if not getting:
+                return
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         at_rest = {member.name for member in getting if not member.ordered and not member.ahead} & self._idle

@@ -18,6 +18,7 @@ from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import NO_LEG, LegCommit
+from app.missions.flight.legs.exchange import LegExchange
 from app.missions.flight.own_legs import MOST_AHEAD, OwnLegs
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
@@ -211,6 +212,37 @@ async def test_who_comes_back_flies_as_many_legs_as_the_others_have_left_not_as_
         rows = (await session.scalars(select(WaypointRow))).all()
     assert len([row for row in rows if row.vehicle == "b"]) == 15
     assert len([row for row in rows if row.vehicle == "a" and row.step > flown]) == 15 - flown > 1
+
+
+async def test_vehicles_that_fall_silent_while_legs_are_exchanged_are_waited_for(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when an exchange waits for a full disk longer than vehicles may be silent."""
+    silent: list[Member] = []
+    look = LegExchange.look
+
+    async def long_look(exchange: LegExchange) -> bool:
+        changed = await look(exchange)
+        if not silent and len(live.team.present) == 2:
+            silent.extend(live.team.present)
+            for member in silent:
+                member.engaged = False
+            asyncio.get_running_loop().call_later(0.3, come_back)
+        return changed
+
+    def come_back() -> None:
+        for member in silent:
+            member.engaged = True
+
+    monkeypatch.setattr(LegExchange, "look", long_look)
+    monkeypatch.setattr(OwnLegs, "_lasts_s", lambda *_: 1e6)  # nobody is in a hurry, however slow the machine is
+    service = await harbour_closed.open(time_scale=5.0)
+    mission = (await service.create(sim_spec(steps=9, side_m=60.0, **APART))).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    view = await until_state(service, mission, MissionState.FINISHED)
+    assert len(silent) == 2
+    assert view.reason == "every step is done"
 
 
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
