@@ -166,7 +166,8 @@ class Cluster:
             raise NotDoneError(
                 "lost", "the package distributed is missing: pip install 'bathyfleet[cluster]'"
             ) from None
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would tell is told here, once
+        for name in ("distributed", "distributed.client"):  # what they would tell is told here, once
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         settings = self._settings
         for file in (settings.tls_ca_file, settings.tls_certificate, settings.tls_key):
             if file is not None and not file.is_file():

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import os
 import shutil
 import signal
@@ -220,6 +221,7 @@ async def test_without_a_cluster_that_answers_everything_is_done_here(
     assert await compute.run(heavy_work.process) == os.getpid()
     await until(lambda: "no Dask scheduler answers" in (compute.state or ""), "it was looked for")
     assert str(unused_tcp_port) in (compute.state or "")
+    assert not logging.getLogger("distributed.client").isEnabledFor(logging.ERROR), "it is told here, not by tracebacks"
     assert await asyncio.to_thread(compute.in_thread, heavy_work.process) == os.getpid()
     await compute.close()
     await processes.close()
