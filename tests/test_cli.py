@@ -266,7 +266,9 @@ def test_a_mission_is_served_exported_and_found_again(
     write_gsf(tmp_path / "line.gsf", pings)
     imported = bathyfleet("import-log", mission["id"][:8], "line.kmall", "--vehicle", "wam-v")
     first, *notes = imported.stdout.splitlines()
-    assert first.endswith("wam-v, 0 soundings accepted, 0 rejected, 0 there before, 12 pings accepted, 0 rejected")
+    assert first.endswith(
+        "wam-v, 0 soundings accepted, 0 rejected, 0 there before, 12 pings accepted, 0 rejected, 0 there before"
+    )
     assert "  depths are below the water surface of their time, not reduced for the tide" in notes
     prior = bathyfleet("import", mission["id"][:8], "line.gsf", "--sd", "0.3")
     assert prior.stdout.startswith("252 of 252 depths imported: "), prior.stderr

@@ -73,8 +73,8 @@ def _import_lines(view: "LogImportView") -> Iterator[str]:
         f"{view.file}: {view.vehicle}, {view.soundings} soundings accepted, {view.rejected} rejected, "
         f"{view.duplicate} there before"
         + (
-            f", {view.pings} pings accepted, {view.pings_rejected} rejected"
-            if view.pings or view.pings_rejected
+            f", {view.pings} pings accepted, {view.pings_rejected} rejected, {view.pings_duplicate} there before"
+            if view.pings or view.pings_rejected or view.pings_duplicate
             else ""
         )
         + (" (imported before, nothing new)" if view.known else "")

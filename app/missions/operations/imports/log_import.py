@@ -250,6 +250,7 @@ class LogImport:
             duplicate=tally.verdicts[Verdict.DUPLICATE],
             pings=tally.pings[Verdict.ACCEPTED],
             pings_rejected=tally.pings[Verdict.REJECTED],
+            pings_duplicate=tally.pings[Verdict.DUPLICATE],
             reasons=dict(tally.reasons),
             refused=dict(self._log.refused),
             first_s=tally.first_s,

@@ -126,6 +126,7 @@ class LogImportView(View):
     duplicate: int = Field(description="There before, from live telemetry or another log")
     pings: int = Field(default=0, description="Pings of swath sonars that were accepted, stored for good")
     pings_rejected: int = Field(default=0, description="Pings that are kept but not used")
+    pings_duplicate: int = Field(default=0, description="Pings that were there before")
     reasons: dict[str, int] = Field(description="Why soundings and pings were rejected, and how many each")
     refused: dict[str, int] = Field(description="Why ranges did not become soundings, and how many each")
     first_s: float | None = Field(description="Vehicle's clock at the first record, Unix seconds")

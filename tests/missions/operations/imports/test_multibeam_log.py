@@ -78,6 +78,9 @@ async def test_pings_are_below_the_surface_and_on_the_map_once(
     again = await take(service, mission.id, file)
     assert again == view.model_copy(update={"known": True})
     assert "12 pings from line" in (await events_after(live))[-1].message
+    of_the_same_line = write({"gsf": "kmall", "kmall": "gsf"}[kind], tmp_path)
+    more = await take(service, mission.id, of_the_same_line)
+    assert (more.pings, more.pings_duplicate) == (0, 12)
     said = "taken out of depths" if kind == "gsf" else "not reduced for the tide"
     assert any(said in note for note in view.notes)
 
