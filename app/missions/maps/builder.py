@@ -370,10 +370,16 @@ class MapBuilder:
     def _soundings(self) -> SoundingRows:
         return self._table.rows
 
-    def as_of(self, soundings: SoundingRows) -> BathymetricMap:
-        """Return the map that the first soundings (n, 4) alone make, under the model learned of all of them."""
+    def as_of(self, soundings: SoundingRows, swath: SwathGrid) -> BathymetricMap:
+        """Return the map that the first soundings (n, 4) and beams alone make, under the model learned of all of them.
+
+        Raises ValueError without any.
+        """
         with self._building:
             learned, prior = self._learned, self._prior
+        ensonified = swath.map(soundings) if swath.beams else None
+        if ensonified is not None:
+            return without_guesses(ensonified) if prior is None else fuse(ensonified, prior)
         doubted = {row[:3].tobytes() for row, _ in learned.doubted}
         used = np.array([row[:3].tobytes() not in doubted for row in soundings], dtype=bool)
         if not used.any():

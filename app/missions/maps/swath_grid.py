@@ -62,6 +62,12 @@ class SwathGrid:
         self.beams = 0
         """How many were taken in, spikes left out."""
 
+    def empty(self) -> "SwathGrid":
+        """Return one of the same cells that has taken in nothing."""
+        empty = SwathGrid(self._grid, self._mask, self.errors, self._cell_of_depth)
+        empty.place = self.place
+        return empty
+
     def add(self, vehicle: str, pings: Pings) -> None:
         """Take in the pings of one vehicle."""
         beams = beams_of(vehicle, pings, self.place, self.errors)

@@ -27,9 +27,10 @@ class Block:
 
 @dataclass(frozen=True)
 class Chunk:
-    """What a file holds; ``block`` (n,) are the numbers of the pings' blocks."""
+    """What a file holds; ``block`` and ``step`` (n,) are the numbers of the pings' blocks and steps."""
 
     block: IntArray
+    step: IntArray
     judged: JudgedPings
 
 
@@ -83,7 +84,8 @@ def read_chunk(content: bytes) -> Chunk:
     columns = {name: np.asarray(table[name]) for name in PING_COLUMNS}
     columns |= {name: _padded(table[name].combine_chunks()) for name in BEAM_COLUMNS}
     reasons = tuple(table["reason"].to_pylist())
-    return Chunk(np.asarray(table["block"]), JudgedPings(Pings(**columns), reasons))
+    judged = JudgedPings(Pings(**columns), reasons)
+    return Chunk(np.asarray(table["block"]), np.asarray(table["step"]), judged)
 
 
 def _padded(lists: Any) -> BeamArray:

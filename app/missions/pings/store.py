@@ -259,10 +259,12 @@ class PingStore:
         async with self._database.reading() as session:
             return await ping_queries.newest_block(session, self._mission_id)
 
-    async def all_accepted(self, until_block: int | None = None) -> AsyncIterator[tuple[str, Pings]]:
+    async def all_accepted(
+        self, until_block: int | None = None, until_step: int | None = None
+    ) -> AsyncIterator[tuple[str, Pings]]:
         """Yield vehicles with their accepted pings, each vehicle's in the order they came, some thousand at a time.
 
-        ``until_block``: no later ones. Pings may be moved to files meanwhile.
+        ``until_block``, ``until_step``: no later ones. Pings may be moved to files meanwhile.
 
         Raises
         ------
@@ -278,7 +280,7 @@ class PingStore:
                 chunks = await ping_queries.chunks(session, self._mission_id)
             missing = [one for one in chunks if one.last_block > done.get(one.vehicle, 0) and one.first_block <= until]
             for chunk in missing:
-                pings = await self._accepted_of(chunk, done.get(chunk.vehicle, 0), until)
+                pings = await self._accepted_of(chunk, done.get(chunk.vehicle, 0), until, until_step)
                 done[chunk.vehicle] = chunk.last_block
                 if len(pings):
                     yield chunk.vehicle, pings
@@ -289,13 +291,16 @@ class PingStore:
             after = rows[-1].id
             for row in rows:
                 done[row.vehicle] = row.id
-            for vehicle, pings in await asyncio.to_thread(_accepted_by_vehicle, rows):
+            wanted = [row for row in rows if until_step is None or row.step <= until_step]
+            for vehicle, pings in await asyncio.to_thread(_accepted_by_vehicle, wanted):
                 yield vehicle, pings
 
-    async def _accepted_of(self, row: PingChunkRow, after: int, until: int) -> Pings:
+    async def _accepted_of(self, row: PingChunkRow, after: int, until: int, until_step: int | None) -> Pings:
         def read() -> Pings:
             chunk = read_chunk(self._files.read(row.name, row.digest))
             wanted = chunk.judged.is_accepted & (chunk.block > after) & (chunk.block <= until)
+            if until_step is not None:
+                wanted &= chunk.step <= until_step
             return chunk.judged.pings if wanted.all() else chunk.judged.pings.take(wanted)
 
         try:

@@ -159,14 +159,14 @@ def test_a_cell_becomes_known_with_a_margin_and_stays_so_up_to_the_accuracy() ->
     builder = built_of(soundings(30))
     first = builder.newest
     assert first is not None
-    plain = builder.as_of(soundings(30)).claim_sd_m
+    plain = builder.as_of(soundings(30), builder.swath).claim_sd_m
     np.testing.assert_allclose(first.map.claim_sd_m, margin(plain) * plain)
     builder.add(soundings(1, seed=4))
     second = builder.build()
     assert second is not None
     known = first.map.known(0.25)
     assert known.any()
-    later = builder.as_of(builder.soundings).claim_sd_m
+    later = builder.as_of(builder.soundings, builder.swath).claim_sd_m
     np.testing.assert_allclose(second.map.claim_sd_m[known], later[known])
     np.testing.assert_allclose(second.map.claim_sd_m[~known], margin(later) * later[~known])
 

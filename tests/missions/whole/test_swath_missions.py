@@ -16,7 +16,7 @@ from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, Place, decide
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
-from app.missions.operations.maps.mission_maps import export
+from app.missions.operations.maps.mission_maps import export, map_at_step, newest_map
 from app.missions.preflight.survey import preflight
 from app.missions.running import vehicle_orders
 from app.missions.settings import ServiceSettings
@@ -130,6 +130,21 @@ async def test_cells_and_what_was_left_are_the_same_after_the_service_started_ag
     assert again.minutes_left is not None
     assert again.minutes_left == pytest.approx(progress.minutes_left, abs=0.02)
     assert again.minutes_left < 60.0
+
+
+async def test_a_map_of_swaths_is_shown_as_it_was_at_any_step(harbour: Harbour) -> None:
+    live = await started(harbour)
+    await until_state(harbour.service, live.id, MissionState.FINISHED)
+    newest = (await newest_map(live, harbour.service.maps)).built.map
+    for _ in ("pings in blocks or files", "pings in files"):
+        last = (await map_at_step(live, live.header.step)).built.map
+        np.testing.assert_allclose(last.depth_m, newest.depth_m, atol=1e-9)
+        np.testing.assert_array_equal(last.count, newest.count)
+        early = (await map_at_step(live, 4)).built.map
+        assert 0 < early.count.sum() < 0.7 * last.count.sum()
+        assert (early.count <= last.count).all()
+        await harbour.reopen()
+        live = await harbour.service.get(live.id)
 
 
 async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour) -> None:

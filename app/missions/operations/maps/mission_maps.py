@@ -61,15 +61,19 @@ async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True
 
 
 async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
-    """Return the map that the soundings until the end of a step make. Raises MapNotReadyError without any."""
+    """Return the map that soundings and pings until the end of a step make. Raises MapNotReadyError without any."""
     if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
         await live.build_map()
     found = await accepted(live.database, live.id, 0, until_step=step)
     newest = live.builder.newest
     if newest is None:
         raise MapNotReadyError("no sounding was accepted, so there is no map", "choose a later step")
+    swath = live.builder.swath.empty()
+    if live.journal.counts.beams:
+        async for vehicle, pings in live.pings.all_accepted(until_step=step):
+            await asyncio.to_thread(swath.add, vehicle, pings)
     try:
-        bathymetry = await live.mapped(live.builder.as_of, found.table)
+        bathymetry = await live.mapped(live.builder.as_of, found.table, swath)
     except ValueError:
         raise MapNotReadyError(
             f"no sounding was accepted until the end of step {step}", "choose a later step"
