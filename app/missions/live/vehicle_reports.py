@@ -117,6 +117,8 @@ class VehicleReports:
                     # It can be reached but follows nothing of ours (any more): the loop engages it again.
                     member.engaged = False
             case RestartReport():
+                # The link may lead it again at once. The loop asks all the same, and says when it follows.
+                member.engaged = False
                 words = f"{event.vehicle}: {event.reason}"
                 line = self._journal.alarm_line(AlarmKind.VEHICLE_RESTARTED, words, vehicle=event.vehicle)
                 self._journal.note_line(line)

@@ -6,13 +6,15 @@ from typing import Any
 import pytest
 
 from app.missions.fleet.hub import FleetHub, VehicleKey
-from app.missions.fleet.interface import FleetEvent, Position, VehicleInfo, VehicleReport
+from app.missions.fleet.interface import FleetEvent, Position, RestartReport, VehicleInfo, VehicleReport
 from app.missions.live.vehicle_reports import VehicleReports
+from app.missions.operations.history import events_after
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from app.missions.team import Member
 from tests.support.missions.harbour import act, sim_spec, until_step
+from tests.support.waiting import until
 
 
 async def test_a_vehicle_without_a_fix_is_no_reason_to_end_the_mission(
@@ -48,4 +50,21 @@ async def test_a_vehicle_without_a_fix_is_no_reason_to_end_the_mission(
     await until_step(service, mission.id, 4)
     assert live.header.state is MissionState.RUNNING
     assert not live.team.members["b"].legs
+    await act(service, mission.id, "abort")
+
+
+async def test_a_vehicle_that_restarted_is_said_to_follow_again_however_soon_it_does(service: MissionService) -> None:
+    mission = await service.create(sim_spec("a", "b", steps=30))
+    live = await service.get(mission.id)
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live.reports.take(RestartReport("a", "DUNE on board has restarted"), live.spec, running=True)
+
+    async def follows() -> bool:
+        return [event.message for event in await events_after(live)].count("a follows") == 2
+
+    await until(follows, "it follows again")
+    assert live.team.named("a").engaged
+    step = live.header.step
+    await until_step(service, mission.id, step + 2)
     await act(service, mission.id, "abort")
