@@ -250,6 +250,12 @@ def test_a_mission_is_served_exported_and_found_again(
         client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(12)})
         exported_beside = bathyfleet("export", mission["id"], "--format", "csv", "--out", "-")
         assert exported_beside.stdout.count("rover") == 12
+        tide = ("tide", mission["id"], "--level", "1")
+        refused = bathyfleet(*tide)
+        assert refused.code == 1
+        assert "in a service that would not notice. Name that service with --url" in refused.stderr
+        assert bathyfleet(*tide, "--url", url).code == 0
+        assert bathyfleet("tide", mission["id"], "--level", "0", "--url", url).code == 0
         process.send_signal(signal.SIGINT)
         assert process.wait(60) == 0  # a first start may still be compiling
     written = bathyfleet("export", mission["id"][:8], "--format", "tif", "--out", "maps/basin.tif")

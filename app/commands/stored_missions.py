@@ -52,10 +52,16 @@ def with_missions(
 
 
 async def resting_mission(service: "MissionService", begin: str) -> "LiveMission":
-    """Return a mission that no service is running. Raises CommandError."""
+    """Return a mission that no service has. Raises CommandError."""
+    from app.storage.processes import processes
+    from app.storage.processes.membership import alive_beside
+
     mission = await meant_mission(service, begin)
     state = mission.header.state
-    if state in ("running", "paused"):
+    async with mission.database.reading() as session:
+        owner = await processes.owner(session, mission.id)
+        owned = owner is not None and await alive_beside(session, service.settings.database_url, [owner])
+    if owned or state in ("running", "paused"):
         raise CommandError(f"the mission is {state} in a service that would not notice", "Name that service with --url")
     return mission
 

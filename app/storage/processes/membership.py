@@ -10,15 +10,19 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Protocol
 
-from sqlalchemy import make_url
+from sqlalchemy import make_url, text
 from sqlalchemy.exc import SQLAlchemyError
-from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncSession, create_async_engine
 from sqlalchemy.pool import NullPool
 
 from app.storage.processes.process_lock import LockHeldError, ProcessLock, is_held
 
 LOCKS = 0x62617468
 """The first half of our advisory locks' names in PostgreSQL; the second is the process's number."""
+HELD = (  # of our locks in a database, the numbers whose processes live
+    f"SELECT objid::bigint FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint = {LOCKS} AND objsubid = 2 "  # noqa: S608 - a number of our own
+    "AND granted AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+)
 CHANNEL = "bathyfleet"
 """PostgreSQL's channel on which processes ask each other to look again."""
 SILENCE_S = 4
@@ -54,6 +58,14 @@ def make_membership(url: str, on_call: Callable[[], None]) -> Membership:
     if parsed.get_backend_name() == "sqlite":
         return FileMembership(Path(parsed.database or "bathyfleet.db"))
     return AdvisoryMembership(url, on_call)
+
+
+async def alive_beside(session: AsyncSession, url: str, numbers: Iterable[int]) -> set[int]:
+    """Return those of the numbers whose processes live, as it is seen by one that is none of them."""
+    parsed = make_url(url)
+    if parsed.get_backend_name() == "sqlite":
+        return await FileMembership(Path(parsed.database or "bathyfleet.db")).alive(numbers)
+    return set(await session.scalars(text(HELD))) & set(numbers)
 
 
 class FileMembership:
@@ -136,11 +148,7 @@ class AdvisoryMembership:
 
     async def alive(self, numbers: Iterable[int]) -> set[int]:
         """Return the numbers whose locks are held. Raises MembershipLostError when the server does not answer."""
-        query = (
-            "SELECT objid::bigint FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint = $1 AND objsubid = 2 "
-            "AND granted AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-        )
-        held = {int(row[0]) for row in await self._ask("fetch", query, LOCKS)}
+        held = {int(row[0]) for row in await self._ask("fetch", HELD)}
         return held & set(numbers)
 
     async def call(self) -> None:

@@ -150,11 +150,18 @@ async def two_services(folder: Path, *, steps: int, speed: float) -> dict[str, A
     ):
         our_mission = await _begun(our_api, NAMES[:1], steps=steps)
         await steps_more(ours, our_mission, 1)
-        # What they begin with our vehicle is refused, with the reason.
+
+        async def seen() -> bool:
+            vehicles = (await their_api.get("/vehicles")).json()
+            return any(v["name"] == NAMES[0] and "another console" in v["reason"] for v in vehicles)
+
+        await until(seen, "they see that our vehicle is led by another console")
+        # What they begin with it is refused, with the reason.
         created = await their_api.post("/missions", json=_spec(NAMES[:1], steps))
         refused = await their_api.post(f"/missions/{created.json()['id']}/start")
         assert refused.status_code == httpx.codes.CONFLICT, refused.text
         assert NAMES[0] in refused.json()["detail"]
+        assert "of another console" in refused.json()["detail"]
         their_mission = await _begun(their_api, NAMES[1:], steps=steps)
         for api, service, mission_id in ((our_api, ours, our_mission), (their_api, theirs, their_mission)):
             last = await ended(api, mission_id, PATIENCE_S + 60.0 * steps / speed)
