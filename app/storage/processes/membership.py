@@ -19,10 +19,11 @@ from app.storage.processes.process_lock import LockHeldError, ProcessLock, is_he
 
 LOCKS = 0x62617468
 """The first half of our advisory locks' names in PostgreSQL; the second is the process's number."""
-HELD = (  # of our locks in a database, the numbers whose processes live
-    f"SELECT objid::bigint FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint = {LOCKS} AND objsubid = 2 "  # noqa: S608 - a number of our own
-    "AND granted AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+HELD = (
+    f"SELECT objid::bigint FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint = {LOCKS} "  # noqa: S608
+    "AND objsubid = 2 AND granted AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
 )
+"""Asks PostgreSQL for the numbers of a database's processes that live."""
 CHANNEL = "bathyfleet"
 """PostgreSQL's channel on which processes ask each other to look again."""
 SILENCE_S = 4
