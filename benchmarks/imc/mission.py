@@ -122,10 +122,10 @@ async def fly(options: argparse.Namespace, seed: int, folder: Path) -> dict[str,
     database = Database(url)
     service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=options.speed), database)
     begun = time.monotonic()
-    for vehicle in vehicles:
-        vehicle.start()
-    await service.startup()
     try:
+        for vehicle in vehicles:
+            vehicle.start()
+        await service.startup()
         identity = (await service.create(mission(options))).id
         while sum(view.link == "ready" for view in await service.vehicles()) < options.vehicles:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
