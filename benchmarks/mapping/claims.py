@@ -126,7 +126,7 @@ def claims_of(terrain: Terrain, survey: Survey, planner: str, seed: int = 0, acc
         known, error = built.map.known(accuracy_m), np.abs(built.map.depth_m - truth)
         seen = builder.mask & np.isfinite(error)
         right = error[known & seen] <= RIGHT_WITHIN * accuracy_m
-        end = builder.as_of(soundings).known(accuracy_m)
+        end = builder.as_of(soundings, builder.swath).known(accuracy_m)
         found.append(
             Claim(
                 part,
