@@ -4,6 +4,7 @@ import mimetypes
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import structlog
 from fastapi import FastAPI
 from fastapi.responses import FileResponse, HTMLResponse
 from starlette.datastructures import Headers
@@ -11,7 +12,11 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
+log = structlog.get_logger(__name__)
+
 STATIC = Path(__file__).with_name("static")
+PMTILES = b"PMTiles"
+"""How such a file begins."""
 
 # Some machines know no type for modules, and browsers run only what is called JavaScript.
 mimetypes.add_type("text/javascript", ".mjs")
@@ -72,6 +77,15 @@ class HashedFiles(StaticFiles):
         return response
 
 
+def _unusable(charts: Path) -> str:
+    """Return why a file cannot be drawn under the map; empty where it can."""
+    try:
+        with charts.open("rb") as file:
+            return "" if file.read(len(PMTILES)) == PMTILES else "it is no PMTiles file"
+    except OSError as error:
+        return error.strerror or str(error)
+
+
 def mount_dashboard(app: FastAPI, static: Path = STATIC, charts: str = "") -> None:
     """Serve the dashboard at ``/`` and its assets below ``/assets``.
 
@@ -85,6 +99,10 @@ def mount_dashboard(app: FastAPI, static: Path = STATIC, charts: str = "") -> No
         What is drawn under the map: a ``.pmtiles`` file, a tile server's address, or nothing.
     """
     server = urlsplit(charts) if "://" in charts else None
+    if charts and server is None and (why := _unusable(Path(charts))):
+        # Vehicles are not left alone for a picture.
+        log.warning("no charts are drawn: name a .pmtiles file or a tile server's address", charts=charts, reason=why)
+        charts = ""
     policy = CONTENT_SECURITY_POLICY
     if server is not None:
         # The page asks nobody else but this one.

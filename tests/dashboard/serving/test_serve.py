@@ -87,11 +87,15 @@ async def test_charts_come_from_a_file_in_parts_from_one_server_or_not_at_all(st
     assert (await client(static).get("/charts.json")).json() == {"tiles": ""}
     assert (await client(static).get("/charts.pmtiles")).status_code == 404
     file = tmp_path / "harbour.pmtiles"
-    file.write_bytes(bytes(range(200)))
+    file.write_bytes(b"PMTiles" + bytes(range(7, 200)))
     own = client(static, str(file))
     assert (await own.get("/charts.json")).json() == {"tiles": "pmtiles:///charts.pmtiles"}
     part = await own.get("/charts.pmtiles", headers={"Range": "bytes=10-19"})
     assert (part.status_code, part.content) == (206, bytes(range(10, 20)))
+    for unusable in (tmp_path / "nowhere.pmtiles", static / "index.html"):
+        none = client(static, str(unusable))
+        assert (await none.get("/charts.json")).json() == {"tiles": ""}
+        assert (await none.get("/charts.pmtiles")).status_code == 404
     server = client(static, "https://tiles.example:8443/{z}/{x}/{y}.png")
     policy = (await server.get("/")).headers["content-security-policy"]
     assert "connect-src 'self' https://tiles.example:8443;" in policy
