@@ -8,7 +8,8 @@ from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
 
-from app.storage.processes.membership import Membership, MembershipLostError, make_membership
+from app.storage.database import Database
+from app.storage.processes.membership import Membership, MembershipLostError, alive_beside, make_membership
 from tests.support.storage.databases import Databases
 
 HOLDER = """
@@ -42,6 +43,13 @@ async def test_each_sees_who_lives(url: str) -> None:
         assert await two.alive([1, 3]) == {1}
         await guests.aclose()
         assert await one.alive([1, 2, 3]) == {1}
+
+
+async def test_who_is_none_of_them_sees_who_lives(url: str) -> None:
+    database = Database(url)
+    async with member(url, 2), database.reading() as session:
+        assert await alive_beside(session, url, [1, 2]) == {2}
+    await database.close()
 
 
 async def test_who_left_does_not_live_from_then_on(url: str) -> None:
