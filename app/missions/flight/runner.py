@@ -156,11 +156,13 @@ class Runner:
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}
         for member in live.team:
+            was_led = member.legs > 0
             member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
             member.spared = spared[member.name]
             of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
-            self._leave_out_passed(member)
+            if not was_led:
+                self._leave_out_passed(member)  # after a pause all that was flown is written down
         await live.journal.log(Level.INFO, "resumed", f"going on after step {step.number}", step=step.number)
         return True
 

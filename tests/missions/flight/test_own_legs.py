@@ -15,6 +15,7 @@ from sqlalchemy import select
 
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
+from app.missions.flight import runner
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import NO_LEG, LegCommit
@@ -243,6 +244,37 @@ async def test_vehicles_that_fall_silent_while_legs_are_exchanged_are_waited_for
     view = await until_state(service, mission, MissionState.FINISHED)
     assert len(silent) == 2
     assert view.reason == "every step is done"
+
+
+async def test_after_a_pause_no_leg_is_left_out_as_after_a_restart(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A later leg may pass the vehicle closer than the one that it flies."""
+    monkeypatch.setattr(runner, "nearest_leg", lambda *_: 1)
+    service = await harbour_closed.open(time_scale=2.0)
+    mission = (await service.create(sim_spec("a", steps=12, side_m=60.0, **APART))).id
+
+    async def left_out() -> int:
+        await live.journal.flush()
+        async with harbour_closed.database.reading() as session:
+            rows = (await session.scalars(select(WaypointRow))).all()
+        return sum("while nobody was there" in row.reason for row in rows)
+
+    async def resumed(times: int) -> bool:
+        return sum("going on after step" in event.message for event in await events_after(live)) == times
+
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: len(live.team.named("a").ahead) >= 2, "several legs")
+    await act(service, mission, "pause")
+    await act(service, mission, "resume")
+    await until(lambda: resumed(1), "it goes on")
+    assert await left_out() == 0
+    service = await harbour_closed.reopen(time_scale=2.0)
+    live = await service.get(mission)
+    await until(lambda: resumed(2), "it goes on")
+    assert await left_out() == 1
+    await act(service, mission, "abort")
 
 
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
