@@ -101,7 +101,7 @@ def lines(
 
 def needed_lines(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:
     """Return how many lines see the cells (along, across) of each column, parts of lines included."""
-    width_m = np.maximum(raster.half_width_m(flying), 0.5 * raster.cell_m)
+    width_m = np.maximum(flying.half_width_m(raster.likely_m), 0.5 * raster.cell_m)
     return np.asarray((cells * raster.cell_m / ((2.0 - flying.overlap) * width_m)).sum(axis=1))
 
 

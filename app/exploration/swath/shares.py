@@ -38,7 +38,7 @@ def share_out(
     for name in names:
         sweeps[name].share = None
     # Nobody is given less than a line: the way to it would be longer.
-    names = names[: max(1, int(whole + ALMOST))]
+    names = names[: max(1, int(np.ceil(whole - ALMOST)))]
     if len(names) == 1:
         across = float(raster.axes.turned(team[names[0]][:2])[1])
         low, high = float(raster.across_m[0]), float(raster.across_m[-1])
