@@ -77,12 +77,8 @@ def lines(
     target_m = edge_m + sign * (1.0 - overlap) * width_m
     far_m = _sides(raster, last[columns], sign)
     back_m = far_m - sign * (1.0 - flying.overlap) * _reach_m(raster, columns, last[columns], far_m, -sign, flying)
-    wish_m = 0.5 * (edge_m + far_m) if near_m is None else near_m[columns]
-    target_m = np.where(
-        sign * back_m < sign * target_m,
-        sign * np.clip(sign * wish_m, sign * back_m, sign * target_m),
-        target_m,
-    )
+    sees_all = sign * back_m < sign * target_m
+    middle_m = 0.5 * (edge_m + far_m)
     bridge = max(1, int(BRIDGED_RADII * flying.radius_m / raster.cell_m))
     parted = (np.diff(columns) > bridge) | (
         np.abs(np.diff(edge_m)) > 1.5 * np.maximum(width_m[1:], width_m[:-1]) + raster.cell_m
@@ -90,8 +86,19 @@ def lines(
     found = []
     for part in np.split(np.arange(len(columns)), np.flatnonzero(parted) + 1):
         whole = np.arange(columns[part[0]], columns[part[-1]] + 1)
+        needs = part[~sees_all[part]]
+        wish_m = (
+            near_m[columns[part]]
+            if near_m is not None
+            else np.interp(part, needs, target_m[needs])
+            if len(needs)
+            else middle_m[part]
+        )
+        wish_m = np.where(
+            sees_all[part], sign * np.clip(sign * wish_m, sign * back_m[part], sign * target_m[part]), target_m[part]
+        )
         wish = np.full(len(whole), np.inf)
-        wish[columns[part] - whole[0]] = sign * target_m[part]
+        wish[columns[part] - whole[0]] = sign * wish_m
         width = np.interp(whole, columns[part], width_m[part])
         radius_m = bend_radius_m(width, flying)
         wish = _worth(wish, width, raster.cell_m, flying, radius_m)
