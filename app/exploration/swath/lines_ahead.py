@@ -8,7 +8,7 @@ from app.arrays import FloatArray
 from app.exploration.core.coverage import Coverage
 from app.exploration.motion.dubins import lengths_m
 from app.exploration.swath.lines import Line, lines, strips
-from app.exploration.swath.raster import Beyond, Flying, LineRaster, raster_of, slope_of
+from app.exploration.swath.raster import Flying, LineRaster, raster_of
 
 CELLS_ALONG = (100, 250)
 """Cells of the longer side of the rasters that directions are compared on: fewest and most."""
@@ -121,12 +121,10 @@ def best_direction(
     cell_m = float(np.clip(fine_m, extent_m / CELLS_ALONG[1], extent_m / CELLS_ALONG[0]))
     cell_m = max(cell_m, least_cell_m)
 
-    beyond = Beyond(slope_of(coverage))
     careful = replace(flying, overlap=flying.overlap + DOUBT)
 
     def length_m(direction_rad: float, most_m: float) -> float:
-        raster = raster_of(coverage, direction_rad, cell_m, guess_m, beyond)
-        raster = replace(raster, depth_m=raster.likely_m)
+        raster = raster_of(coverage, direction_rad, cell_m, guess_m)
         start = raster.axes.to_en(raster.corner_m)
         found = ahead(raster, careful, np.array([*start, np.nan]), most_m=most_m)
         return np.inf if found is None else found.length_m

@@ -165,36 +165,12 @@ class LineRaster:
 
 
 SHOALING, SHOALING_OF_STEEP = (0.01, 0.1), 1.0
-"""Metres by which unknown ground is reckoned to rise a metre away from known ground, least and most: so many times what
+"""Metres by which unknown ground is presumed to rise a metre away from known ground, least and most: so many times what
 the steepest known ground does. Lines rather begin too close."""
-
-SLOPE_SD = 0.1
-"""Deviation of the slopes that sea floors have at large, metres a metre: by it slopes of little known ground are
-drawn towards level."""
-
-
-ROUGH_M = 0.1
-"""Least deviation of the bottom from a plane, metres."""
-
-
-@dataclass(frozen=True)
-class Beyond:
-    """How the bottom goes on where it is unknown: from the closest known place.
-
-    Attributes
-    ----------
-    slope : (2,)
-        Metres by which it likely falls a metre east, and north.
-    shoaling
-        Metres by which it is reckoned to rise a metre.
-    """
-
-    slope: FloatArray
-    shoaling: float = 0.0
 
 
 class Rasters:
-    """Rasters of areas whose unknown ground is taken to go on as the known ground is.
+    """Rasters of areas whose unknown ground rises as steep known ground does.
 
     Parameters
     ----------
@@ -206,24 +182,24 @@ class Rasters:
 
     def __init__(self, cell_m: float, guess_m: float) -> None:
         self.cell_m, self.guess_m = cell_m, guess_m
-        self._beyond: tuple[FloatArray, Beyond] | None = None
-        """How unknown ground goes on, and the depths that this follows from."""
+        self._shoaling: tuple[FloatArray, float] | None = None
+        """How much the bottom is presumed to rise, and the depths that this follows from."""
 
     def of(self, coverage: Coverage, direction_rad: float) -> LineRaster:
         """Return an area in the frame of lines in a direction, anticlockwise from east."""
-        if self._beyond is None or self._beyond[0] is not coverage.depth_m:
+        if self._shoaling is None or self._shoaling[0] is not coverage.depth_m:
             steep = SHOALING_OF_STEEP * steepness(coverage)
-            self._beyond = coverage.depth_m, Beyond(slope_of(coverage), float(np.clip(steep, *SHOALING)))
-        return raster_of(coverage, direction_rad, self.cell_m, self.guess_m, self._beyond[1])
+            self._shoaling = coverage.depth_m, float(np.clip(steep, *SHOALING))
+        return raster_of(coverage, direction_rad, self.cell_m, self.guess_m, self._shoaling[1])
 
 
 def raster_of(
-    coverage: Coverage, direction_rad: float, cell_m: float, guess_m: float, beyond: Beyond | None = None
+    coverage: Coverage, direction_rad: float, cell_m: float, guess_m: float, shoaling: float = 0.0
 ) -> LineRaster:
     """Return an area in the frame of lines in a direction, with cells not finer than those of the grid.
 
-    ``guess_m`` is taken for the depth as long as none is known. Away from known places the bottom goes on as told by
-    ``beyond``, None: level; no farther than to half and twice its depth there.
+    ``guess_m`` is taken for the depth as long as none is known. Away from known places the bottom is taken to rise by
+    ``shoaling``, metres a metre, up to half of its depth.
     """
     axes = Axes(direction_rad)
     wanted_m = axes.turned(coverage.places_m(coverage.wanted))
@@ -244,9 +220,7 @@ def raster_of(
     count = np.bincount(flat, minlength=int(shape.prod())).reshape(shape)
     total = np.bincount(flat, coverage.depth_m[known], minlength=int(shape.prod())).reshape(shape)
     depth = np.divide(total, count, out=np.full(shape, np.nan), where=count > 0)
-    beyond = Beyond(np.zeros(2)) if beyond is None else beyond
-    depth_m, likely_m = _filled(depth, guess_m, axes.turned(beyond.slope) * cell_m, beyond.shoaling * cell_m)
-    return LineRaster(axes, corner, cell_m, still_open, wanted, depth_m, likely_m)
+    return LineRaster(axes, corner, cell_m, still_open, wanted, *_filled(depth, guess_m, shoaling * cell_m))
 
 
 def steepness(coverage: Coverage) -> float:
@@ -264,34 +238,8 @@ def steepness(coverage: Coverage) -> float:
     return float(np.quantile(rises, STEEP)) / blocks.cell_m if len(rises) >= FEWEST_RISES else np.inf
 
 
-def slope_of(coverage: Coverage) -> FloatArray:
-    """Return how much the bottom falls a metre east, and north, (2,): by a plane through all that is known.
-
-    A ridge regression (Hoerl and Kennard 1970): the less is known in a direction, and the less of it is a plane, the
-    more level it is. Blocks as wide as the bottom is deep count as independent.
-    """
-    known_m = coverage.depth_m[np.isfinite(coverage.depth_m)]
-    if not known_m.size:
-        return np.zeros(2)
-    blocks = coverage.coarser(max(1, round(float(np.median(known_m)) / coverage.cell_m)))
-    known = np.isfinite(blocks.depth_m)
-    depth_m = blocks.depth_m[known]
-    if len(depth_m) < FEWEST_RISES:
-        return np.zeros(2)
-    places_m = blocks.places_m(known)
-    places_m, depth_m = places_m - places_m.mean(axis=0), depth_m - depth_m.mean()
-    squares, products = places_m.T @ places_m, places_m.T @ depth_m
-    rough_m = float(np.std(depth_m - places_m @ np.linalg.lstsq(places_m, depth_m, rcond=None)[0]))
-    shrunk = (max(rough_m, ROUGH_M) / SLOPE_SD) ** 2
-    return np.asarray(np.linalg.solve(squares + shrunk * np.eye(2), products))
-
-
-def _filled(depth_m: FloatArray, guess_m: float, fall_m: FloatArray, rise_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return depths also where there are none: as shoal as is reckoned with, and as they likely are.
-
-    Both go on from the closest known place, by ``rise_m`` for each cell between, and by ``fall_m`` (2,) for each cell
-    along and across.
-    """
+def _filled(depth_m: FloatArray, guess_m: float, rise_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return depths where there is none: the closest known one less ``rise_m`` for each cell between, and without."""
     unknown = np.isnan(depth_m)
     if unknown.all():
         return np.full_like(depth_m, guess_m), np.full_like(depth_m, guess_m)
@@ -299,8 +247,4 @@ def _filled(depth_m: FloatArray, guess_m: float, fall_m: FloatArray, rise_m: flo
         return depth_m, depth_m
     away, nearest = distance_transform_edt(unknown, return_indices=True)
     closest_m = depth_m[tuple(nearest)]
-    fallen_m = np.tensordot(fall_m, np.indices(depth_m.shape) - nearest, axes=1)
-    return (
-        np.maximum(closest_m - rise_m * away, 0.5 * closest_m),
-        np.clip(closest_m + fallen_m, 0.5 * closest_m, 2.0 * closest_m),
-    )
+    return np.maximum(closest_m - rise_m * away, 0.5 * closest_m), closest_m

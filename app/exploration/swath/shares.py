@@ -6,7 +6,7 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.swath.assignment import Assignment, Question, Strip
-from app.exploration.swath.lines import needed_lines
+from app.exploration.swath.lines import ALMOST, needed_lines
 from app.exploration.swath.lines_ahead import path_m
 from app.exploration.swath.passes import BUSY
 from app.exploration.swath.raster import Flying, LineRaster
@@ -38,7 +38,7 @@ def share_out(
     for name in names:
         sweeps[name].share = None
     # Nobody is given less than a line: the way to it would be longer.
-    names = names[: max(1, round(whole))]
+    names = names[: max(1, int(np.ceil(whole - ALMOST)))]
     if len(names) == 1:
         across = float(raster.axes.turned(team[names[0]][:2])[1])
         low, high = float(raster.across_m[0]), float(raster.across_m[-1])
