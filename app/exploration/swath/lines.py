@@ -65,7 +65,8 @@ def lines(
 
     In each column the line lies so far beyond the first open cell that its swath just reaches back to it: how far that
     is follows from the depth there, which the last line has measured. A line bends gently. Where one line sees all that
-    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it, else in the middle.
+    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it; None: to where it lies in
+    columns that need more than one, or without any in the middle.
     """
     first, last, has = _extent(open_cells, sign)
     if not has.any():
@@ -78,7 +79,6 @@ def lines(
     far_m = _sides(raster, last[columns], sign)
     back_m = far_m - sign * (1.0 - flying.overlap) * _reach_m(raster, columns, last[columns], far_m, -sign, flying)
     sees_all = sign * back_m < sign * target_m
-    middle_m = 0.5 * (edge_m + far_m)
     bridge = max(1, int(BRIDGED_RADII * flying.radius_m / raster.cell_m))
     parted = (np.diff(columns) > bridge) | (
         np.abs(np.diff(edge_m)) > 1.5 * np.maximum(width_m[1:], width_m[:-1]) + raster.cell_m
@@ -86,19 +86,16 @@ def lines(
     found = []
     for part in np.split(np.arange(len(columns)), np.flatnonzero(parted) + 1):
         whole = np.arange(columns[part[0]], columns[part[-1]] + 1)
-        needs = part[~sees_all[part]]
-        wish_m = (
-            near_m[columns[part]]
-            if near_m is not None
-            else np.interp(part, needs, target_m[needs])
-            if len(needs)
-            else middle_m[part]
-        )
-        wish_m = np.where(
-            sees_all[part], sign * np.clip(sign * wish_m, sign * back_m[part], sign * target_m[part]), target_m[part]
-        )
+        more = part[~sees_all[part]]
+        if near_m is not None:
+            wish_m = near_m[columns[part]]
+        elif len(more):
+            wish_m = np.interp(part, more, target_m[more])
+        else:
+            wish_m = 0.5 * (edge_m + far_m)[part]
+        lies_m = sign * np.clip(sign * wish_m, sign * back_m[part], sign * target_m[part])
         wish = np.full(len(whole), np.inf)
-        wish[columns[part] - whole[0]] = sign * wish_m
+        wish[columns[part] - whole[0]] = sign * np.where(sees_all[part], lies_m, target_m[part])
         width = np.interp(whole, columns[part], width_m[part])
         radius_m = bend_radius_m(width, flying)
         wish = _worth(wish, width, raster.cell_m, flying, radius_m)
@@ -108,7 +105,7 @@ def lines(
 
 def needed_lines(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:
     """Return how many lines see the cells (along, across) of each column, parts of lines included."""
-    width_m = np.maximum(flying.half_width_m(raster.likely_m), 0.5 * raster.cell_m)
+    width_m = np.maximum(raster.likely_half_width_m(flying), 0.5 * raster.cell_m)
     return np.asarray((cells * raster.cell_m / ((2.0 - flying.overlap) * width_m)).sum(axis=1))
 
 

@@ -97,6 +97,7 @@ class LineRaster:
     depth_m: FloatArray
     likely_m: FloatArray
     _half_widths: dict[Flying, FloatArray] = field(default_factory=dict)
+    _likely_half_widths: dict[Flying, FloatArray] = field(default_factory=dict)
 
     def half_width_m(self, flying: Flying) -> FloatArray:
         """Return how far to either side the bottom is seen over each cell."""
@@ -104,9 +105,15 @@ class LineRaster:
             self._half_widths[flying] = flying.half_width_m(self.depth_m)
         return self._half_widths[flying]
 
+    def likely_half_width_m(self, flying: Flying) -> FloatArray:
+        """Return how far to either side the bottom is likely seen over each cell."""
+        if flying not in self._likely_half_widths:
+            self._likely_half_widths[flying] = flying.half_width_m(self.likely_m)
+        return self._likely_half_widths[flying]
+
     def work_m(self, flying: Flying) -> FloatArray:
         """Return how much of a line each cell takes, by the width that is likely seen over it."""
-        return np.asarray(self.cell_m**2 / np.maximum(2.0 * flying.half_width_m(self.likely_m), self.cell_m))
+        return np.asarray(self.cell_m**2 / np.maximum(2.0 * self.likely_half_width_m(flying), self.cell_m))
 
     @property
     def along_m(self) -> FloatArray:
