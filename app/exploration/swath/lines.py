@@ -65,8 +65,8 @@ def lines(
 
     In each column the line lies so far beyond the first open cell that its swath just reaches back to it: how far that
     is follows from the depth there, which the last line has measured. A line bends gently. Where one line sees all that
-    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it; None: to where it lies in
-    columns that need more than one, or without any in the middle.
+    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it. None: to where it lies
+    in columns that need more than one line, or without any in the middle.
     """
     first, last, has = _extent(open_cells, sign)
     if not has.any():
