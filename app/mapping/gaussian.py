@@ -8,7 +8,7 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.kriging.cell_index import cell_numbers
+from app.mapping.kriging.cell_index import cell_by_cell, cell_numbers
 from app.mapping.kriging.kernels import exp_minus
 from app.mapping.kriging.neighbours import nearest
 from app.mapping.kriging.supersoundings import merge_soundings
@@ -231,24 +231,15 @@ def _bands(row: FloatArray, rows: int) -> list[slice]:
 
 @njit(cache=True, nogil=True)
 def _block_order(row: FloatArray, col: FloatArray, rows: int, cols: int) -> IntArray:
-    """Order of the soundings by blocks of cells, row-major; within a block as given (a counting sort)."""
+    """Order of the soundings by blocks of cells, row-major; within a block as given."""
     down = rows // BLOCK_CELLS + 1
     across = cols // BLOCK_CELLS + 1
-    n = len(row)
-    block = np.empty(n, np.int64)
-    start = np.zeros(down * across + 1, np.int64)
-    for i in range(n):
+    block = np.empty(len(row), np.int64)
+    for i in range(len(row)):
         r = int(min(max(row[i], 0.0), rows - 1.0)) // BLOCK_CELLS
         c = int(min(max(col[i], 0.0), cols - 1.0)) // BLOCK_CELLS
         block[i] = r * across + c
-        start[block[i] + 1] += 1
-    for b in range(down * across):
-        start[b + 1] += start[b]
-    order = np.empty(n, np.int64)
-    for i in range(n):
-        order[start[block[i]]] = i
-        start[block[i]] += 1
-    return order
+    return cell_by_cell(block, down * across)[0]
 
 
 @njit(cache=True, nogil=True)

@@ -85,7 +85,7 @@ class NeptusSessions:
         try:
             return await self._log_in(password, host, own_user)
         except MissionError as error:
-            raise SessionRefusedError(f"{error}. {error.remedy}") from error
+            raise SessionRefusedError(f"{error}; {error.remedy}") from error
 
     async def begin(self, session: str, vehicles: int, user: str, host: str) -> None:
         """Make the session's mission. What its console flew before ends when nothing is heard of it any more."""
@@ -96,7 +96,7 @@ class NeptusSessions:
         try:
             mission = await self._service.create(spec, actor=user)
         except MissionError as error:
-            raise SessionRefusedError(f"{error}. {error.remedy}") from error
+            raise SessionRefusedError(f"{error}; {error.remedy}") from error
         self._missions[session] = mission.id
         self._users[session] = user
         self.link.add(session, [vehicle.name for vehicle in spec.vehicles], host)
@@ -144,7 +144,7 @@ class NeptusSessions:
             if state is MissionState.READY:
                 await self._service.act(mission, Action.START, actor=user, note="START in the panel")
         except MissionError as error:
-            raise SessionRefusedError(f"{error}. {error.remedy}") from error
+            raise SessionRefusedError(f"{error}; {error.remedy}") from error
         await self._warn_of_border(data)
         await self._warn_of_slants(data)
         refused = "; ".join(f"{count} {reason}" for reason, count in sorted(data.refused.items()))

@@ -11,6 +11,7 @@ page.
 import argparse
 import asyncio
 import json
+import os
 import sys
 import tempfile
 import time
@@ -233,7 +234,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(json.dumps(found, indent=1))
     figures = {key: value for key, value in found.items() if key != "by_vehicle"}
     length = f"{options.minutes:g} min in" if options.minutes else f"{options.steps}"
-    title = f"{options.vehicles} vehicles ({options.kind}), {options.side:g} m, {length} legs of {options.leg:g} m"
+    title = f"{options.planner}, {options.vehicles} vehicles ({options.kind}), {options.side:g} m, {length} legs of "
+    title += f"{options.leg:g} m"
+    if options.speeds:
+        title += f", {' and '.join(f'{speed:g}' for speed in options.speeds)} m/s"
+        figures["flown_m_by_vehicle"] = [vehicle["flown_m"] for vehicle in found["by_vehicle"].values()]
+    if options.slow_decisions:
+        title += f", decisions of {options.slow_decisions:g} s"
+    figures["load_of_the_machine"] = round(os.getloadavg()[1], 1)
     write_section(options.write, FLIGHT, title, figures, seeds=[options.seed])
 
 

@@ -34,7 +34,7 @@ HALF_SWATH_DEG = 60.0
 PER_SECOND = 200
 """Pings that come by telemetry: ten times what four vehicles send."""
 WATCH_S = 0.005
-QUIET = 0.2
+QUIET = 0.03
 """Cores that a process takes in which nothing happens but the measuring itself."""
 
 

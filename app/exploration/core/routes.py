@@ -16,9 +16,13 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Situation
 
 CORNER_TOLERANCE = 0.15
-"""A corner may be cut when the leg passes it within this fraction of a step."""
+"""A corner may be cut when the leg passes it within this fraction of a step, ..."""
+CORNER_MOST_M = 2.0
+"""... and within so many metres: where a step is as long as a line, lines side by side would become a zigzag."""
 SAME_CORNER = 0.03
 """Vertices that are no farther apart than this fraction of a step are one corner."""
+SAME_M = 1e-3
+"""Places no farther apart are the same."""
 SWING = 3.94
 """Radii per radian by which two turns to the same side, taken as one, exceed a right angle: right for a reversal."""
 SHARP_RAD = 0.5
@@ -40,7 +44,8 @@ def next_waypoint(
     step : float
         Largest length of the leg.
     cut : float
-        A vertex may be left aside by this fraction of a step, and with it others that belong to the same corner.
+        A vertex may be left aside by this fraction of a step, at most by ``CORNER_MOST_M``, and with it others that
+        belong to the same corner.
     """
     i = first
     while i < count and np.hypot(route[i, 0] - x, route[i, 1] - y) < 1e-9:
@@ -55,7 +60,7 @@ def next_waypoint(
         reached = 1 if d - step < 1e-9 else 0
         return x + f * dx, y + f * dy, i + reached
     # The vertex lies within the step: cut the corner when the leg still passes close to it.
-    to_x, to_y, ahead = route[i, 0], route[i, 1], i + 1
+    to_x, to_y, ahead, close_m = route[i, 0], route[i, 1], i + 1, min(cut * step, CORNER_MOST_M)
     for j in range(i, count - 1):
         if np.hypot(route[j, 0] - route[i, 0], route[j, 1] - route[i, 1]) > min(cut, SAME_CORNER) * step:
             break
@@ -73,7 +78,7 @@ def next_waypoint(
         for k in range(i, j + 1):
             kx, ky = route[k, 0] - x, route[k, 1] - y
             along = (kx * tx + ky * ty) / length
-            if not -1e-12 <= along <= length + 1e-12 or abs(kx * ty - ky * tx) / length > cut * step + 1e-12:
+            if not -1e-12 <= along <= length + 1e-12 or abs(kx * ty - ky * tx) / length > close_m + 1e-12:
                 close = False
                 break
         if not close:
@@ -82,6 +87,46 @@ def next_waypoint(
         if t < 1.0:
             break
     return to_x, to_y, ahead
+
+
+def follows(start: FloatArray, ends: FloatArray, planned_m: FloatArray) -> BoolArray:
+    """Return which legs lie on a planned one: they may end before it does, where they climb over ground, (...).
+
+    Parameters
+    ----------
+    start, planned_m : (2,) or what broadcasts with ``ends``
+        Where the planned leg begins and ends.
+    ends : (..., 2)
+        Where the legs end; one that ends where it begins follows a planned one only if that does, too.
+    """
+    way, planned = ends - start, planned_m - start
+    length = np.hypot(planned[..., 0], planned[..., 1])
+    along = (way * planned).sum(axis=-1)
+    aside = np.abs(way[..., 0] * planned[..., 1] - way[..., 1] * planned[..., 0])
+    on_line = (aside <= SAME_M * length) & (along > 0.0) & (along <= (length + SAME_M) * length)
+    same = np.hypot(ends[..., 0] - planned_m[..., 0], ends[..., 1] - planned_m[..., 1]) <= SAME_M
+    return np.asarray(on_line | same)
+
+
+def vertices_passed(start: FloatArray, end: FloatArray, route: FloatArray, step: float, cut: float) -> int | None:
+    """Return how many vertices of a route (m, 2) a leg reaches or leaves behind; None where it does not follow it.
+
+    The leg (2,) may end before the one of :func:`next_waypoint`. What it would have reached it has as good as reached
+    when no more than a corner's tolerance is left to fly.
+    """
+    x, y, reached = next_waypoint(start[0], start[1], route, 0, len(route), step, cut)
+    planned_m = np.array([x, y])
+    if not follows(start, end, planned_m):
+        return None
+    planned = planned_m - start
+    length = float(np.hypot(*planned))
+    if length <= SAME_M:
+        return reached
+    along = (route[:reached] - start) @ planned / length
+    beyond = np.flatnonzero(
+        along > float((end - start) @ planned) / length + max(min(cut * step, CORNER_MOST_M), SAME_M)
+    )
+    return int(beyond[0]) if len(beyond) else reached
 
 
 class Vehicles(NamedTuple):

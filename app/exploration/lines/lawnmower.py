@@ -10,7 +10,7 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint
+from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint, vertices_passed
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, longer_axis_rad, route_length
@@ -126,18 +126,16 @@ class LawnmowerPlanner(PlannerBase):
         # The corner that a leg cuts may be that of a zone: then it is flown out.
         cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
         targets = np.empty((len(cuts), len(team.vehicles), 2))
-        following = np.empty((len(cuts), len(team.vehicles)), dtype=np.int64)
         for k, cut in enumerate(cuts):
             for i, name in enumerate(team.vehicles):
                 route = self._routes[name] if team.moves[i] else self._routes[name][:0]
                 x, y = team.positions[i, :2]
-                targets[k, i, 0], targets[k, i, 1], following[k, i] = next_waypoint(
-                    x, y, route, 0, len(route), steps[i], cut
-                )
+                targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], cut)[:2]
         positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
         for i, name in enumerate(team.vehicles):
-            if team.moves[i] and np.hypot(*(positions[i, :2] - targets[which, i])) < 1e-6:
-                self._routes[name] = self._routes[name][following[which, i] :]
+            route, end_m = self._routes[name], positions[i, :2]
+            passed = vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which]) if team.moves[i] else 0
+            self._routes[name] = route[passed or 0 :]
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 

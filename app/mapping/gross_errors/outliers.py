@@ -7,12 +7,13 @@ from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.gross_errors.planes import LEAST_COMPANY, SUSPICION, judge_squares, plane_residuals
+from app.mapping.kriging.cell_index import cell_by_cell
 from app.mapping.kriging.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging.kriging import krige_holes
 from app.mapping.kriging.likelihood import Hyperparameters, RestrictedLikelihood, Trend, spread_subset
 from app.mapping.kriging.neighbours import nearest
 from app.mapping.kriging.scales import uniform_scales
-from app.mapping.kriging.supersoundings import merge_soundings
+from app.mapping.kriging.supersoundings import merge_soundings, squares
 from app.mapping.kriging.threads import each
 from app.mapping.types import Soundings
 
@@ -115,7 +116,7 @@ def flag_outliers(
     if len(trusted) == 0:
         trusted = np.arange(n)
         suspect = np.zeros(n, np.bool_)
-    extent = max(float(np.ptp(points, axis=0).max()), 1e-3)
+    extent = max(float(_extent(soundings).max()), 1e-3)
     merged, _ = merge_soundings(soundings.take(trusted), extent / max(100.0, 0.5 * np.sqrt(n)))
     merged_points = np.column_stack([merged.east_m, merged.north_m])
     tree = cKDTree(merged_points)
@@ -158,7 +159,7 @@ def flag_outliers(
 
         error, deviations[rows] = misses(np.arange(len(rows)), near)
         predicted[rows] = soundings.depth_m[rows] - error
-        accused = np.flatnonzero(np.nan_to_num(deviations[rows]) > CONVICTION)
+        accused = np.flatnonzero(deviations[rows] > CONVICTION)
         if len(accused) > 1:
             at = points[rows[accused]]
             distance, others = nearest(cKDTree(at), at, WITNESSES + 1)
@@ -167,7 +168,7 @@ def flag_outliers(
             witnesses = np.where(others == np.arange(len(accused))[:, None], -1, m + accused[others])
             _, heard = misses(accused, np.hstack([near[accused], witnesses]))
             deviations[rows[accused]] = np.where(agrees, 0.0, np.fmin(deviations[rows[accused]], heard))
-    rejected = np.nan_to_num(deviations) > CONVICTION
+    rejected = deviations > CONVICTION
     return OutlierReport(rejected, predicted, deviations, soundings.depth_m, hyperparameters)
 
 
@@ -233,6 +234,11 @@ def _excuse(
     return max(1.0, tail) * local(nearest(sampled, at, EXCUSE_NEIGHBOURS)[1])
 
 
+def _extent(soundings: Soundings) -> FloatArray:
+    """How far soundings reach eastward and northward in m, (2,)."""
+    return np.array([np.ptp(soundings.east_m), np.ptp(soundings.north_m)])
+
+
 def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:
     n = len(points)
     if n <= MANY:
@@ -247,14 +253,13 @@ def _suspects(points: FloatArray, soundings: Soundings) -> BoolArray:
 def _suspects_by_square(points: FloatArray, soundings: Soundings) -> tuple[BoolArray, BoolArray]:
     """Hold soundings against one robust plane per square; also return which have too few beside them, (n,) each."""
     n = len(points)
-    low = points.min(axis=0)
-    extent = np.maximum(np.ptp(points, axis=0), 1e-9)
+    extent = np.maximum(_extent(soundings), 1e-9)
     side = float(np.sqrt(extent.prod() * PER_SQUARE / n))
     side = max(side, float(extent.max()) / n)  # a straight track has no area
-    at = ((points - low) / side).astype(np.int64)
-    square = at[:, 1] * (int(at[:, 0].max()) + 1) + at[:, 0]
-    order = np.argsort(square, kind="stable")
-    first = np.append(np.flatnonzero(np.diff(square[order], prepend=-1)), n)
+    columns, rows = (extent / side).astype(np.int64) + 1
+    west, south = float(soundings.east_m.min()), float(soundings.north_m.min())
+    square = squares(soundings.east_m, soundings.north_m, west, south, side, int(columns))
+    order, first = cell_by_cell(square, int(columns * rows))
     suspect, alone = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
     per_chunk = max(1, CHUNK // PER_SQUARE)
     parts = [first[i : i + per_chunk + 1] for i in range(0, len(first) - 1, per_chunk)]

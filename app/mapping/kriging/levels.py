@@ -8,6 +8,7 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray, IntArray
+from app.mapping.kriging.cell_index import cell_by_cell
 from app.mapping.kriging.neighbours import nearest
 from app.mapping.kriging.supersoundings import merge_soundings
 from app.mapping.types import Soundings
@@ -89,11 +90,12 @@ def two_levels(soundings: Soundings, fine_m: float, coarse_m: float) -> TwoLevel
             for name in ("east_m", "north_m", "depth_m", "sd_m")
         )
     )
+    members, start = cell_by_cell(group, len(coarse))
     return TwoLevels(
         soundings=both,
         n_fine=len(fine),
-        members=np.argsort(group, kind="stable").astype(np.int64),
-        start=np.concatenate([[0], np.cumsum(np.bincount(group, minlength=len(coarse)))]).astype(np.int64),
+        members=members,
+        start=start,
         coarse_tree=cKDTree(np.column_stack([coarse.east_m, coarse.north_m])),
         coarse_m=coarse_m,
     )

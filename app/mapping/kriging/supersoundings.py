@@ -10,6 +10,15 @@ SQUARES_EACH, FEW_SQUARES = 8, 65_536
 """Up to so many squares for each sounding, or so many in all, are kept in a table; more are found by sorting."""
 
 
+@njit(cache=True, nogil=True)
+def squares(east: FloatArray, north: FloatArray, west: float, south: float, cell_m: float, columns: int) -> IntArray:
+    """Return the row-major number of each sounding's square, (n,)."""
+    square = np.empty(len(east), np.int64)
+    for i in range(len(east)):
+        square[i] = np.int64((north[i] - south) / cell_m) * columns + np.int64((east[i] - west) / cell_m)
+    return square
+
+
 def merge_soundings(soundings: Soundings, cell_m: float) -> tuple[Soundings, IntArray]:
     """Merge all soundings of one square of side ``cell_m`` into one.
 
@@ -29,7 +38,7 @@ def merge_soundings(soundings: Soundings, cell_m: float) -> tuple[Soundings, Int
     west, south = float(soundings.east_m.min()), float(soundings.north_m.min())
     columns = int((float(soundings.east_m.max()) - west) / cell_m) + 1
     rows = int((float(soundings.north_m.max()) - south) / cell_m) + 1
-    square = _squares(soundings.east_m, soundings.north_m, west, south, cell_m, columns)
+    square = squares(soundings.east_m, soundings.north_m, west, south, cell_m, columns)
     if rows * columns <= max(SQUARES_EACH * len(soundings), FEW_SQUARES):
         groups = _number_in_place(square, rows * columns)
         group = square
@@ -42,15 +51,6 @@ def merge_soundings(soundings: Soundings, cell_m: float) -> tuple[Soundings, Int
         soundings.east_m, soundings.north_m, soundings.depth_m, soundings.sd_m, group, groups, west, south, shallowest
     )
     return Soundings(*merged), group
-
-
-@njit(cache=True, nogil=True)
-def _squares(east: FloatArray, north: FloatArray, west: float, south: float, cell_m: float, columns: int) -> IntArray:
-    """Return the row-major number of each sounding's square, (n,)."""
-    square = np.empty(len(east), np.int64)
-    for i in range(len(east)):
-        square[i] = np.int64((north[i] - south) / cell_m) * columns + np.int64((east[i] - west) / cell_m)
-    return square
 
 
 @njit(cache=True, nogil=True)

@@ -307,7 +307,7 @@ class VehicleRefusedError(Exception):
     """A vehicle cannot do what was asked. ``reason`` says why, ``remedy`` what to do about it."""
 
     def __init__(self, vehicle: str, reason: str, remedy: str) -> None:
-        super().__init__(f"{vehicle}: {reason}. {remedy}")
+        super().__init__(f"{vehicle}: {reason}; {remedy}")
         self.vehicle = vehicle
         self.reason = reason
         self.remedy = remedy

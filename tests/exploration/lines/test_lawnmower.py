@@ -91,3 +91,17 @@ def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:
         if np.hypot(*(place - behind[0])) < 1.0:
             break
     assert place == pytest.approx(behind[0], abs=1.0)
+
+
+def test_lines_stay_side_by_side_where_a_step_is_as_long_as_a_line() -> None:
+    planner, rng = create_planner("lawnmower"), np.random.default_rng(0)
+    told, place, headings = situation(3000.0, (2.0, 2.0)), np.array([2.0, 2.0]), []
+    told = replace(told, constraints=replace(told.constraints, max_step_m=HEIGHT))
+    for _ in range(12):
+        end = planner.propose(replace(told, positions=np.array([[*place, 2.0]])), rng).positions[0, :2]
+        east, north = end - place
+        if np.hypot(east, north) > HEIGHT / 2:
+            headings.append(abs(np.rad2deg(np.arctan2(east, north))) % 180.0)
+        place = end
+    assert len(headings) >= 4
+    assert max(min(h, 180.0 - h) for h in headings) < 2.0, "they do not become a zigzag"

@@ -23,7 +23,16 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.problem import Belief, Situation
-from app.exploration.core.routes import CORNER_TOLERANCE, Turns, Vehicles, metres_left, next_waypoint
+from app.exploration.core.routes import (
+    CORNER_TOLERANCE,
+    SAME_M,
+    Turns,
+    Vehicles,
+    follows,
+    metres_left,
+    next_waypoint,
+    vertices_passed,
+)
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
 from app.exploration.planner.base import vehicle_rng
@@ -60,7 +69,6 @@ SILENT_WITHIN, SILENT = 0.5, 0.05
 JITTER = 0.7
 SKIPPED_M = 5.0
 """Ground along a line that is left out is marked at places so far apart."""
-SAME_M = 1e-3
 MOST_GIVEN = 24
 """How many of a vehicle's last legs can be taken back."""
 CORNER_LOSS = 0.4
@@ -218,16 +226,14 @@ class SurveyRegressors:
         for i, name in enumerate(self._team.vehicles):
             if not self._team.moves[i]:
                 continue
-            x, y = self._en[i]
-            self._flown_m += float(np.hypot(positions[i, 0] - x, positions[i, 1] - y))
+            self._flown_m += float(np.hypot(*(positions[i, :2] - self._en[i])))
             self._silent = np.vstack([self._silent, 0.5 * (self._en[i] + positions[i, :2]), positions[i, :2]])
             coarse, taken = self._coarse[name], [np.zeros((0, 2)), np.zeros((0, 2))]
             for which, routes in enumerate((self._plan, self._backbone)):
-                route = routes[name]
                 for cut in (CORNER_TOLERANCE, 0.0):
-                    tx, ty, first = next_waypoint(x, y, route, 0, len(route), self._steps_m[i], cut)
-                    if np.hypot(tx - positions[i, 0], ty - positions[i, 1]) < 1e-3:
-                        routes[name], taken[which] = route[first:], route[:first]
+                    first = vertices_passed(self._en[i], positions[i, :2], routes[name], self._steps_m[i], cut)
+                    if first is not None:
+                        routes[name], taken[which] = routes[name][first:], routes[name][:first]
                         if routes is self._plan:
                             self._coarse[name] = max(0, self._coarse[name] - first)
                         break
@@ -455,8 +461,7 @@ class SurveyRegressors:
         """Return which vehicles' legs are those of the plan that is followed, (c, n_vehicles)."""
         on_plan = np.zeros(candidates.shape[:2], dtype=np.bool_)
         for cut in (CORNER_TOLERANCE, 0.0):
-            away = candidates[..., :2] - self._first_legs(self._followed, cut)
-            on_plan |= np.hypot(away[..., 0], away[..., 1]) < 1e-3
+            on_plan |= follows(self._en, candidates[..., :2], self._first_legs(self._followed, cut))
         return on_plan
 
     def _legs_of(self, i: int, alpha: float) -> FloatArray:
