@@ -65,7 +65,8 @@ def lines(
 
     In each column the line lies so far beyond the first open cell that its swath just reaches back to it: how far that
     is follows from the depth there, which the last line has measured. A line bends gently. Where one line sees all that
-    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it, else in the middle.
+    is left of a column it lies as close to ``near_m`` (along), metres across, as that lets it. None: to where it lies
+    in columns that need more than one line, or without any in the middle.
     """
     first, last, has = _extent(open_cells, sign)
     if not has.any():
@@ -77,12 +78,7 @@ def lines(
     target_m = edge_m + sign * (1.0 - overlap) * width_m
     far_m = _sides(raster, last[columns], sign)
     back_m = far_m - sign * (1.0 - flying.overlap) * _reach_m(raster, columns, last[columns], far_m, -sign, flying)
-    wish_m = 0.5 * (edge_m + far_m) if near_m is None else near_m[columns]
-    target_m = np.where(
-        sign * back_m < sign * target_m,
-        sign * np.clip(sign * wish_m, sign * back_m, sign * target_m),
-        target_m,
-    )
+    sees_all = sign * back_m < sign * target_m
     bridge = max(1, int(BRIDGED_RADII * flying.radius_m / raster.cell_m))
     parted = (np.diff(columns) > bridge) | (
         np.abs(np.diff(edge_m)) > 1.5 * np.maximum(width_m[1:], width_m[:-1]) + raster.cell_m
@@ -90,8 +86,16 @@ def lines(
     found = []
     for part in np.split(np.arange(len(columns)), np.flatnonzero(parted) + 1):
         whole = np.arange(columns[part[0]], columns[part[-1]] + 1)
+        more = part[~sees_all[part]]
+        if near_m is not None:
+            wish_m = near_m[columns[part]]
+        elif len(more):
+            wish_m = np.interp(part, more, target_m[more])
+        else:
+            wish_m = 0.5 * (edge_m + far_m)[part]
+        lies_m = sign * np.clip(sign * wish_m, sign * back_m[part], sign * target_m[part])
         wish = np.full(len(whole), np.inf)
-        wish[columns[part] - whole[0]] = sign * target_m[part]
+        wish[columns[part] - whole[0]] = sign * np.where(sees_all[part], lies_m, target_m[part])
         width = np.interp(whole, columns[part], width_m[part])
         radius_m = bend_radius_m(width, flying)
         wish = _worth(wish, width, raster.cell_m, flying, radius_m)
@@ -101,7 +105,7 @@ def lines(
 
 def needed_lines(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:
     """Return how many lines see the cells (along, across) of each column, parts of lines included."""
-    width_m = np.maximum(raster.half_width_m(flying), 0.5 * raster.cell_m)
+    width_m = np.maximum(raster.likely_half_width_m(flying), 0.5 * raster.cell_m)
     return np.asarray((cells * raster.cell_m / ((2.0 - flying.overlap) * width_m)).sum(axis=1))
 
 

@@ -84,7 +84,9 @@ class LineRaster:
     wanted
         What the area is.
     depth_m
-        Depth of the bottom, everywhere: where it is unknown that of the closest known place.
+        Depth of the bottom, everywhere: where it is unknown as shoal as it has to be reckoned with.
+    likely_m
+        The same, where it is unknown that of the closest known place: by it lines are counted and shared out.
     """
 
     axes: Axes
@@ -93,7 +95,9 @@ class LineRaster:
     open: BoolArray
     wanted: BoolArray
     depth_m: FloatArray
+    likely_m: FloatArray
     _half_widths: dict[Flying, FloatArray] = field(default_factory=dict)
+    _likely_half_widths: dict[Flying, FloatArray] = field(default_factory=dict)
 
     def half_width_m(self, flying: Flying) -> FloatArray:
         """Return how far to either side the bottom is seen over each cell."""
@@ -101,9 +105,15 @@ class LineRaster:
             self._half_widths[flying] = flying.half_width_m(self.depth_m)
         return self._half_widths[flying]
 
+    def likely_half_width_m(self, flying: Flying) -> FloatArray:
+        """Return how far to either side the bottom is likely seen over each cell."""
+        if flying not in self._likely_half_widths:
+            self._likely_half_widths[flying] = flying.half_width_m(self.likely_m)
+        return self._likely_half_widths[flying]
+
     def work_m(self, flying: Flying) -> FloatArray:
-        """Return how much of a line each cell takes, by the width that is seen over it."""
-        return np.asarray(self.cell_m**2 / np.maximum(2.0 * self.half_width_m(flying), self.cell_m))
+        """Return how much of a line each cell takes, by the width that is likely seen over it."""
+        return np.asarray(self.cell_m**2 / np.maximum(2.0 * self.likely_half_width_m(flying), self.cell_m))
 
     @property
     def along_m(self) -> FloatArray:
@@ -217,7 +227,7 @@ def raster_of(
     count = np.bincount(flat, minlength=int(shape.prod())).reshape(shape)
     total = np.bincount(flat, coverage.depth_m[known], minlength=int(shape.prod())).reshape(shape)
     depth = np.divide(total, count, out=np.full(shape, np.nan), where=count > 0)
-    return LineRaster(axes, corner, cell_m, still_open, wanted, _filled(depth, guess_m, shoaling * cell_m))
+    return LineRaster(axes, corner, cell_m, still_open, wanted, *_filled(depth, guess_m, shoaling * cell_m))
 
 
 def steepness(coverage: Coverage) -> float:
@@ -235,13 +245,13 @@ def steepness(coverage: Coverage) -> float:
     return float(np.quantile(rises, STEEP)) / blocks.cell_m if len(rises) >= FEWEST_RISES else np.inf
 
 
-def _filled(depth_m: FloatArray, guess_m: float, rise_m: float) -> FloatArray:
-    """Return depths with the closest known one where there is none, less ``rise_m`` for each cell between."""
+def _filled(depth_m: FloatArray, guess_m: float, rise_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return depths where there is none: the closest known one less ``rise_m`` for each cell between, and without."""
     unknown = np.isnan(depth_m)
     if unknown.all():
-        return np.full_like(depth_m, guess_m)
+        return np.full_like(depth_m, guess_m), np.full_like(depth_m, guess_m)
     if not unknown.any():
-        return depth_m
+        return depth_m, depth_m
     away, nearest = distance_transform_edt(unknown, return_indices=True)
     closest_m = depth_m[tuple(nearest)]
-    return np.asarray(np.maximum(closest_m - rise_m * away, 0.5 * closest_m))
+    return np.maximum(closest_m - rise_m * away, 0.5 * closest_m), closest_m

@@ -37,8 +37,8 @@ def share_out(
     whole = float(needed_lines(raster, raster.open, flying).max(initial=1.0))
     for name in names:
         sweeps[name].share = None
-    # Nobody is given less than a line: the way to it would be longer.
-    names = names[: max(1, int(whole + ALMOST))]
+    # There is a line for each, if not a whole one.
+    names = names[: max(1, int(np.ceil(whole - ALMOST)))]
     if len(names) == 1:
         across = float(raster.axes.turned(team[names[0]][:2])[1])
         low, high = float(raster.across_m[0]), float(raster.across_m[-1])

@@ -106,6 +106,16 @@ def test_a_hole_does_not_hold_back_a_whole_line() -> None:
     assert np.allclose(together[0].across_m.max(), alone[0].across_m.max(), atol=1.0), "the hole waits"
 
 
+def test_a_line_goes_straight_on_where_little_is_left_beside_it() -> None:
+    """Its end is seen in part, all but a scrap on the side that was swept."""
+    coverage = flat(150, 200)
+    coverage.done[:, 170:] = True
+    coverage.done[:8, 170:] = False
+    raster = raster_of(coverage, 0.0, 1.0, 10.0)
+    (line,) = lines(raster, raster.open, 1, FLYING)
+    assert np.ptp(line.across_m) < 1.0
+
+
 def test_all_lines_together_see_everything_and_are_as_long_as_needed() -> None:
     coverage = flat(180, 300)
     raster = raster_of(coverage, 0.0, 1.0, 10.0)
