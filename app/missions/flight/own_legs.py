@@ -362,6 +362,10 @@ class OwnLegs:
     def _will_need_leg(self, member: Member) -> bool:
         if self._measured:
             return self._lasts_s(member) < SOON * self._lead_s
+        # Where decisions are slow one for everybody takes the time of one for somebody.
+        others_s = len(self._live.team.present) * self._decider.takes_s
+        if not self._watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s + others_s:
+            return True
         left_m = self._left_of_leg_m(member)
         return len(member.ahead) <= self._ahead and left_m <= HARDLY_BEGUN * self._spec.limits.max_step_m
 

@@ -40,7 +40,7 @@ class Decider:
     Attributes
     ----------
     takes_s
-        How long the next decision will take, on the wall clock, as the last ones did.
+        How long the next decision of one leg will take, on the wall clock, as the last ones did.
     attempt
         How often in a row legs were decided that a vehicle could not fly.
     """
@@ -101,7 +101,8 @@ class Decider:
 
         with metrics.PLANNING_SECONDS.time():
             decisions = await asyncio.get_running_loop().run_in_executor(self._executor, work)
-        took_s = asyncio.get_running_loop().time() - started_s
+        # Several legs at once take longer, and last longer: as one slow decision they would make for ever more of them.
+        took_s = (asyncio.get_running_loop().time() - started_s) / len(decisions)
         # Some decisions take longer than most. Vehicles would circle for them if the usual one were allowed for.
         self.takes_s = max(took_s, PACE_MEMORY * self.takes_s + (1 - PACE_MEMORY) * took_s)
         return decisions

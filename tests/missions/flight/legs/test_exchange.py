@@ -1,5 +1,6 @@
 """Legs that are not begun are exchanged for better ones: all of them and the planner's memory, or nothing."""
 
+import time
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -231,3 +232,21 @@ async def test_legs_that_may_not_be_flown_replace_none(
     assert not await flight.exchange.look()
     assert flight.ahead() == before == await flight.stored(database)
     assert flight.planner.snapshot() == memory
+
+
+async def test_legs_decided_together_do_not_count_as_one_slow_decision(
+    flight: Flight, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else more legs would be decided together the next time, and more still after that, while vehicles wait."""
+
+    def slow(*arguments: Any, **more: Any) -> Decision:
+        time.sleep(0.05)
+        return decide(*arguments, **more)
+
+    monkeypatch.setattr(deciding, "decide", slow)
+    flight.decider.takes_s = 0.0
+    places = [replace(place_ahead(m, flight.live), left_m=300.0) for m in flight.live.team]
+    began_s = time.monotonic()
+    decisions = await flight.decider.decide(LEGS + 1, places, legs=LEGS)
+    assert len(decisions) == LEGS
+    assert flight.decider.takes_s <= (time.monotonic() - began_s) / LEGS
