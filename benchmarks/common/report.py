@@ -54,7 +54,8 @@ FLIGHT = Page(
     """# Flying: what was measured
 
 Every section is written by the command that stands in it (`--write`). Vehicles are simulated; service and vehicles
-share the cores of one machine.
+share the cores of one machine. `loops` and `waiting_pct` count the circles of vehicles that give way, too, and of those
+that have flown their way and wait for the others.
 """,
 )
 COVERAGE = Page(
