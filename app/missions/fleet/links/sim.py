@@ -42,7 +42,7 @@ from simulator.sonars.sensors import SensorKind, SonarNoise
 from simulator.sonars.swath import SwathSonar
 from simulator.targets import Ranging, RangingNoise, Target
 from simulator.vehicles.battery import BatterySpec
-from simulator.vehicles.vehicle import BOAT
+from simulator.vehicles.vehicle import BOAT, VehicleLimits
 from simulator.world import SimulatedVehicle
 
 TICK_S = 0.05
@@ -195,7 +195,7 @@ class SimFleetLink(FleetLink):
                 noise=SonarNoise(relative_sd=launch.noise),
                 swath=launch.swath or SwathSonar(),
                 drift_m2ps=self._settings.drift_m2ps,
-                limits=None if launch.lookout is None else BOAT,
+                limits=_limits_of(launch),
                 battery=launch.battery,
             ),
             current=self._settings.current_mps,
@@ -428,3 +428,11 @@ class SimFleetLink(FleetLink):
         elif deployed.raised_to_m < ahead.depth_m and bottom_m - ahead.depth_m > least_m + ROOM_M:
             deployed.raised_to_m = math.inf
             deployed.head_for(order, ahead, ahead.depth_m)
+
+
+def _limits_of(launch: Launch) -> VehicleLimits:
+    """Return what a vehicle can do: one that is asked to be faster than an AUV plays a faster vehicle."""
+    if launch.lookout is not None:
+        return BOAT
+    auv = VehicleLimits()
+    return replace(auv, max_speed_mps=max(auv.max_speed_mps, launch.battery.nominal_mps))

@@ -64,6 +64,22 @@ async def test_it_tells_its_energy_and_the_current() -> None:
     assert info.report.current_mps == (0.1, -0.2)
 
 
+async def test_one_that_is_asked_to_be_fast_is() -> None:
+    """An ASV beside AUVs, say."""
+    events: list[FleetEvent] = []
+    link = SimFleetLink(SimulationSettings(), 20.0)
+    await link.start(events.append)
+    try:
+        link.launch(launch(BatterySpec(nominal_mps=2.5)))
+        await link.engage(NAME)
+        await link.order(order(1, 50, 95, speed_mps=2.5))
+        await until(lambda: has_arrived(events), "it has arrived")
+    finally:
+        await link.close()
+    speeds = [e.speed_mps for e in events if isinstance(e, VehicleReport) and e.speed_mps is not None]
+    assert max(speeds) == pytest.approx(2.5, abs=0.1)
+
+
 async def test_one_that_joins_others_under_way_is_put_to_sea_far_from_them() -> None:
     link = SimFleetLink(SimulationSettings(), 1.0)
     await link.start(lambda _event: None)
