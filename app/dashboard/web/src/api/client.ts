@@ -2,6 +2,7 @@ import { say } from "../words/say";
 import type {} from "./early";
 import type {
   ActionView,
+  AdjustmentView,
   AlarmReport,
   AlarmView,
   ChangesView,
@@ -247,6 +248,10 @@ export const api = {
     }),
   deleteSystematicErrors: (id: string) =>
     request<unknown>(`${missionPath(id)}/systematic-errors`, { method: "DELETE" }),
+  adjustment: (id: string) => request<AdjustmentView>(`${missionPath(id)}/adjustment`),
+  adjust: (id: string) => post<AdjustmentView>(`${missionPath(id)}/adjustment`, {}),
+  undoAdjustment: (id: string) =>
+    request<AdjustmentView>(`${missionPath(id)}/adjustment`, { method: "DELETE" }),
   holidays: (id: string) => request<Holidays>(`${missionPath(id)}/holidays`),
   profile: (id: string, line: string, layers: readonly string[], gone: AbortSignal) => {
     const query = new URLSearchParams({ line });

@@ -43,6 +43,7 @@ import { CrosslinesCard } from "./CrosslinesCard";
 import { SearchCard } from "./SearchCard";
 import { SwathCard } from "./SwathCard";
 import { TargetCards } from "./TargetCards";
+import { TracksCard } from "./TracksCard";
 import { LineOrders, OrderLine, TypedPlace } from "./VehicleOrders";
 
 export function VehicleCards() {
@@ -77,6 +78,7 @@ export function VehicleCards() {
         )}
         <TargetCards />
         <CrosslinesCard />
+        <TracksCard />
       </section>
       {shownFolded.value ? null : (
         <Grip
