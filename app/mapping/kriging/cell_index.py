@@ -3,13 +3,19 @@
 import numpy as np
 from numba import njit
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import IntArray
 from app.mapping.types import Grid, Soundings
 
 
 def cell_numbers(grid: Grid, soundings: Soundings) -> IntArray:
     """Row-major cell number of each sounding, (n,); -1 outside. The far edges belong to the last cells."""
-    return _numbers(soundings.east_m, soundings.north_m, grid.west_m, grid.south_m, grid.cell_m, grid.rows, grid.cols)
+    # Not compiled: the confined process that reads files of strangers calls it, too.
+    col = np.floor((soundings.east_m - grid.west_m) / grid.cell_m).astype(np.int64)
+    row = np.floor((soundings.north_m - grid.south_m) / grid.cell_m).astype(np.int64)
+    col[soundings.east_m == grid.west_m + grid.cols * grid.cell_m] = grid.cols - 1
+    row[soundings.north_m == grid.south_m + grid.rows * grid.cell_m] = grid.rows - 1
+    inside = (col >= 0) & (col < grid.cols) & (row >= 0) & (row < grid.rows)
+    return np.where(inside, row * grid.cols + col, -1)
 
 
 def count_per_cell(grid: Grid, soundings: Soundings) -> IntArray:
@@ -46,16 +52,3 @@ def cell_by_cell(cells: IntArray, count: int) -> tuple[IntArray, IntArray]:
         order[free[cells[i]]] = i
         free[cells[i]] += 1
     return order, first
-
-
-@njit(cache=True, nogil=True)
-def _numbers(
-    east: FloatArray, north: FloatArray, west: float, south: float, cell_m: float, rows: int, cols: int
-) -> IntArray:
-    cells = np.empty(len(east), np.int64)
-    for i in range(len(east)):
-        col = cols - 1.0 if east[i] == west + cols * cell_m else np.floor((east[i] - west) / cell_m)
-        row = rows - 1.0 if north[i] == south + rows * cell_m else np.floor((north[i] - south) / cell_m)
-        inside = 0.0 <= col < cols and 0.0 <= row < rows
-        cells[i] = np.int64(row) * cols + np.int64(col) if inside else -1
-    return cells
