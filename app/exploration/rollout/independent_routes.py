@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.rollout.flight import PER_WAYPOINT, STEEP, WORTH_OF_EARLY, Plan, Rules, advance
+from app.exploration.rollout.flight import PER_WAYPOINT, STEEP, Plan, Rules, advance
 from app.exploration.rollout.floor import FloorEstimate, sample
 from app.exploration.rollout.free_space import Free, clear_ways, settle_waypoint
 from app.exploration.rollout.local_search import change
@@ -19,6 +19,12 @@ from app.exploration.rollout.points import LandmarkPoints, lacks, look_whole
 ALL_LEFT = 10_000.0
 """Steps charged for leaving every landmark over: one of a thousand is worth a way of ten steps."""
 
+EARLY = 10.0
+"""What the sum over time of the part that remains counts, against a step more in the end.
+
+Routes over what takes many looks fill the time that is left. With less than that they put off what they could do now,
+and then errands come between.
+"""
 
 HALVINGS = 6
 """Times that the reach of a step is narrowed down between what is too far for its climb and what is not."""
@@ -178,7 +184,7 @@ def judge(
             open_ -= look_whole(x, y, z, points, rules.visibility_m, rules.relative_noise, information, done)
         if flying:
             t += 1.0
-            cost += WORTH_OF_EARLY * open_ / points.work.total
+            cost += EARLY * open_ / points.work.total
             if t + cost >= bound:
                 return np.inf
     missing = 0.0

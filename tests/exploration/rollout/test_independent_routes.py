@@ -189,6 +189,25 @@ def test_a_vehicle_that_is_away_half_of_the_time_is_not_relied_upon(seed: int) -
     assert half >= whole
 
 
+def test_what_is_done_ten_steps_earlier_is_worth_twelve_steps_in_the_end() -> None:
+    xyz = np.array([[0.0, 0.0, 0.5], [0.02, 0.0, 0.5], [0.8, 0.0, 0.5]])
+    belief = Belief(
+        xyz[:, :2], xyz[:, 2], np.full(3, np.inf), np.zeros(3, dtype=bool), np.ones(3), 0.2,
+        np.repeat(np.diag([np.inf] * 3)[None], 3, axis=0),
+    )  # fmt: skip
+    points = make_points(xyz, belief, np.arange(3), ACCURACY, CUBE, 0.4, 3, 3.0, flat(0.5))
+    around = np.array([[0.1, 0.1, 0.2], [-0.1, 0.1, 0.2], [0.0, -0.1, 0.2]] * 2)
+    scores = []
+    for first, last in ((30, 50), (20, 62)):
+        paths = no_paths(1, 100)
+        paths.at_m[0] = [-0.8, -0.8, 0.2]
+        paths.at_m[0, first : first + 6] = around
+        paths.at_m[0, last : last + 6] = around + [0.8, 0.0, 0.0]
+        paths.length[0] = last + 6
+        scores.append(judge(paths, np.ones(1), 2, points, RULES, np.inf, np.empty(3)))
+    assert scores[1] < scores[0]
+
+
 def test_first_routes_give_each_vehicle_a_strip_of_its_own() -> None:
     left = np.random.default_rng(0).uniform(-1.0, 1.0, (300, 2))
     routes = list(sectors(left, START[:, :2], CUBE, 0.4))
@@ -276,7 +295,8 @@ def test_no_vehicle_stands_before_a_step_that_only_the_estimate_of_the_floor_has
         track.append(np.column_stack([after[:, :2], np.minimum(after[:, 2], 0.6 - HELD)]))
     way = np.array(track)
     assert (way[-1, :, 1] > 0.1).all()
-    assert np.linalg.norm(way[6:] - way[:-6], axis=2).min() > 0.5 * LIMITS.max_step_m
+    flown = np.cumsum(np.hypot(*np.moveaxis(np.diff(way[..., :2], axis=0), 2, 0)), axis=0)
+    assert (flown[6:] - flown[:-6]).min() > 0.5 * LIMITS.max_step_m
 
 
 def situation(step: Any, positions: FloatArray, targets: Any = None) -> Any:
