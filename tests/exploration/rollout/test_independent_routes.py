@@ -202,7 +202,7 @@ def test_what_is_done_ten_steps_earlier_is_worth_twelve_steps_in_the_end() -> No
         paths = no_paths(1, 100)
         paths.at_m[0] = [-0.8, -0.8, 0.2]
         paths.at_m[0, first : first + 6] = around
-        paths.at_m[0, last : last + 6] = around + [0.8, 0.0, 0.0]
+        paths.at_m[0, last : last + 6] = np.add(around, [0.8, 0.0, 0.0])
         paths.length[0] = last + 6
         scores.append(judge(paths, np.ones(1), 2, points, RULES, np.inf, np.empty(3)))
     assert scores[1] < scores[0]
