@@ -487,7 +487,7 @@ class SurveyRegressors:
         # Behind it lies what it is still to fly, and will sound then.
         east, north = (legs - here).T
         turned = np.abs((np.arctan2(east, north) - heading + np.pi) % (2.0 * np.pi) - np.pi)
-        return legs[turned <= TURNS_RAD.max() + 1e-9]
+        return np.asarray(legs[turned <= TURNS_RAD.max() + 1e-9])
 
     def _after_legs(self, candidates: FloatArray) -> FloatArray:
         """Return U after the first legs and at the end, when the team goes on with the plan it follows, (c, 2)."""
