@@ -3,12 +3,12 @@
 A mission of the service with its simulated vehicles, in process or, with ``--kind imc``, over IMC as fake DUNE nodes in
 processes of their own. Of the tracks as they were stored is told, by vehicle and in all: ``flown_m``; ``on_plan_pct``,
 the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
-``waiting_pct``, the part of the time spent in them; and how many legs were not reached. ``--slow-decisions 5`` makes
+``waiting_pct``, the part of the time spent in them; ``loops_under_way``, those until its last leg was reached, after
+which a vehicle waits for the others; and how many legs were not reached. ``--slow-decisions 5`` makes
 each decision take that many seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a
 page.
 """
 
-import argparse
 import asyncio
 import json
 import os
@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from app.storage.database import Database
 from app.storage.queries.missions import track_points, waypoints_between
 from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import FLIGHT, make_parser, write_section
-from benchmarks.imc.mission import ANNOUNCE_PORTS, NAMES, ORIGIN, PORT
+from benchmarks.imc.mission import ANNOUNCE_PORTS, ORIGIN, PORT
 
 ASIDE_M = 4.0
 COURSE_RAD = np.deg2rad(45.0)
@@ -42,55 +43,84 @@ LOOP_WITHIN_M = 80.0
 """A turn of 330 degrees to one side within so many metres that ends where it began is a closed loop."""
 LOOP_RAD = np.deg2rad(330.0)
 CLOSED_M = 6.0
+MOST_FLOWN = 0.9
+"""A vehicle that flew less than this part of its legs is not at the end of the last one."""
 RESAMPLED_M = 1.0
 PORTS_APART = 10
 
 
-def mission(options: argparse.Namespace) -> MissionSpec:
-    """Vehicles that survey a square."""
-    frame, side = LocalFrame(*ORIGIN), options.side
+@dataclass(frozen=True)
+class Flight:
+    """Vehicles that survey a square, whose side and longest leg are in metres, and their speeds in m/s."""
+
+    vehicles: int = 4
+    kind: str = "sim"
+    side: float = 200.0
+    steps: int = 60
+    minutes: float | None = None
+    """In place of steps."""
+    leg: float = 10.0
+    speed: float = 1.3
+    speeds: Sequence[float] = ()
+    """Of single vehicles, the first ones."""
+    time_scale: float = 5.0
+    planner: str = "cao"
+    seed: int = 0
+    slow_decisions: float = 0.0
+    """How much longer each decision takes, seconds of the vehicles' time."""
+    layers_m: float = 1.0
+    """How much deeper each vehicle is than the last one."""
+
+
+def name_of(number: int) -> str:
+    """Return the name of a vehicle by its number from 0 on."""
+    return f"lauv-xplore-{number + 1}"
+
+
+def mission(flight: Flight) -> MissionSpec:
+    """Return the mission."""
+    frame, side = LocalFrame(*ORIGIN), flight.side
     corners = [(0, 0), (side, 0), (side, side), (0, side), (0, 0)]
     ring = [[float(x) for x in reversed(frame.to_geographic(float(e), float(n)))] for e, n in corners]
-    speeds = options.speeds or []
     vehicles = [
         {
-            "name": name,
-            "kind": options.kind,
-            "depth_m": 2.0 + k,
-            **({"speed_mps": speeds[k]} if k < len(speeds) else {}),
+            "name": name_of(k),
+            "kind": flight.kind,
+            "depth_m": 2.0 + k * flight.layers_m,
+            **({"speed_mps": flight.speeds[k]} if k < len(flight.speeds) else {}),
         }
-        for k, name in enumerate(NAMES[: options.vehicles])
+        for k in range(flight.vehicles)
     ]
     return MissionSpec.model_validate(
         {
             "name": "flying",
             "area": {"type": "Polygon", "coordinates": [ring]},
             "vehicles": vehicles,
-            "budget": {"minutes": options.minutes} if options.minutes else {"steps": options.steps},
+            "budget": {"minutes": flight.minutes} if flight.minutes else {"steps": flight.steps},
             "cell_m": max(1.0, side / 100.0),
-            "speed_mps": options.speed,
-            "limits": {"max_step_m": options.leg, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
-            "planner": {"name": options.planner},
-            "seed": options.seed,
+            "speed_mps": flight.speed,
+            "limits": {"max_step_m": flight.leg, "min_vertical_separation_m": 1.0, "min_altitude_m": 2.0},
+            "planner": {"name": flight.planner},
+            "seed": flight.seed,
         }
     )
 
 
-async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Fly the mission; what its tracks tell."""
+async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict[str, Any]:
+    """Fly the mission; what its tracks tell, which may be drawn into a file."""
     url = f"sqlite+aiosqlite:///{folder / 'mission.db'}"
     imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
     await prepare_database(url, may_upgrade=True)
     database = Database(url)
-    service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=options.time_scale), database)
-    if options.slow_decisions:
-        slow_down(options.slow_decisions / options.time_scale)
-    crafts = [await craft(number, options) for number in range(options.vehicles)] if options.kind == "imc" else []
+    service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=flight.time_scale), database)
+    if flight.slow_decisions:
+        slow_down(flight.slow_decisions / flight.time_scale)
+    crafts = [await craft(number, flight) for number in range(flight.vehicles)] if flight.kind == "imc" else []
     await service.startup()
     begun = time.monotonic()
     try:
-        identity = (await service.create(mission(options))).id
-        while crafts and sum(view.link == "ready" for view in await service.vehicles()) < options.vehicles:  # noqa: ASYNC110
+        identity = (await service.create(mission(flight))).id
+        while crafts and sum(view.link == "ready" for view in await service.vehicles()) < flight.vehicles:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
         await service.act(await service.get(identity), Action.START, actor="benchmark")
         while (view := mission_view(await service.get(identity))).state not in ENDED:  # noqa: ASYNC110
@@ -111,8 +141,8 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         track = np.column_stack(frame.to_local(lat, lon))
         ends = np.array([[row.east_m, row.north_m] for row in waypoints if row.vehicle == name]).reshape(-1, 2)
         by_vehicle[name], drawn[name] = judged(track, seconds, ends), (track, ends)
-    if options.picture is not None:
-        draw(options.picture, drawn)
+    if picture is not None:
+        draw(picture, drawn)
     flown = sum(found["flown_m"] for found in by_vehicle.values())
     return {
         "state": str(view.state),
@@ -121,19 +151,30 @@ async def fly(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         "planned_m": round(sum(found["planned_m"] for found in by_vehicle.values()), 1),
         "on_plan_pct": round(sum(f["on_plan_pct"] * f["flown_m"] for f in by_vehicle.values()) / max(flown, 1e-9), 1),
         "loops": sum(found["loops"] for found in by_vehicle.values()),
+        "loops_under_way": sum(found["loops_under_way"] for found in by_vehicle.values()),
         "waiting_pct": round(float(np.mean([found["waiting_pct"] for found in by_vehicle.values()])), 2),
         "missed": sum(row.status != "reached" for row in waypoints),
         "by_vehicle": by_vehicle,
     }
 
 
-async def craft(number: int, options: argparse.Namespace) -> asyncio.subprocess.Process:
+async def craft(number: int, flight: Flight) -> asyncio.subprocess.Process:
     """Start a fake DUNE in a process of its own."""
-    start = f"{options.side * (number + 1) / (options.vehicles + 1.0):.1f},5.0"
+    start = f"{flight.side * (number + 1) / (flight.vehicles + 1.0):.1f},5.0"
     return await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "simulator", "--vehicles", "1", "--names", NAMES[number], "--ids", f"{0x1E + number}"),
-        *("--family", "smooth", "--size", f"{options.side:g}", "--origin", ",".join(map(str, ORIGIN))),
-        *("--base-port", f"{32220 + PORTS_APART * number}", "--speed", f"{options.time_scale:g}", "--start", start),
+        *(
+            sys.executable,
+            "-m",
+            "simulator",
+            "--vehicles",
+            "1",
+            "--names",
+            name_of(number),
+            "--ids",
+            f"{0x1E + number}",
+        ),
+        *("--family", "smooth", "--size", f"{flight.side:g}", "--origin", ",".join(map(str, ORIGIN))),
+        *("--base-port", f"{32220 + PORTS_APART * number}", "--speed", f"{flight.time_scale:g}", "--start", start),
         *("--announce-ports", f"{ANNOUNCE_PORTS[0]}-{ANNOUNCE_PORTS[-1]}"),
         stdout=asyncio.subprocess.DEVNULL,
         stderr=asyncio.subprocess.DEVNULL,
@@ -155,7 +196,15 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
     pieces = np.hypot(*np.diff(track, axis=0).T)
     flown = float(pieces.sum())
     if len(ends) == 0 or flown == 0.0:
-        return {"flown_m": flown, "planned_m": 0.0, "on_plan_pct": 0.0, "loops": 0, "waiting_pct": 0.0}
+        nothing = {
+            "planned_m": 0.0,
+            "on_plan_pct": 0.0,
+            "loops": 0,
+            "loops_under_way": 0,
+            "waiting_pct": 0.0,
+            "hours": 0.0,
+        }
+        return {"flown_m": flown, **nothing}
     corners = np.vstack([track[:1], ends])
     legs = np.diff(corners, axis=0)
     legs_m = np.hypot(*legs.T)
@@ -178,7 +227,9 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
     turns = (np.diff(course) + np.pi) % (2 * np.pi) - np.pi
     turned = np.concatenate([[0.0], np.cumsum(turns)])
     window = int(LOOP_WITHIN_M / RESAMPLED_M)
-    circling, loops, k = np.zeros(len(step), dtype=bool), 0, 0
+    at_end = (np.hypot(*(path - ends[-1]).T) <= CLOSED_M) & (places_m >= MOST_FLOWN * float(legs_m.sum()))
+    end_m = int(np.argmax(at_end)) if at_end.any() else len(path)
+    circling, loops, under_way, k = np.zeros(len(step), dtype=bool), 0, 0, 0
     while k < len(turned):
         ahead = np.abs(turned[k : k + window] - turned[k])
         back = np.hypot(*(path[k : k + len(ahead)] - path[k]).T) <= CLOSED_M
@@ -186,6 +237,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
         if closed.any():
             end = k + int(np.argmax(closed))
             circling[k:end] = True
+            under_way += end <= end_m
             loops, k = loops + 1, end
         k += 1
     spent = np.diff(times)
@@ -194,7 +246,9 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
         "planned_m": round(float(legs_m.sum()), 1),
         "on_plan_pct": round(100.0 * float(on_plan.mean()), 1),
         "loops": loops,
+        "loops_under_way": under_way,
         "waiting_pct": round(100.0 * float(spent[circling].sum() / max(spent.sum(), 1e-9)), 2),
+        "hours": round(float(spent.sum()) / 3600.0, 3),
     }
 
 
@@ -215,22 +269,23 @@ def draw(file: Path, drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Fly and print."""
     parser = make_parser(__doc__, FLIGHT)
-    parser.add_argument("--vehicles", type=int, default=4)
-    parser.add_argument("--kind", choices=["sim", "imc"], default="sim")
-    parser.add_argument("--side", type=float, default=200.0, help="of the square, metres")
-    parser.add_argument("--steps", type=int, default=60)
+    parser.add_argument("--vehicles", type=int, default=Flight.vehicles)
+    parser.add_argument("--kind", choices=["sim", "imc"], default=Flight.kind)
+    parser.add_argument("--side", type=float, default=Flight.side, help="of the square, metres")
+    parser.add_argument("--steps", type=int, default=Flight.steps)
     parser.add_argument("--minutes", type=float, help="in place of steps")
-    parser.add_argument("--leg", type=float, default=10.0, help="longest leg, metres")
-    parser.add_argument("--speed", type=float, default=1.3, help="of the vehicles, m/s")
-    parser.add_argument("--speeds", type=float, nargs="*", help="of each vehicle, m/s")
-    parser.add_argument("--time-scale", type=float, default=5.0)
-    parser.add_argument("--planner", default="cao")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--leg", type=float, default=Flight.leg, help="longest leg, metres")
+    parser.add_argument("--speed", type=float, default=Flight.speed, help="of the vehicles, m/s")
+    parser.add_argument("--speeds", type=float, nargs="*", default=Flight.speeds, help="of each vehicle, m/s")
+    parser.add_argument("--time-scale", type=float, default=Flight.time_scale)
+    parser.add_argument("--planner", default=Flight.planner)
+    parser.add_argument("--seed", type=int, default=Flight.seed)
     parser.add_argument("--slow-decisions", type=float, default=0.0, help="seconds of the vehicles' time")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the tracks into this file")
     options = parser.parse_args(arguments)
+    flight = Flight(**{key: value for key, value in vars(options).items() if key in Flight.__dataclass_fields__})
     with tempfile.TemporaryDirectory(prefix="bathyfleet-flying-") as folder:
-        found = asyncio.run(fly(options, Path(folder)))
+        found = asyncio.run(fly(flight, Path(folder), options.picture))
     print(json.dumps(found, indent=1))
     figures = {key: value for key, value in found.items() if key != "by_vehicle"}
     length = f"{options.minutes:g} min in" if options.minutes else f"{options.steps}"

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from shapely.geometry import LineString, Point, Polygon
 
+from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
@@ -221,6 +223,24 @@ def test_water_below_the_datum_leaves_less_room_and_water_above_it_is_not_relied
     decision, _, _ = decide_for([place("a", 10, 10, 5.0)], [[12.0, 12.0, 5.0]], belief_of(6.0, 0.75), water_level_m)
     assert decision.legs[0].target_m[2] == pytest.approx(room_m - 2 * 0.75 - 1.0)
     assert decision.bottom.at(np.array([12.0, 12.0])) == pytest.approx(room_m - 2 * 0.75)
+
+
+@settings(deadline=None, max_examples=50)
+@given(arrays(np.float64, (15, 15), elements=st.floats(1.5, 12.0)), st.floats(0.0, 2.0 * math.pi), st.booleans())
+def test_no_wall_keeps_a_vehicle_where_its_last_leg_ended(depth_m: FloatArray, course: float, low: bool) -> None:
+    """It comes so high that it can rise over whatever is ahead, and its next leg is flown, whichever that is."""
+    known = belief_of()
+    known = replace(known, depth_m=depth_m.ravel(), sd_m=np.full(depth_m.size, 0.05))
+    altitude_m = 2.0 if low else math.nan
+    flier = replace(place("a", 30.0, 30.0, 5.0), altitude_m=altitude_m, turn_radius_m=5.2)
+    wish = [30.0 + 9.0 * math.sin(course), 30.0 + 9.0 * math.cos(course), 5.0]
+    decision, *_ = decide_for([flier], [wish], known)
+    assert decision.notes == []
+    np.testing.assert_allclose(decision.legs[0].target_m[:2], wish[:2])
+    floor = decision.bottom
+    along = np.linspace(0.0, 1.0, 9)[:, None] * (np.array(wish[:2]) - 30.0) + 30.0
+    room_m = floor.at(along).min() - make_spec().limits.min_altitude_m
+    assert decision.legs[0].target_m[2] <= max(room_m, 0.0) + 1e-9
 
 
 def test_a_proposal_of_nan_holds_and_is_told() -> None:

@@ -15,6 +15,8 @@ LEG_CHECKS = 4
 DEPTH_MARGIN_M = 1e-3
 """By how much more than the least height depths of travel are chosen."""
 
+ROUNDING_M = 1e-9
+
 
 @dataclass(frozen=True)
 class Bottom:
@@ -76,10 +78,12 @@ class Bottom:
         safe_col = np.where(known, col, 0).astype(int)
         return np.where(known, self.depth_m[safe_row, safe_col], np.nan)
 
-    def deepest_end_m(self, origin: FloatArray, leg_m: FloatArray, min_altitude_m: float) -> FloatArray:
+    def deepest_end_m(
+        self, origin: FloatArray, leg_m: FloatArray, min_altitude_m: float, climb: float = 0.0
+    ) -> FloatArray:
         """Return how deep legs may end for vehicles to keep their height above the bottom; inf where it is unknown.
 
-        A vehicle is taken to change its depth evenly along the leg, and at once where it ends less deep than it begins.
+        A vehicle is taken to change its depth evenly along the leg, or to rise as steeply as it can from the beginning.
 
         Parameters
         ----------
@@ -87,11 +91,41 @@ class Bottom:
             Where legs begin, with the depth there.
         leg_m : (..., 2)
             Ways east and north.
+        climb
+            Metres a metre that it rises where it ends less deep than it begins; 0: evenly.
         """
         deepest = np.full(leg_m.shape[:-1], np.inf)
+        length_m = np.hypot(leg_m[..., 0], leg_m[..., 1])
         for k in range(1, LEG_CHECKS + 1):
             part = k / LEG_CHECKS
             room = self.at(origin[..., :2] + part * leg_m) - min_altitude_m - DEPTH_MARGIN_M
             rising = (room - (1.0 - part) * origin[..., 2]) / part
+            clears = origin[..., 2] - climb * part * length_m <= room + DEPTH_MARGIN_M + ROUNDING_M
+            rising = np.where(clears, room, rising)
             deepest = np.fmin(deepest, np.fmin(room, rising))
         return deepest
+
+    def deepest_to_leave_m(self, en_m: FloatArray, min_altitude_m: float, climb: float, reach_m: float) -> float:
+        """Return how deep a vehicle may be at a place (2,) to rise over whatever is known within so many metres.
+
+        Parameters
+        ----------
+        climb
+            Metres a metre that it rises.
+        """
+        rows, cols = self.depth_m.shape
+        low = np.floor((en_m - reach_m - [self.west_m, self.south_m]) / self.cell_m).astype(int)
+        high = np.floor((en_m + reach_m - [self.west_m, self.south_m]) / self.cell_m).astype(int) + 1
+        col = np.arange(max(low[0], 0), min(high[0], cols))
+        row = np.arange(max(low[1], 0), min(high[1], rows))
+        if not len(col) or not len(row):
+            return np.inf
+        # A cell is as far as the nearest place in it.
+        aside_m, above_m = (
+            np.maximum(np.abs(first + (index + 0.5) * self.cell_m - at) - 0.5 * self.cell_m, 0.0)
+            for first, index, at in ((self.west_m, col, en_m[0]), (self.south_m, row, en_m[1]))
+        )
+        away_m = np.hypot(above_m[:, None], aside_m[None])
+        depth_m = self.depth_m[row[0] : row[-1] + 1, col[0] : col[-1] + 1]
+        deepest_m = np.where((away_m <= reach_m) & np.isfinite(depth_m), depth_m + climb * away_m, np.inf)
+        return float(deepest_m.min() - min_altitude_m)

@@ -100,6 +100,8 @@ class Constraints:
         Difference in depth that makes horizontal separation unnecessary.
     held_altitude_m : float or None
         Height above the sea floor that vehicles hold by themselves when they are sent deeper; None: the least altitude.
+    climb : float
+        Metres a metre that vehicles rise from the beginning of a leg that ends less deep; 0: evenly along it.
     around : tuple of (n_vertices, 2)
         Polygons about the keep-out zones that plans keep off, too: a vehicle begins its leg near where it was planned
         to, and its way from there has to be free.
@@ -117,6 +119,7 @@ class Constraints:
     min_separation_m: float = 0.0
     min_vertical_separation_m: float = np.inf
     held_altitude_m: float | None = None
+    climb: float = 0.0
     around: tuple[FloatArray, ...] = ()
     checked_by: "Constraints | None" = None
 
@@ -172,6 +175,7 @@ class Constraints:
             float(self.com_range_m),
             float(self.min_separation_m),
             float(self.min_vertical_separation_m),
+            float(self.climb),
         )
         ends = np.ascontiguousarray(candidates, dtype=np.float64)
         excess = np.zeros((*ends.shape[:2], len(Limit)))
@@ -267,6 +271,7 @@ class _Limits(NamedTuple):
     com_range: float
     separation: float
     vertical_separation: float
+    climb: float
 
 
 Point = tuple[float, float, float]
@@ -310,15 +315,19 @@ def _zone_excess(origin: FloatArray, candidates: FloatArray, zone: FloatArray, e
 
 
 @njit(cache=True, nogil=True)
-def _clearance(a: Point, b: Point, floor: _Floor) -> float:
+def _clearance(a: Point, b: Point, floor: _Floor, climb: float) -> float:
     """Return the least height of the leg a -> b above the floor, inf where that is unknown."""
     least = np.inf
+    length = np.hypot(b[0] - a[0], b[1] - a[1])
     for k in range(1, LEG_CHECKS + 1):
         t = k / LEG_CHECKS
         col = int(np.floor((a[0] + t * (b[0] - a[0]) - floor.west) / floor.cell))
         row = int(np.floor((a[1] + t * (b[1] - a[1]) - floor.south) / floor.cell))
         if 0 <= row < floor.depth.shape[0] and 0 <= col < floor.depth.shape[1]:
-            height = floor.depth[row, col] - a[2] - t * (b[2] - a[2])
+            depth = a[2] + t * (b[2] - a[2])
+            if b[2] < a[2]:
+                depth = max(b[2], min(depth, a[2] - climb * t * length))
+            height = floor.depth[row, col] - depth
             if height < least:  # never where the depth is NaN
                 least = height
     return least
@@ -367,7 +376,7 @@ def _excess(
             row[STEP] = max(0.0, step - limits.step)
             row[MIN_DEPTH] = max(0.0, limits.min_depth - b[2])
             row[MAX_DEPTH] = max(0.0, b[2] - limits.max_depth)
-            row[ALTITUDE] = max(0.0, limits.altitude - _clearance(a, b, floor))
+            row[ALTITUDE] = max(0.0, limits.altitude - _clearance(a, b, floor, limits.climb))
             nearest = np.inf
             for k in range(n):
                 if k == i:

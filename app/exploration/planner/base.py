@@ -208,7 +208,8 @@ def at_depth(
     reach = constraints.max_step_m * (1.0 - 1e-9)
     drop = np.zeros(leg.shape[:-1])
     for _ in range(PASSES):  # a shortened leg lies over other ground
-        deepest = np.minimum(constraints.max_depth_m, bottom.deepest_end_m(origin, leg, constraints.min_altitude_m))
+        room = bottom.deepest_end_m(origin, leg, constraints.min_altitude_m, constraints.climb)
+        deepest = np.minimum(constraints.max_depth_m, room)
         depth = np.maximum(np.minimum(wish_m, deepest), constraints.min_depth_m)
         drop = np.clip(depth - origin[:, 2], -reach, reach)
         length = np.hypot(leg[..., 0], leg[..., 1])

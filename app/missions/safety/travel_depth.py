@@ -13,8 +13,10 @@ from app.exploration.motion.turning import ahead_of_end
 
 LEG_SAMPLES = 9
 MOST_LEG_SAMPLES = 200
-CLIMB = 0.1
-"""Metres a metre that a vehicle is trusted to rise while it turns into its next leg: half of what a LAUV is seen to."""
+RISE = 0.2
+"""Metres a metre that vehicles rise where the bottom does: what a LAUV is seen to."""
+CLIMB = 0.5 * RISE
+"""What one is trusted to rise while it turns into its next leg."""
 WAY_SPACING_M = 5.0
 DEPTH_TOLERANCE_M = 0.25
 """A vehicle that keeps its layer may be this much deeper than asked."""

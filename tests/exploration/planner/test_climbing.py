@@ -32,7 +32,7 @@ def test_a_vehicle_that_climbs_over_ground_does_not_turn_back_to_corners_that_it
         told = Situation(step, 80, team, place, heading, belief, sounded, limits, left_m=left_m)
         to = planner.propose(told, rng).positions
         moved = to[:, :2] - place[:, :2]
-        for k in range(2):
+        for k in np.flatnonzero(left_m >= 1.0):
             legs[k].append(moved[k])
         left_m = np.maximum(left_m - np.hypot(*moved.T), 0.0)
         sounded = np.vstack([sounded, 0.5 * (to[:, :2] + place[:, :2]), to[:, :2]])

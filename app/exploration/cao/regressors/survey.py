@@ -481,7 +481,13 @@ class SurveyRegressors:
         n = max(0, self._options.candidates - len(turns) - len(towards))
         random = alpha * step * rng.standard_normal((n, 2))
         random *= np.minimum(1.0, step / np.maximum(np.hypot(*random.T), 1e-12))[:, None]
-        return np.vstack([turns, towards, here + random])
+        legs = np.vstack([turns, towards, here + random])
+        if not np.isfinite(heading):
+            return legs
+        # Behind it lies what it is still to fly, and will sound then.
+        east, north = (legs - here).T
+        turned = np.abs((np.arctan2(east, north) - heading + np.pi) % (2.0 * np.pi) - np.pi)
+        return np.asarray(legs[turned <= TURNS_RAD.max() + 1e-9])
 
     def _after_legs(self, candidates: FloatArray) -> FloatArray:
         """Return U after the first legs and at the end, when the team goes on with the plan it follows, (c, 2)."""

@@ -89,13 +89,21 @@ class Place:
     def travel_depth_m(
         self, origin_m: FloatArray, target_m: FloatArray, bottom: Bottom, constraints: Constraints
     ) -> float:
-        """Return how deep it travels from one place (2,) to another over a pessimistic sea floor."""
-        if math.isnan(self.altitude_m):
-            least_m = constraints.min_altitude_m
+        """Return how deep it travels from one place (2,) to another over a pessimistic sea floor.
+
+        Where it ends it may rise over whatever is known within its next leg, wherever that goes.
+        """
+        least_m = constraints.min_altitude_m
+        if self.keeps_depth:
             return travel_depth.travel_depth_m(origin_m, target_m, self.cruise_depth_m, bottom, least_m)
-        return travel_depth.depth_above_bottom_m(
-            origin_m, target_m, self.altitude_m, self.cruise_depth_m, bottom, constraints, self.turn_radius_m
-        )
+        if math.isnan(self.altitude_m):
+            depth_m = travel_depth.travel_depth_m(origin_m, target_m, self.cruise_depth_m, bottom, least_m)
+        else:
+            depth_m = travel_depth.depth_above_bottom_m(
+                origin_m, target_m, self.altitude_m, self.cruise_depth_m, bottom, constraints, self.turn_radius_m
+            )
+        to_leave_m = bottom.deepest_to_leave_m(target_m, least_m, constraints.climb, constraints.max_step_m)
+        return min(depth_m, max(to_leave_m, 0.0))
 
 
 @dataclass(frozen=True)
@@ -179,6 +187,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
         com_range_m=limits.com_range_m if limits.com_range_m is not None else np.inf,
         min_separation_m=limits.min_separation_m,
         min_vertical_separation_m=limits.min_vertical_separation_m,
+        climb=travel_depth.RISE,
     )
 
 
@@ -403,7 +412,8 @@ def _flyable(
     """Return where a vehicle is sent instead of a proposed position (3,): in its depth, its step, and its way left."""
     target = proposed.copy()
     target[2] = place.travel_depth_m(place.en_m, target[:2], floor.cautious, constraints)
-    clear_m = floor.likely.deepest_end_m(origin, target[:2] - origin[:2], constraints.min_altitude_m)
+    leg_m, least_m = target[:2] - origin[:2], constraints.min_altitude_m
+    clear_m = floor.likely.deepest_end_m(origin, leg_m, least_m, constraints.climb)
     target[2] = min(target[2], max(float(clear_m), 0.0))
     if rises:
         # It goes on along its leg while it rises; the checks below are the same for it as for everyone.
