@@ -55,7 +55,7 @@ FLIGHT = Page(
 
 Every section is written by the command that stands in it (`--write`). Vehicles are simulated; service and vehicles
 share the cores of one machine. `loops` and `waiting_pct` count the circles of vehicles that give way, too, and of those
-that have flown their way and wait for the others.
+that have flown their way and wait for the others; `loops_under_way` are without the latter.
 """,
 )
 COVERAGE = Page(
