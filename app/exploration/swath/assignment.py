@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.exploration.core.coverage import Coverage
 from app.exploration.swath.raster import Flying
+from app.exploration.swath.tries import packed, unpacked
 
 
 @dataclass
@@ -61,6 +62,8 @@ class Assignment:
     """What its line was laid by last."""
     skipped: FloatArray | None = None
     """A line (k, 2) that its operator wants left out, until that is noted."""
+    hidden: BoolArray | None = None
+    """Cells (rows, cols) that its line leaves alone, since two lines before did not see them."""
     idle: bool = False
     """Whether there was nothing for it when it was last asked for."""
 
@@ -74,12 +77,13 @@ class Assignment:
             "ends": [piece.open_m.tolist() for piece in self.expected],
             "refused": self.refused,
             "skipped": None if self.skipped is None else self.skipped.tolist(),
+            "hidden": None if self.hidden is None else packed(self.hidden.astype(np.int64)),
         }
 
 
 def recalled(kept: dict[str, Any]) -> Assignment:
     """Return what was remembered. Raises KeyError, TypeError or ValueError when it is not that."""
-    course, skipped = kept["course"], kept.get("skipped")
+    course, skipped, hidden = kept["course"], kept.get("skipped"), kept.get("hidden")
     return Assignment(
         None if kept["share"] is None else Strip(**kept["share"]),
         None
@@ -95,6 +99,7 @@ def recalled(kept: dict[str, Any]) -> Assignment:
         _pieces(kept["expected"], kept.get("ends", [])),
         int(kept.get("refused", 0)),
         skipped=None if skipped is None else _path(skipped),
+        hidden=None if hidden is None else unpacked(hidden) > 0,
     )
 
 

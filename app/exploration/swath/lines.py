@@ -99,8 +99,24 @@ def lines(
         width = np.interp(whole, columns[part], width_m[part])
         radius_m = bend_radius_m(width, flying)
         wish = _worth(wish, width, raster.cell_m, flying, radius_m)
-        found.append(Line(whole, sign * gentle(wish, raster.cell_m, radius_m)))
+        line = Line(whole, sign * gentle(wish, raster.cell_m, radius_m))
+        found.append(_in_sight(line, raster, open_cells, flying))
     return found
+
+
+def _in_sight(line: Line, raster: LineRaster, open_cells: BoolArray, flying: Flying) -> Line:
+    """Return a line without ends outside of the area that likely see no open cell (along, across); whole where all are.
+
+    Beside a border at an angle to it a line does not bend far enough to come near what is open there.
+    """
+    rows = raster.rows_of(line.across_m)
+    reach_m = raster.likely_half_width_m(flying)[line.columns, rows] + raster.cell_m
+    near = np.abs(raster.across_m - line.across_m[:, None]) <= reach_m[:, None]
+    kept = np.flatnonzero((near & open_cells[line.columns]).any(axis=1) | raster.wanted[line.columns, rows])
+    if not len(kept):
+        return line
+    inner = slice(kept[0], kept[-1] + 1)
+    return Line(line.columns[inner], line.across_m[inner])
 
 
 def needed_lines(raster: LineRaster, cells: BoolArray, flying: Flying) -> FloatArray:

@@ -23,7 +23,7 @@ from app.exploration.swath.raster import Flying, LineRaster, Rasters
 from app.exploration.swath.rest_of_line import rest_of_line, simple
 from app.exploration.swath.sent import expected, forget_flown, sent_along
 from app.exploration.swath.shares import NEAR_M, better_by_another, between, free_at, part_of_others, share_out
-from app.exploration.swath.tries import MOST_TRIES, Tries
+from app.exploration.swath.tries import MOST_TRIES, Tries, without
 
 MOST_REFUSED = 3
 """Who was so often in a row not sent along its line gets another one."""
@@ -225,7 +225,7 @@ class SwathSurvey:
             return
         if len(course.path) < 2 or course.sign == 0:
             return
-        raster = self._rasters.of(asked.coverage, course.direction_rad)
+        raster = self._rasters.of(without(asked.coverage, sweep.hidden), course.direction_rad)
         free = raster.open & ~expected(self._sweeps, raster, asked.flying, asked.vehicle)
         if sweep.share is not None:
             free &= between(raster, sweep.share)
@@ -245,7 +245,7 @@ class SwathSurvey:
             if float(np.hypot(*(course.path[0] - corner))) > NEAR_M:
                 return np.asarray(corner)
             course.begun = True
-            self._count(course.path, asked.flying, asked.coverage)
+            self._begin(sweep, course, asked)
             if away_m > NEAR_M:
                 course.sent_from = (float(here[0]), float(here[1]))
                 return np.asarray(course.path[0])
@@ -269,7 +269,9 @@ class SwathSurvey:
         raster = self._rasters.of(coverage, self._direction_rad)
         foreseen = expected(self._sweeps, raster, flying, asked.vehicle)
         left = replace(raster, open=raster.open & ~foreseen)
-        large, small = strips(left, flying)
+        swept = self._rasters.of(without(coverage, self._hidden(coverage, flying)), self._direction_rad).open
+        large, small = strips(replace(left, open=left.open & swept), flying)
+        small |= left.open & ~swept
         missed = small & ~touching(raster.open, foreseen)
         share = sweep.share
         own = share is not None and bool((large & between(raster, share)).any())
@@ -351,6 +353,28 @@ class SwathSurvey:
         if len(path) > 1:
             self._count(path, flying, coverage, tries=MOST_TRIES)
         return np.zeros((0, 2))
+
+    def _begin(self, sweep: Assignment, course: FlownLine, asked: Question) -> None:
+        """Note what a line is to see; one that sweeps passes by what two lines before it did not see."""
+        coverage = asked.coverage
+        sweep.hidden = None
+        if course.overlap == asked.flying.overlap:
+            sweep.hidden = self._hidden(coverage, asked.flying)
+            coverage = without(coverage, sweep.hidden)
+        self._count(course.path, asked.flying, coverage)
+
+    def _hidden(self, coverage: Coverage, flying: Flying) -> BoolArray:
+        """Return the cells (rows, cols) in small pieces that two lines were to see and did not: they are passed over.
+
+        Something stands in between: lines beside them would look in vain again.
+        """
+        again = self._tries.again(coverage)
+        raster = self._rasters.of(again, self._direction_rad)
+        _, small = strips(raster, flying)
+        turned = raster.axes.turned(again.places_m(again.left))
+        hidden = again.left.copy()
+        hidden[again.left] = small[raster.columns_of(turned[:, 0]), raster.rows_of(turned[:, 1])]
+        return hidden
 
     def _tried_twice(self, coverage: Coverage) -> BoolArray:
         """Return which cells of the raster hold ground that two lines were to see and did not."""

@@ -7,12 +7,32 @@ from typing import Any
 
 import numpy as np
 
-from app.arrays import FloatArray, IntArray
+from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.coverage import Coverage
 from app.exploration.swath.raster import Flying, LineRaster
 
 MOST_TRIES = 4
 """What so many lines were to see and did not is given up."""
+
+
+def packed(counts: IntArray) -> list[Any]:
+    """Return small counts (rows, cols) as what JSON takes, for ``unpacked``; what is more than 255 is 255."""
+    bits = zlib.compress(np.minimum(counts, 255).astype(np.uint8).tobytes(), level=1)
+    return [counts.shape, base64.b64encode(bits).decode()]
+
+
+def unpacked(state: list[Any]) -> IntArray:
+    """Return what was packed. Raises TypeError or ValueError when it is not that."""
+    shape, text = state
+    counts = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+    return counts.reshape(tuple(shape)).astype(np.int64)
+
+
+def without(coverage: Coverage, cells: BoolArray | None) -> Coverage:
+    """Return the same as if some cells (rows, cols) were done; on another grid than theirs all is left as it is."""
+    if cells is None or cells.shape != coverage.done.shape:
+        return coverage
+    return replace(coverage, done=coverage.done | cells)
 
 
 class Tries:
@@ -44,11 +64,8 @@ class Tries:
 
     def remember(self) -> list[Any]:
         """Return the counts, for ``recall``."""
-        packed = zlib.compress(np.minimum(self._counts, 255).astype(np.uint8).tobytes(), level=1)
-        return [self._counts.shape, base64.b64encode(packed).decode()]
+        return packed(self._counts)
 
     def recall(self, state: list[Any]) -> None:
         """Take up what ``remember`` returned. Raises TypeError or ValueError when it is not that."""
-        shape, packed = state
-        counts = np.frombuffer(zlib.decompress(base64.b64decode(packed)), np.uint8)
-        self._counts = counts.reshape(tuple(shape)).astype(np.int64)
+        self._counts = unpacked(state)

@@ -116,6 +116,15 @@ def test_a_line_goes_straight_on_where_little_is_left_beside_it() -> None:
     assert np.ptp(line.across_m) < 1.0
 
 
+@pytest.mark.parametrize("direction_deg", [15.0, 75.0, 105.0, 165.0])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_line_ends_where_nothing_open_is_seen_any_more(direction_deg: float, sign: int) -> None:
+    raster = raster_of(flat(200, 250, 8.0), math.radians(direction_deg), 1.0, 10.0)
+    for line in lines(raster, raster.open, sign, FLYING):
+        seen = raster.seen(line.columns, line.across_m, FLYING) & raster.open[line.columns]
+        assert seen[[0, -1]].any(axis=1).all()
+
+
 def test_all_lines_together_see_everything_and_are_as_long_as_needed() -> None:
     coverage = flat(180, 300)
     raster = raster_of(coverage, 0.0, 1.0, 10.0)

@@ -17,8 +17,9 @@ from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
-from app.exploration.swath.raster import Flying
+from app.exploration.swath.raster import Flying, raster_of
 from app.exploration.swath.survey import SwathSurvey
+from app.exploration.swath.tries import MOST_TRIES, Tries
 
 FLYING = Flying(SwathSonar(), 2.0, 1.0, 5.0, 0.06)
 
@@ -188,6 +189,24 @@ def test_who_is_past_the_end_of_its_line_takes_another_one() -> None:
     end = survey.next_leg("a", swept_away, FLYING, sea.coverage(), {"a": swept_away}, 20.0)
     assert end is not None
     assert np.isfinite(end).all()
+
+
+def test_ground_that_lines_beside_it_saw_in_vain_is_not_given_up_before_a_line_leads_over_it() -> None:
+    sea = Sea(np.full((60, 90), 20.0))
+    hidden = np.zeros(sea.seen.shape, dtype=bool)
+    hidden[20:23, 40:44] = True
+    tries = Tries()
+    tries.left(sea.coverage())
+    over = raster_of(sea.coverage(), 0.0, 1.0, 20.0)
+    only = replace(sea.coverage(), wanted=hidden)
+    for _ in range(MOST_TRIES - 1):
+        tries.count(np.array([[38.0, 21.5], [46.0, 21.5]]), FLYING, only, over)
+    survey, pose = SwathSurvey(0.0, 1.0, 20.0), np.array([0.0, 10.0, 0.0])
+    survey.recall(survey.remember() | {"tried": tries.remember()})
+    while survey.piece_m("v0").size == 0:
+        pose[:2] = survey.next_leg("v0", pose, FLYING, sea.coverage(), {"v0": pose}, 20.0)
+    tries.recall(survey.remember()["tried"])
+    assert tries.left(sea.coverage()).left[hidden].all()
 
 
 def test_a_hole_is_left_to_who_waits_nearest() -> None:
