@@ -78,7 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     figures = summary(flown)
     print(json.dumps(figures, indent=1))
     title = f"Missions of {options.minutes:g} min"
-    write_section(options.write, FLIGHT, title, figures, seeds=[mission["seed"] for mission in flown])
+    hidden = {options.keep: "FILE", options.pictures: "FOLDER"}
+    write_section(options.write, FLIGHT, title, figures, seeds=[m["seed"] for m in flown], hidden=hidden)
 
 
 def describe(flight: Flight) -> str:
