@@ -8,34 +8,15 @@ figures are of all of them. A long run may be interrupted, and gone on with.
 import json
 import math
 import os
-import subprocess
 import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from app.api import logs
 from app.commands.home import fly_all, summary
 from benchmarks.common.report import FLIGHT, make_parser, write_section
-from tests.support.paths import PROJECT
-
-PROGRAM = ("app", "simulator")
-"""What is flown, and flies."""
-
-
-def version() -> str:
-    """Return what tells versions of the program apart, that of the documentation aside."""
-    asked = ["git", "rev-parse", *(f"HEAD:{folder}" for folder in PROGRAM)]
-    trees = subprocess.run(asked, cwd=PROJECT, check=True, capture_output=True, text=True).stdout.split()
-    return "-".join(tree[:10] for tree in trees)
-
-
-def kept(file: Path | None, of: str | None) -> list[dict[str, Any]]:
-    """Return the missions of a file that were flown by this version, None: by any; of a seed's the last."""
-    lines = [] if file is None or not file.exists() else file.read_text(encoding="utf-8").splitlines()
-    found = {mission["seed"]: mission for mission in map(json.loads, lines) if of in (None, mission["version"])}
-    return list(found.values())
+from benchmarks.missions.kept import keep, kept, version
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,12 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def told(mission: dict[str, object]) -> None:
         mission = {"version": of} | mission
-        line = json.dumps(mission)
-        print(line, flush=True)
         done.append(mission)
-        if options.keep is not None:
-            with options.keep.open("a", encoding="utf-8") as file:
-                file.write(line + "\n")
+        keep(options.keep, mission)
 
     if seeds:
         fly_all(seeds, options.time_scale, told, still=options.still, most_s=60.0 * options.minutes)

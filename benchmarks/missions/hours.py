@@ -3,15 +3,16 @@
 What is flown is drawn by the mission's number: two to ten simulated vehicles, all at one depth or each at its own, some
 with one of 2.5 m/s beside others of 1 m/s, over squares of 100 m to 1 km, each fifth of them a small one, in legs of 10
 to 50 m; each third mission is flown by lines, the others by what the service has by default; each fifth over IMC, by
-two fake DUNE nodes in processes of their own. Told is what :mod:`benchmarks.missions.flying` tells: ``loops_under_way``
-are closed circles of vehicles that still had legs. With ``--keep FILE`` the missions are kept there, and are not flown
-again.
+two fake DUNE nodes in processes of their own. The sea floor is the generated harbour, over IMC a smooth one. Told is
+what :mod:`benchmarks.missions.flying` tells: ``loops_under_way`` are closed circles of vehicles that still had legs.
+With ``--keep FILE`` the missions are kept there, and are not flown again as long as the program is the same.
 """
 
 import asyncio
 import json
 import os
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ import numpy as np
 from app.api import logs
 from benchmarks.common.report import FLIGHT, make_parser, write_section
 from benchmarks.missions.flying import Flight, fly
+from benchmarks.missions.kept import keep, kept, version
 
 SHORT_M = 150.0
 """Areas with a side below this are the small ones."""
@@ -55,11 +57,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--time-scale", type=float, default=10.0)
     parser.add_argument("--keep", type=Path, metavar="FILE", help="keep what was flown in this file, and go on from it")
+    parser.add_argument("--any-version", action="store_true", help="what other versions flew counts, too")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw the tracks into this folder")
     options = parser.parse_args(arguments)
     logs.configure("error", "json")
-    lines = options.keep.read_text(encoding="utf-8").splitlines() if options.keep and options.keep.exists() else []
-    done = {mission["seed"]: mission for mission in map(json.loads, lines)}
+    of = version()
+    done = {mission["seed"]: mission for mission in kept(options.keep, None if options.any_version else of)}
     for seed in range(options.first, options.first + options.missions):
         if seed in done:
             continue
@@ -68,12 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with tempfile.TemporaryDirectory(prefix="bathyfleet-hours-") as folder:
             found = asyncio.run(fly(flight, Path(folder), picture))
         load = round(os.getloadavg()[1], 1)
-        done[seed] = {"seed": seed, "flight": describe(flight), "side_m": flight.side, "load": load, **found}
-        line = json.dumps(done[seed])
-        print(line, flush=True)
-        if options.keep is not None:
-            with options.keep.open("a", encoding="utf-8") as file:
-                file.write(line + "\n")
+        facts = {"version": of, "seed": seed, "flight": describe(flight), "side_m": flight.side, "load": load}
+        done[seed] = facts | found
+        keep(options.keep, done[seed])
     flown = [done[seed] for seed in sorted(done) if 0 <= seed - options.first < options.missions]
     figures = summary(flown)
     print(json.dumps(figures, indent=1))
@@ -93,6 +93,7 @@ def describe(flight: Flight) -> str:
 def summary(flown: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return what all missions came to, and each."""
     figures: dict[str, Any] = {"missions": len(flown)}
+    figures["missions_of_versions"] = dict(Counter(mission["version"] for mission in flown))
     for key in ("loops_under_way", "loops", "missed"):
         figures[key] = sum(mission[key] for mission in flown)
     figures["vehicle_hours"] = round(sum(vehicle["hours"] for m in flown for vehicle in m["by_vehicle"].values()), 1)

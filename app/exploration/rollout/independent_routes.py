@@ -20,7 +20,8 @@ ALL_LEFT = 10_000.0
 """Steps charged for leaving every landmark over: one of a thousand is worth a way of ten steps."""
 
 EARLY = 10.0
-"""What the sum over time of the part that remains counts, against a step more in the end.
+"""What the sum over time of the part that remains counts, against a step more in the end: more than
+:data:`.flight.WORTH_OF_EARLY`, which routes of a whole team are judged by.
 
 Routes over what takes many looks fill the time that is left. With less than that they put off what they could do now,
 and then errands come between.
