@@ -59,7 +59,8 @@ class Supervisor:
     async def watching(self) -> AsyncIterator[None]:
         """Send signs of life as long as the event loop turns; whoever is ended without any says where it hung."""
         if self.patience_s is not None:
-            faulthandler.enable()
+            # Of the thread that is ended only, which is the loop's: others go on and cannot be read meanwhile.
+            faulthandler.enable(all_threads=False)
         async with _beside(self._live()):
             yield
 

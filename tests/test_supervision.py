@@ -103,6 +103,8 @@ def test_a_service_whose_loop_hangs_is_silent_and_says_where_it_hung_when_it_is_
         assert process.wait(240) == -signal.SIGABRT
         assert "Fatal Python error: Aborted" in said
         assert "in hang" in said
+        # Reading the frames of threads that go on ends now and then in a fault of its own.
+        assert "Thread 0x" not in said
 
 
 async def test_who_hangs_gives_no_sign_of_life(listening: socket.socket, tmp_path: Path) -> None:
