@@ -32,6 +32,8 @@ class Flown:
     """Of those along planned legs, metres."""
     idle_s: float = 0.0
     """Vehicle time in which it had no leg to fly and was to get one, seconds."""
+    survey_s: float = 0.0
+    """Vehicle time in which it surveyed, seconds: without the way there and home, and without fixes at the surface."""
     used_s: float = 0.0
     """Energy used, in seconds at its usual speed."""
     left_m: float | None = None
@@ -48,7 +50,7 @@ class Flown:
     def remember(self) -> dict[str, float]:
         """Return what is stored, so that a restart goes on counting."""
         kept = asdict(self)
-        names = ("flown_m", "on_plan_m", "idle_s", "used_s", "left_m")
+        names = ("flown_m", "on_plan_m", "idle_s", "survey_s", "used_s", "left_m")
         return {name: round(kept[name], 2) for name in names if kept[name] is not None}
 
     @classmethod

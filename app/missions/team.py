@@ -151,6 +151,8 @@ class Member:
     """How many legs in a row it did not get to the end of."""
     committed_m: float = 0.0
     """How long all legs are together that were committed for it, but for those that it was spared."""
+    late_m: float = 0.0
+    """How much farther it could have come in the time that a mission of so many minutes counts: turns, waiting."""
     spared: int = 0
     """How many legs were given up before it began them: they take nothing of how far it may be sent."""
     withdrawal: Withdrawal | None = None
@@ -233,8 +235,14 @@ class Member:
         """Return how far it may be sent yet, beyond the legs that are committed for it."""
         allowance = spec.allowance(self.spec)
         if allowance.metres is not None:
-            return max(allowance.metres - self.committed_m, 0.0)
+            return max(allowance.metres - self.committed_m - self.late_m, 0.0)
         return max(allowance.most_legs(spec.limits.max_step_m) - self.legs + self.spared, 0) * spec.limits.max_step_m
+
+    def count_late(self, spec: MissionSpec, frame: LocalFrame) -> None:
+        """Count how far it is behind its legs by the time in which it surveyed; who is ahead of them is not late."""
+        if spec.budget.minutes is not None:
+            come_m = self.committed_m - self.way_ahead_m(frame)
+            self.late_m = max(self.flown.survey_s * spec.speed_of(self.spec) - come_m, 0.0)
 
     def way_ahead_m(self, frame: LocalFrame) -> float:
         """Return how long what is left of its leg is, and the legs after it."""
@@ -294,7 +302,7 @@ class Team:
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
             member.legs, member.committed_m, member.spared = before.legs, before.committed_m, before.spared
-            member.flown = before.flown
+            member.flown, member.late_m = before.flown, before.late_m
             member.energy.used_s = before.energy.used_s
         self.members[spec.name] = member
         return member

@@ -9,7 +9,7 @@ from shapely import Polygon, minimum_rotated_rectangle
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.routes import FreeSpace, Turns, flown_m
 
 SHARE_SAMPLES = 200
 MAX_LINES = 2000
@@ -145,10 +145,24 @@ def most_lines(affordable: Callable[[int], bool]) -> int:
     return low
 
 
+def flown_length(start: FloatArray, stops: FloatArray, turn_radius_m: float) -> float:
+    """Return how far a vehicle flies from ``start`` (2,) through ``stops`` (k, 2) that turns in such circles."""
+    if turn_radius_m <= 0.0:
+        return route_length(start, stops)
+    return float(flown_m(start[0], start[1], np.nan, np.ascontiguousarray(stops), Turns(turn_radius_m, 0.0)))
+
+
 def boustrophedon(
-    sweep: Sweep, start: FloatArray, low_u: float, high_u: float, budget_m: float, *, lines: FloatArray | None = None
+    sweep: Sweep,
+    start: FloatArray,
+    low_u: float,
+    high_u: float,
+    budget_m: float,
+    *,
+    lines: FloatArray | None = None,
+    turn_radius_m: float = 0.0,
 ) -> FloatArray:
-    """Return the route (k, 2) over as many evenly spaced lines of the strip as ``budget_m`` pays for.
+    """Return the route (k, 2) over as many evenly spaced lines of the strip as ``budget_m`` pays for, turns included.
 
     Begins at the corner of the strip that is closest to ``start``. At least one line is returned, whatever its length;
     given ``lines`` (values of u) are flown whatever they cost.
@@ -159,7 +173,7 @@ def boustrophedon(
     def route(n: int) -> FloatArray:
         return _from_closest_corner(sweep, start, even_lines(low_u, high_u, n))
 
-    return route(most_lines(lambda n: route_length(start, route(n)) <= budget_m))
+    return route(most_lines(lambda n: flown_length(start, route(n), turn_radius_m) <= budget_m))
 
 
 def _from_closest_corner(sweep: Sweep, start: FloatArray, lines: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint, vertices_passed
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
-from app.exploration.lines.lattice import Sweep, boustrophedon, longer_axis_rad, route_length
+from app.exploration.lines.lattice import Sweep, boustrophedon, flown_length, longer_axis_rad, route_length
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
@@ -21,7 +21,9 @@ LEAST_BUDGET_M = 1.0
 """Also who can fly no farther has a strip, a very narrow one."""
 
 
-def lawnmower_routes(constraints: Constraints, starts: FloatArray, budgets_m: FloatArray) -> list[FloatArray]:
+def lawnmower_routes(
+    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float = 0.0
+) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): lines along the longer axis, as many as fit into the distance it can travel.
 
     Parameters
@@ -32,18 +34,21 @@ def lawnmower_routes(constraints: Constraints, starts: FloatArray, budgets_m: Fl
         Where the vehicles are; they take the strips in the order in which they stand across the lines.
     budgets_m : (n_vehicles,)
         Distances that the vehicles can travel; their strips are in proportion to them.
+    turn_radius_m
+        Of the circles in which they turn, which takes some of those distances.
     """
     sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
     order = np.argsort(sweep.to_uv(starts)[:, 0], kind="stable")
     cuts = sweep.shares(np.maximum(budgets_m[order], LEAST_BUDGET_M))
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
     for strip, i in enumerate(order):
-        routes[i] = boustrophedon(sweep, starts[i], float(cuts[strip]), float(cuts[strip + 1]), float(budgets_m[i]))
+        low, high = float(cuts[strip]), float(cuts[strip + 1])
+        routes[i] = boustrophedon(sweep, starts[i], low, high, float(budgets_m[i]), turn_radius_m=turn_radius_m)
     return routes
 
 
 def route_across(
-    constraints: Constraints, en_m: FloatArray, vehicle: int, passes: int, budget_m: float
+    constraints: Constraints, en_m: FloatArray, vehicle: int, passes: int, budget_m: float, turn_radius_m: float = 0.0
 ) -> FloatArray | None:
     """Return the next lines (k, 2) of a vehicle that has flown its own and can go on; None where it cannot.
 
@@ -56,6 +61,8 @@ def route_across(
         be able to fly farther than a line of the area is long.
     budget_m
         How far it can fly.
+    turn_radius_m
+        Of the circles in which it turns.
     """
     sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
     uv, area_uv = sweep.to_uv(en_m), sweep.to_uv(constraints.area)
@@ -69,8 +76,8 @@ def route_across(
         (sweep, low, high),
     ]
     for of, begin, end in ways if passes % 2 == 0 else ways[::-1]:
-        route = boustrophedon(of, en_m[vehicle], begin, end, budget_m)
-        if len(route) and route_length(en_m[vehicle], route) <= budget_m:
+        route = boustrophedon(of, en_m[vehicle], begin, end, budget_m, turn_radius_m=turn_radius_m)
+        if len(route) and flown_length(en_m[vehicle], route, turn_radius_m) <= budget_m:
             return route
     return None
 
@@ -139,6 +146,10 @@ class LawnmowerPlanner(PlannerBase):
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
+    def _turn_radius_m(self, team: Situation) -> float:
+        # Where legs are counted a turn takes nothing.
+        return 0.0 if team.left_m is None else self.options.turn_radius_m
+
     def _left(self, team: Situation, i: int) -> float:
         return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])
 
@@ -149,7 +160,7 @@ class LawnmowerPlanner(PlannerBase):
             if not team.moves[i] or self._left(team, i) > 0.0:
                 continue
             passes = self._passes.get(name, 0)
-            route = route_across(team.constraints, en, i, passes, float(left_m[i]))
+            route = route_across(team.constraints, en, i, passes, float(left_m[i]), self._turn_radius_m(team))
             if route is not None:
                 self._routes[name], self._passes[name] = route, passes + 1
             elif passes:
@@ -172,7 +183,7 @@ class LawnmowerPlanner(PlannerBase):
         """Give every vehicle of the team a route."""
         en = team.positions[:, :2]
         if not self._routes.keys() & set(team.vehicles):
-            routes = lawnmower_routes(team.constraints, en, metres_left(team))
+            routes = lawnmower_routes(team.constraints, en, metres_left(team), self._turn_radius_m(team))
             self._routes = dict(zip(team.vehicles, routes, strict=True))
             return
         self._routes = hand_over(self._routes, team.vehicles, en)

@@ -25,6 +25,7 @@ from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
+from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 from app.missions.views.mission import Level
 
@@ -46,7 +47,7 @@ PATIENCE = 1
 """How often a vehicle waits for others to pass before it goes aside."""
 
 LEAST_WAY_M = 1.0
-"""A vehicle with less way left is done."""
+"""A vehicle with less way left is done, and where a mission lasts so many minutes one with less than it arrives in."""
 
 SOON = 1.3
 """A vehicle whose legs end within this many times the usual lead is decided for together with one that needs a leg."""
@@ -56,6 +57,12 @@ HARDLY_BEGUN = 0.6
 
 TOLD_PCT = 0.1
 """A mission that leaves more of its area unseen says so when it ends."""
+
+
+def least_way_m(spec: MissionSpec) -> float:
+    """Return how much of its way a vehicle has left that still goes on."""
+    # By the clock somewhat more or less is left when its last leg ends. Nearer than it arrives it is there already.
+    return LEAST_WAY_M if spec.budget.minutes is None else max(spec.arrival_radius_m, LEAST_WAY_M)
 
 
 class OwnLegs:
@@ -422,7 +429,7 @@ class OwnLegs:
     def _has_way(self, member: Member) -> bool:
         if self._spec.budget.steps is not None:
             return self._next_number(member) <= self._spec.steps
-        return member.way_left_m(self._spec) > LEAST_WAY_M
+        return member.way_left_m(self._spec) > least_way_m(self._spec)
 
     @property
     def _nobody_to_lead(self) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.missions.flight.decisions.decision import Knowledge, decide, limits_of_decisions, make_constraints
-from app.missions.flight.own_legs import LEAST_WAY_M
+from app.missions.flight.own_legs import least_way_m
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm, planner_of, poses_apart
 from app.missions.forecast.swath_flight import sweep_over, sweeps
@@ -143,7 +143,7 @@ def fly_over(
         coverage_pct=builder.coverage_pct(),
         remaining_pct=builder.remaining_pct(),
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
-        steps=steps if left_m <= LEAST_WAY_M * len(members) else flown,
+        steps=steps if left_m <= least_way_m(spec) * len(members) else flown,
     )
 
 

@@ -9,7 +9,7 @@ from app.arrays import BoolArray, FloatArray
 from app.exploration.planner.base import PlannerBase
 from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m
 from app.missions.flight.legs.commit import STILL_M
-from app.missions.flight.own_legs import HARDLY_BEGUN, LEAST_WAY_M
+from app.missions.flight.own_legs import HARDLY_BEGUN, least_way_m
 from app.missions.flight.steering import steered
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
@@ -142,14 +142,21 @@ class Swarm:
         self.legs = np.full(n, first_step - 1)
         self._held = np.zeros(n, dtype=bool)
         if spec.budget.steps is not None:
-            self.left_m = np.full(n, max(spec.steps - first_step + 1, 0) * spec.limits.max_step_m)
+            self._most_m = np.full(n, max(spec.steps - first_step + 1, 0) * spec.limits.max_step_m)
         else:
-            self.left_m = np.array([member.way_left_m(spec) for member in members])
+            self._most_m = np.array([member.way_left_m(spec) for member in members])
+        self._counted_m, self._ahead_m = np.zeros(n), np.zeros(n)
+        """What legs took of that, and how long those were that vehicles had already."""
+        self.left_m = self._most_m.copy()
 
     def flown(self, step: int) -> StepFlown:
         """Return how far they have come after a step."""
         left_m, seconds = float(self.left_m.sum()), float(self.clock_s.max())
         return StepFlown(step, self.circled_m(self.clock_s), seconds, left_m, self.here[:, :2].copy())
+
+    def lift_budget(self) -> None:
+        """Let them fly as far as there is anything to do."""
+        self._most_m[:] = self.left_m[:] = math.inf
 
     def circled_m(self, ended_s: FloatArray) -> FloatArray:
         """Return how far each comes, (vehicles,), that goes on in circles from when it ended until the last one has."""
@@ -158,7 +165,7 @@ class Swarm:
 
     def due(self, *, apart: bool) -> BoolArray:
         """Return who gets the next leg, (n,): all together, or who ends its last one first, with those right after."""
-        able = self.left_m > LEAST_WAY_M
+        able = self.left_m > least_way_m(self._spec)
         if not apart or not able.any():
             return able
         first = int(np.argmin(np.where(able, self.clock_s, np.inf)))
@@ -213,11 +220,18 @@ class Swarm:
             self._poses[i] = (float(poses[-1, 0]), float(poses[-1, 1]), float(poses[-1, 2]))
         if not ahead:
             counts_m = self._spec.limits.max_step_m if self._spec.budget.steps is not None or still else leg_m
-            self.left_m[i] = max(self.left_m[i] - counts_m, 0.0)
+            self._counted_m[i] += counts_m
             self.legs[i] += 1
+        else:
+            self._ahead_m[i] += leg_m
         self.distance_m[i] += way_m
         self.clock_s[i] += STILL_S if still else way_m / self._speed_mps[i]
         self.here[i] = end
+        late_m = 0.0
+        if self._spec.budget.minutes is not None:
+            come_m = self._ahead_m[i] + self._counted_m[i]
+            late_m = max(float(self.clock_s[i] * self._speed_mps[i] - come_m), 0.0)
+        self.left_m[i] = max(float(self._most_m[i] - self._counted_m[i]) - late_m, 0.0)
         return np.column_stack([poses, np.full(len(poses), end[2])])
 
 

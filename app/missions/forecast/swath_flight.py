@@ -25,7 +25,7 @@ from app.missions.flight.decisions.decision import (
     swath_sonar,
     swath_task,
 )
-from app.missions.flight.own_legs import LEAD_S, LEAST_WAY_M, SOON
+from app.missions.flight.own_legs import LEAD_S, SOON, least_way_m
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder
@@ -151,7 +151,7 @@ class SwathFlight:
         return [
             i
             for i, craft in enumerate(self._crafts)
-            if craft.sonar is not None and craft.idle < MOST_IDLE and self.swarm.left_m[i] > LEAST_WAY_M
+            if craft.sonar is not None and craft.idle < MOST_IDLE and self.swarm.left_m[i] > least_way_m(self._spec)
         ]
 
     def _next_legs(self, getting: list[int]) -> None:
@@ -290,7 +290,7 @@ def sweep_over(
         mean_sd_m=newest.mean_sd_m if newest is not None else None,
         steps=steps if ended else max(int(swarm.legs.max()) - so_far.first_step + 1, 0),
     )
-    swarm.left_m[:] = math.inf
+    swarm.lift_budget()
     all_seen = ended and flight.fly(over)
     share = 1.0 if all_seen else 100.0 / max(builder.coverage_pct(), 1.0)
     return flown.with_whole(
@@ -300,6 +300,6 @@ def sweep_over(
             distances_m={member.name: float(swarm.distance_m[i]) for i, member in enumerate(members)},
             drawn_out=share,
             coverage_pct=builder.coverage_pct() if all_seen else 100.0,
-            within_budget=ended and bool((left_m > LEAST_WAY_M).all()),
+            within_budget=ended and bool((left_m > least_way_m(spec)).all()),
         )
     )

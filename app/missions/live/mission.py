@@ -302,7 +302,7 @@ class LiveMission:
 
     def receive(self, event: FleetEvent) -> None:
         """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
-        self.reports.take(event, self.spec, running=self.running)
+        self.reports.take(event, self.spec, running=self.running, standing=bool(self.standstill))
 
     def withdraw(self, member: Member, response: Response, why: str, *, asked: bool = False) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.

@@ -43,7 +43,7 @@ FASTEST_MPS = 10.0
 SURFACE_M = 0.7
 """Who is not deeper can receive satellites."""
 LONGEST_SILENCE_S = 6 * 3600.0
-"""A vehicle was under way, and used energy, in a silence that was not longer."""
+"""A vehicle was under way, surveyed and used energy, in a silence that was not longer."""
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a leg's duration."""
 
@@ -77,10 +77,11 @@ class VehicleReports:
         self.leg_s: float | None = None
         """How long a leg takes, running mean on the wall clock."""
 
-    def take(self, event: FleetEvent, spec: MissionSpec, *, running: bool) -> None:
+    def take(self, event: FleetEvent, spec: MissionSpec, *, running: bool, standing: bool = False) -> None:
         """Take an event from one of the mission's vehicles; called from the event loop, never blocks.
 
-        ``running``: whether the mission's flight goes on in this process.
+        ``running``: whether the mission's flight goes on in this process; ``standing``: whether nobody can be sent
+        anywhere meanwhile.
         """
         member = self._team.get(event.vehicle)
         if member is None:
@@ -92,9 +93,12 @@ class VehicleReports:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
                 if running:
+                    self._count_time(member, event, spec, standing=standing)
                     self._count_way(member, event, place, spec)
                 self._count_energy(member, event, spec.surface_policy)
                 member.report, member.heard_s = event, now().timestamp()
+                if running and member.flown.phase is Phase.SURVEY:
+                    member.count_late(spec, self._frame)
                 self._journal.position(event)
                 self._hold_against_boundaries(event, place)
                 if spec.targets:
@@ -126,12 +130,18 @@ class VehicleReports:
                 self._receive_waypoint(member, event)
         self._changed.set()
 
+    def _count_time(self, member: Member, report: VehicleReport, spec: MissionSpec, *, standing: bool) -> None:
+        """Note what a vehicle is at, and count how long it has surveyed since its last report."""
+        member.flown.phase = self._phase(member, member.way_left_m(spec))
+        passed_s = 0.0 if member.report is None else report.time_s - member.report.time_s
+        if member.flown.phase is Phase.SURVEY and 0.0 < passed_s <= LONGEST_SILENCE_S and not standing:
+            member.flown.survey_s += passed_s
+
     def _count_way(self, member: Member, report: VehicleReport, place: tuple[float, float], spec: MissionSpec) -> None:
-        """Note what a vehicle is at, and add what it has flown since its last report, if that can have been."""
+        """Add what a vehicle has flown since its last report, if that can have been."""
         flown = member.flown
         way_left_m = member.way_left_m(spec)
         flown.left_m = way_left_m + member.way_ahead_m(self._frame)
-        flown.phase = self._phase(member, way_left_m)
         before = None if member.report is None else local_place(self._frame, member.report.position)
         if member.report is None or before is None:
             return

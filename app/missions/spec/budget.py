@@ -41,7 +41,8 @@ class Budget(Model):
         gt=0,
         le=10_080,
         exclude_if=_is_absent,
-        description="Minutes of vehicle time under way, each vehicle at its own speed",
+        description="Minutes in which each vehicle surveys, by its own clock: turns and waiting for others count, the way "
+        "there and home and fixes at the surface do not",
         examples=[60.0],
     )
     km_per_vehicle: float | None = Field(
@@ -49,7 +50,7 @@ class Budget(Model):
         gt=0,
         le=1000,
         exclude_if=_is_absent,
-        description="Kilometres that each vehicle flies",
+        description="Kilometres of legs that each vehicle flies, however long its turns are",
         examples=[2.0],
     )
     steps: Steps | None = Field(default=None, exclude_if=_is_absent, description="Legs that each vehicle flies")

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
-from app.exploration.lines.lattice import route_length
-from app.exploration.lines.lawnmower import LawnmowerPlanner, route_across
+from app.exploration.lines.lattice import flown_length, route_length
+from app.exploration.lines.lawnmower import LawnmowerPlanner, lawnmower_routes, route_across
 from app.exploration.planners import create_planner
 
 WIDTH, HEIGHT = 120.0, 300.0
@@ -24,6 +26,16 @@ def test_lines_across_keep_to_their_vehicles_strip_and_to_what_it_can_fly() -> N
     assert route[:, 0].max() <= WIDTH / 3 + 1.0, "the third of the area that the westernmost has"
     legs = np.diff(route, axis=0)
     assert (np.abs(legs[:, 0]) > 20.0).sum() >= 3, "several lines lie across"
+
+
+@given(radius_m=st.floats(0.5, 12.0), budget_m=st.floats(1200.0, 6000.0))
+@settings(max_examples=30, deadline=None)
+def test_no_more_lines_are_begun_than_a_vehicle_has_way_for_with_its_turns(radius_m: float, budget_m: float) -> None:
+    routes = lawnmower_routes(Constraints(AREA), TEAM, np.full(3, budget_m), radius_m)
+    straight = lawnmower_routes(Constraints(AREA), TEAM, np.full(3, budget_m))
+    for start, route, without in zip(TEAM, routes, straight, strict=True):
+        assert flown_length(start, route, radius_m) <= budget_m
+        assert 2 <= len(route) <= len(without)
 
 
 def test_lines_along_follow_those_across() -> None:

@@ -331,9 +331,11 @@ class Budget(Model):
     """How long a mission is; exactly one of these."""
 
     minutes: float | None = None
-    """Minutes of vehicle time under way, each vehicle at its own speed"""
+    """Minutes in which each vehicle surveys, by its own clock: turns and waiting for others count, the way there and
+    home and fixes at the surface do not
+    """
     km_per_vehicle: float | None = None
-    """Kilometres that each vehicle flies"""
+    """Kilometres of legs that each vehicle flies, however long its turns are"""
     steps: int | None = None
     """Legs that each vehicle flies"""
 

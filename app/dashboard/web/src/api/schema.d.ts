@@ -2387,13 +2387,13 @@ export interface components {
         Budget: {
             /**
              * Minutes
-             * @description Minutes of vehicle time under way, each vehicle at its own speed
+             * @description Minutes in which each vehicle surveys, by its own clock: turns and waiting for others count, the way there and home and fixes at the surface do not
              * @example 60
              */
             minutes?: number | null;
             /**
              * Km Per Vehicle
-             * @description Kilometres that each vehicle flies
+             * @description Kilometres of legs that each vehicle flies, however long its turns are
              * @example 2
              */
             km_per_vehicle?: number | null;

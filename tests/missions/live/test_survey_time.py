@@ -1,0 +1,133 @@
+"""What the time in which a vehicle surveys takes of a mission that lasts so many minutes."""
+
+from collections.abc import Awaitable, Callable
+
+import numpy as np
+import pytest
+
+from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointOrder
+from app.missions.fleet.interface import WaypointStatus as Status
+from app.missions.flown import Phase
+from app.missions.live.mission import LiveMission
+from app.missions.service import MissionService
+from app.missions.spec.failsafes import Response
+from app.missions.states import MissionState
+from app.missions.team import Member, Withdrawal
+from tests.support.missions.harbour import act, sim_spec, until_state
+
+SPEED_MPS, MINUTES = 2.0, 30.0
+WHOLE_M = MINUTES * 60.0 * SPEED_MPS
+
+
+class UnderWay:
+    """A vehicle on a leg of 100 m, all of which is counted, as it reports where it is."""
+
+    def __init__(self, live: LiveMission) -> None:
+        self.live = live
+        self.member: Member = live.team.join(live.spec.vehicles[0], 0)
+        self.member.link = LinkState.ENGAGED
+        self.member.legs, self.member.committed_m = 1, 100.0
+        self.member.target_m = np.array([10.0, 110.0])
+        self.member.order = WaypointOrder(live.id, 1, "a", self._at(110.0), SPEED_MPS, 3.0, 1.0)
+        self.member.status = Status.ACKNOWLEDGED
+        self.reports(0.0, 10.0)
+
+    def reports(self, time_s: float, north_m: float, *, standing: bool = False, running: bool = True) -> None:
+        report = VehicleReport("a", time_s, self._at(north_m))
+        self.live.reports.take(report, self.live.spec, running=running, standing=standing)
+
+    def _at(self, north_m: float) -> Position:
+        lat, lon = self.live.frame.to_geographic(np.array(10.0), np.array(north_m))
+        return Position(float(lat), float(lon), 2.0)
+
+    @property
+    def left_m(self) -> float:
+        return self.member.way_left_m(self.live.spec)
+
+
+@pytest.fixture
+async def under_way(service: MissionService) -> Callable[..., Awaitable[UnderWay]]:
+    async def made(**budget: float) -> UnderWay:
+        asked = budget or {"minutes": MINUTES}
+        spec = sim_spec("a", side_m=120.0, speed_mps=SPEED_MPS, budget=asked)
+        live = await service.get((await service.create(spec)).id)
+        live.header.state = MissionState.RUNNING
+        return UnderWay(live)
+
+    return made
+
+
+Made = Callable[..., Awaitable[UnderWay]]
+
+
+async def test_who_flies_its_leg_at_its_speed_has_what_its_legs_leave(under_way: Made) -> None:
+    vehicle = await under_way()
+    for time_s in (10.0, 20.0, 30.0):
+        vehicle.reports(time_s, 10.0 + SPEED_MPS * time_s)
+        assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0, abs=0.1)
+
+
+async def test_turns_and_waiting_take_the_time_that_they_take(under_way: Made) -> None:
+    vehicle = await under_way()
+    vehicle.reports(20.0, 10.0)
+    assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0 - 20.0 * SPEED_MPS, abs=0.1)
+    vehicle.reports(45.0, 60.0)
+    assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0 - 20.0 * SPEED_MPS, abs=0.1)
+
+
+async def test_who_is_faster_than_its_speed_gets_no_more_legs_for_that(under_way: Made) -> None:
+    vehicle = await under_way()
+    vehicle.reports(10.0, 100.0)
+    assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0)
+
+
+async def test_a_silence_is_time_too(under_way: Made) -> None:
+    vehicle = await under_way()
+    vehicle.reports(600.0, 110.0)
+    assert vehicle.left_m == pytest.approx(WHOLE_M - 600.0 * SPEED_MPS, abs=0.1)
+
+
+@pytest.mark.parametrize("how", ["standing", "paused", "surfacing", "held", "on its way there"])
+async def test_time_that_is_not_spent_surveying_does_not_count(under_way: Made, how: str) -> None:
+    vehicle = await under_way()
+    member = vehicle.member
+    member.surfacing = how == "surfacing"
+    member.withdrawal = Withdrawal(Response.HOLD, "a person wants it", asked=True) if how == "held" else None
+    member.legs = 0 if how == "on its way there" else 1
+    for time_s in (30.0, 60.0):
+        vehicle.reports(time_s, 10.0, standing=how == "standing", running=how != "paused")
+    member.surfacing, member.withdrawal, member.legs = False, None, 1
+    vehicle.reports(60.0, 10.0)
+    assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0)
+    assert member.flown.phase is Phase.SURVEY
+
+
+async def test_kilometres_are_those_of_legs_however_long_they_take(under_way: Made) -> None:
+    vehicle = await under_way(km_per_vehicle=2.0)
+    vehicle.reports(500.0, 20.0)
+    assert vehicle.left_m == pytest.approx(2000.0 - 100.0)
+    assert vehicle.member.flown.survey_s == pytest.approx(500.0)
+
+
+async def test_who_comes_back_has_used_its_time(under_way: Made) -> None:
+    vehicle = await under_way()
+    vehicle.reports(50.0, 10.0)
+    left_m, team = vehicle.left_m, vehicle.live.team
+    team.leave("a", vehicle.live.header.created_at)
+    again = team.join(vehicle.live.spec.vehicles[0], 0)
+    assert again.way_left_m(vehicle.live.spec) == left_m < WHOLE_M - 100.0
+
+
+async def test_vehicles_that_wait_for_each_other_all_the_time_survey_for_their_minutes(service: MissionService) -> None:
+    limits = {"max_step_m": 8.0, "min_separation_m": 5.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
+    vehicles = [{"name": name, "kind": "sim", "depth_m": 2.0} for name in "abc"]
+    spec = sim_spec(side_m=40.0, vehicles=vehicles, limits=limits, planner={"name": "random"}, budget={"minutes": 4.0})
+    mission = (await service.create(spec)).id
+    await act(service, mission, "start")
+    await until_state(service, mission, MissionState.FINISHED)
+    live = await service.get(mission)
+    survey_s = np.array([member.flown.survey_s for member in live.team])
+    # The legs that a vehicle has when its time is up are flown to their end, with what it has to wait there.
+    assert np.median(survey_s) < 240.0 + 60.0, survey_s
+    assert survey_s.min() > 240.0 - 30.0, survey_s
+    assert max(member.committed_m for member in live.team) < 240.0 * live.spec.speed_mps + 1.0
