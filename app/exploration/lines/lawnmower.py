@@ -154,7 +154,7 @@ class LawnmowerPlanner(PlannerBase):
         return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])
 
     def _go_on(self, team: Situation) -> frozenset[str]:
-        """Give those that have flown their lines more of them; returns those that had more, and can fly no others."""
+        """Give those that have flown their lines more of them; returns those that can fly no others."""
         en, left_m, done = team.positions[:, :2], metres_left(team), set()
         for i, name in enumerate(team.vehicles):
             if not team.moves[i] or self._left(team, i) > 0.0:
@@ -163,7 +163,7 @@ class LawnmowerPlanner(PlannerBase):
             route = route_across(team.constraints, en, i, passes, float(left_m[i]), self._turn_radius_m(team))
             if route is not None:
                 self._routes[name], self._passes[name] = route, passes + 1
-            elif passes:
+            else:
                 done.add(name)
         return frozenset(done)
 

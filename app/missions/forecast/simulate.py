@@ -182,6 +182,9 @@ def fly(
         decision = decide(number, spec, constraints, planner, swarm.places(due), known)
         target = {leg.vehicle: leg.target_m for leg in decision.legs}
         for i in map(int, np.flatnonzero(due)):
+            if members[i].name in decision.done:
+                swarm.end(i)
+                continue
             sound(i, swarm.fly(i, target.get(members[i].name, swarm.here[i])))
         if number > told:
             told = number

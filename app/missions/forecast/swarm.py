@@ -158,6 +158,10 @@ class Swarm:
         """Let them fly as far as there is anything to do."""
         self._most_m[:] = self.left_m[:] = math.inf
 
+    def end(self, i: int) -> None:
+        """Let one vehicle be done, whatever it has left."""
+        self._most_m[i], self.left_m[i] = self._counted_m[i], 0.0
+
     def circled_m(self, ended_s: FloatArray) -> FloatArray:
         """Return how far each comes, (vehicles,), that goes on in circles from when it ended until the last one has."""
         way_m: FloatArray = self.distance_m + (ended_s.max() - ended_s) * self._speed_mps

@@ -89,6 +89,21 @@ def test_a_vehicle_whose_battery_lasts_longer_than_was_sure_does_not_wait_where_
     assert proposal.done == {"a"}, "who can fly no further line is done"
 
 
+def test_who_has_flown_its_lines_and_can_fly_no_other_one_is_done() -> None:
+    """It circled where its lines ended until its way was used up: up to a line's length."""
+    planner, rng, place, left_m = create_planner("lawnmower"), np.random.default_rng(0), (2.0, 2.0), 1100.0
+    for _ in range(100):
+        proposal = planner.propose(situation(left_m, place), rng)
+        east, north, _ = proposal.positions[0]
+        moved_m = float(np.hypot(east - place[0], north - place[1]))
+        if proposal.done:
+            break
+        assert moved_m > 0.5, "it always has somewhere to go"
+        left_m, place = left_m - moved_m, (float(east), float(north))
+    assert proposal.done == {"a"}
+    assert 20.0 < left_m < HEIGHT
+
+
 def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:
     """One that joined was given lines on the other side, and stayed where it was for as long as its battery lasted."""
     planner = create_planner("lawnmower")
