@@ -41,8 +41,8 @@ class Budget(Model):
         gt=0,
         le=10_080,
         exclude_if=_is_absent,
-        description="Minutes in which each vehicle surveys, by its own clock: turns and waiting for others count, the way "
-        "there and home and fixes at the surface do not",
+        description="Minutes in which each vehicle surveys, by its own clock: turns and waiting for others count, the "
+        "way there and home and fixes at the surface do not",
         examples=[60.0],
     )
     km_per_vehicle: float | None = Field(
