@@ -38,6 +38,23 @@ HELD_NEAR = 0.3
 """How far the height that a vehicle holds by its altimeter says something of the floor, in visibilities."""
 
 
+class HeldTo(NamedTuple):
+    """How deep the constraints let vehicles be, in steps: square cells, row 0 is south, column 0 is west.
+
+    Attributes
+    ----------
+    west_m, south_m, cell_m : float
+        Outer corner of the first cell, side of a cell.
+    deepest_m : (rows, cols)
+        Deepest that a vehicle may be; inf where the sea floor is unknown.
+    """
+
+    west_m: float
+    south_m: float
+    cell_m: float
+    deepest_m: FloatArray
+
+
 class FloorEstimate(NamedTuple):
     """Rasters over the area; the first row is the southernmost, the first column the westernmost.
 
@@ -53,6 +70,8 @@ class FloorEstimate(NamedTuple):
         Deepest that a vehicle may be, so that it clears the floor here and can climb every rise ahead.
     clear_m : (rows, cols)
         Deepest that a vehicle may be that goes straight down and up again: it clears the floor here.
+    held_to : HeldTo
+        Deepest that the constraints let it be there. They hold to steps that the other rasters smooth.
     """
 
     west_m: float
@@ -62,6 +81,13 @@ class FloorEstimate(NamedTuple):
     smooth_m: FloatArray
     deepest_m: FloatArray
     clear_m: FloatArray
+    held_to: HeldTo
+
+
+def held_to(bottom: Bottom, clearance_m: float) -> HeldTo:
+    """Return how deep the constraints let vehicles be over a sea floor."""
+    deepest = np.where(np.isnan(bottom.depth_m), np.inf, bottom.depth_m - clearance_m)
+    return HeldTo(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), deepest)
 
 
 def margin_m(visibility_m: float, clearance_m: float) -> float:
@@ -145,6 +171,7 @@ def estimate_floor(
     return FloorEstimate(
         float(low[0]), float(low[1]), float(cell), depth, smooth,
         np.minimum(_envelope(limit, cell, slope), depth - held_m), np.minimum(clear, depth - held_m),
+        held_to(bottom, clearance_m),
     )  # fmt: skip
 
 
@@ -222,6 +249,16 @@ def sample(raster: FloatArray, west: float, south: float, cell: float, x: float,
     lower = raster[r, c] * (1.0 - u) + raster[r, c + 1] * u
     upper = raster[r + 1, c] * (1.0 - u) + raster[r + 1, c + 1] * u
     return float(lower * (1.0 - v) + upper * v)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def held_at(held: HeldTo, x: float, y: float) -> float:
+    """Return how deep the constraints let a vehicle be at (x, y); inf outside of the raster."""
+    col = int(np.floor((x - held.west_m) / held.cell_m))
+    row = int(np.floor((y - held.south_m) / held.cell_m))
+    if row < 0 or col < 0 or row >= held.deepest_m.shape[0] or col >= held.deepest_m.shape[1]:
+        return np.inf
+    return float(held.deepest_m[row, col])
 
 
 @njit(cache=True, nogil=True)

@@ -236,6 +236,27 @@ def test_only_a_dive_goes_down_into_a_steep_pit_and_comes_up_again() -> None:
     assert lowest[1] > 0.7
 
 
+@given(seed=st.integers(0, 1000), east=st.floats(-0.9, 0.9), north=st.floats(-0.9, 0.9))
+@settings(max_examples=40, deadline=None)
+def test_a_dive_goes_no_deeper_than_its_constraints_let_it(seed: int, east: Any, north: Any) -> None:
+    # Else the move is refused each time, and a team stands over what it left for as long as the plan stands.
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-1.0, 1.0, (400, 2))
+    rough = Belief(xy, rng.uniform(0.3, 0.9, 400), np.full(400, 0.02), np.ones(400, dtype=bool), np.ones(400), 0.2)
+    bottom = Bottom.from_landmarks(rough.xy_m, rough.depth_m)
+    limits = Constraints(CUBE, max_step_m=RULES.step_m, min_depth_m=-1.0, max_depth_m=1.0, min_altitude_m=CLEARANCE)
+    at = np.array([[east, north, 0.2]])
+    plan = Plan(at[None, :, :2].copy(), np.full(1, 0.1), np.full(1, DIVE), np.arange(1))
+    after, k = np.empty_like(at), 0
+    for _ in range(30):
+        if k == 1:
+            break
+        k = fly_step(at, plan, k, 1, floor_of(rough), RULES, after)
+        assert limits.feasible(at, after[None], bottom)[0]
+        at = after.copy()
+    assert k == 1, "the dive ends"
+
+
 def test_a_plan_that_leaves_what_can_be_taken_costs_more_than_one_that_takes_it() -> None:
     belief, start, plan = over_a_pit()
     floor = floor_of(belief)
