@@ -31,6 +31,9 @@ MARGIN_OF_ROOM = 0.25
 """The same as a part of what visibility leaves above the required clearance, where that is less."""
 
 
+UNEVEN = 2.0
+"""How much shoaler than estimated the floor may be between landmarks, in deviations of the depths nearby."""
+
 ROUGHLY = 0.1
 """Deviation, in visibilities, up to which the depth of a landmark counts as estimated."""
 
@@ -70,6 +73,8 @@ class FloorEstimate(NamedTuple):
         Deepest that a vehicle may be, so that it clears the floor here and can climb every rise ahead.
     clear_m : (rows, cols)
         Deepest that a vehicle may be that goes straight down and up again: it clears the floor here.
+    shoal_m : (rows, cols)
+        As deep as altimeters let vehicles be where the floor is as shoal between landmarks as it may be.
     held_to : HeldTo
         Deepest that the constraints let it be there. They hold to steps that the other rasters smooth.
     """
@@ -81,6 +86,7 @@ class FloorEstimate(NamedTuple):
     smooth_m: FloatArray
     deepest_m: FloatArray
     clear_m: FloatArray
+    shoal_m: FloatArray
     held_to: HeldTo
 
 
@@ -144,15 +150,16 @@ def estimate_floor(
         trust = np.minimum(np.sqrt(belief.covariance_m2[:, 2, 2]), ROUGHLY * visibility_m)
     if known.any():
         sure = np.vstack([felt_m, belief.sounded_m])
-        depth = _from_neighbours(
+        depth, spread = _from_neighbours(
             np.vstack([belief.xy_m[known], sure[:, :2], deeper[:, :2]]),
             np.concatenate([belief.depth_m[known], sure[:, 2], deeper[:, 2]]),
             np.concatenate([trust[known], np.zeros(len(sure)), np.full(len(deeper), ROUGHLY * visibility_m)]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
-        ).reshape(rows, cols)
+        )
     else:
-        depth = np.full((rows, cols), unknown_m)
+        depth, spread = np.full(rows * cols, unknown_m), np.zeros(rows * cols)
+    depth, spread = depth.reshape(rows, cols), spread.reshape(rows, cols)
     here = bottom.at(np.stack([east, north], axis=-1))
     limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
     clear = np.where(np.isnan(here), limit, here - clearance_m)
@@ -171,21 +178,25 @@ def estimate_floor(
     return FloorEstimate(
         float(low[0]), float(low[1]), float(cell), depth, smooth,
         np.minimum(_envelope(limit, cell, slope), depth - held_m), np.minimum(clear, depth - held_m),
-        held_to(bottom, clearance_m),
+        np.minimum(depth - UNEVEN * spread - clearance_m, depth - held_m), held_to(bottom, clearance_m),
     )  # fmt: skip
 
 
 def _from_neighbours(
     seen_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray, at_m: FloatArray, visibility_m: float
-) -> FloatArray:
-    """Weigh the closest seen landmarks by distance and trust; far from all of them return their mean."""
+) -> tuple[FloatArray, FloatArray]:
+    """Weigh the closest seen landmarks by distance and trust; return their mean and the deviation from it.
+
+    Far from all of them that is the mean of all, without any deviation.
+    """
     k = min(NEIGHBOURS, len(seen_m))
     found = cKDTree(seen_m).query(at_m, k=k)
     distance, index = (np.asarray(part).reshape(len(at_m), k) for part in found)
     weight = 1.0 / ((distance / visibility_m) ** 2 + 0.01) / (sd_m[index] ** 2 + (0.05 * visibility_m) ** 2)
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
-    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
+    spread = np.sqrt((weight * (depth_m[index] - local[:, None]) ** 2).sum(axis=1) / weight.sum(axis=1))
+    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean()), np.asarray(trust * spread)
 
 
 @njit(cache=True, nogil=True)
