@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.rollout.floor import FloorEstimate, held_at, sample
+from app.exploration.rollout.floor import FloorEstimate, deepest_dive_m, sample
 
 WORTH_OF_EARLY = 2.5
 """What the sum over time of the part that remains counts, against a step more in the end: early gains are surer."""
@@ -319,9 +319,8 @@ def fly_step(
             spare = np.sqrt(max(0.0, step * step - (x - at[i, 0]) ** 2 - (y - at[i, 1]) ** 2))
             lowest = at[i, 2]
             if steep:
-                limit = sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
                 # Of a dive the constraints refuse, nothing would be flown, and the team would wait there for good.
-                limit = min(limit, held_at(floor.held_to, x, y))
+                limit = deepest_dive_m(floor, x, y)
                 wish = limit - max(0.0, height - LOW * rules.visibility_m)
                 lowest += spare
             else:

@@ -50,12 +50,15 @@ class HeldTo(NamedTuple):
         Outer corner of the first cell, side of a cell.
     deepest_m : (rows, cols)
         Deepest that a vehicle may be; inf where the sea floor is unknown.
+    felt_m : (k, 3)
+        East, north and deepest that a vehicle may be where altimeters felt the sea floor.
     """
 
     west_m: float
     south_m: float
     cell_m: float
     deepest_m: FloatArray
+    felt_m: FloatArray
 
 
 class FloorEstimate(NamedTuple):
@@ -71,12 +74,11 @@ class FloorEstimate(NamedTuple):
         The same without detail: what a team keeps its height above.
     deepest_m : (rows, cols)
         Deepest that a vehicle may be, so that it clears the floor here and can climb every rise ahead.
-    clear_m : (rows, cols)
-        Deepest that a vehicle may be that goes straight down and up again: it clears the floor here.
     shoal_m : (rows, cols)
         As deep as altimeters let vehicles be where the floor is as shoal between landmarks as it may be.
     held_to : HeldTo
-        Deepest that the constraints let it be there. They hold to steps that the other rasters smooth.
+        Deepest that a vehicle may be that goes straight down and up again. The constraints hold to steps that the
+        other rasters smooth.
     """
 
     west_m: float
@@ -85,15 +87,15 @@ class FloorEstimate(NamedTuple):
     depth_m: FloatArray
     smooth_m: FloatArray
     deepest_m: FloatArray
-    clear_m: FloatArray
     shoal_m: FloatArray
     held_to: HeldTo
 
 
-def held_to(bottom: Bottom, clearance_m: float) -> HeldTo:
-    """Return how deep the constraints let vehicles be over a sea floor."""
+def held_to(bottom: Bottom, felt_m: FloatArray, clearance_m: float) -> HeldTo:
+    """Return how deep vehicles may be over a sea floor that altimeters have felt at some points (k, 3)."""
     deepest = np.where(np.isnan(bottom.depth_m), np.inf, bottom.depth_m - clearance_m)
-    return HeldTo(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), deepest)
+    felt = np.ascontiguousarray(felt_m - [0.0, 0.0, clearance_m])
+    return HeldTo(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), deepest, felt)
 
 
 def margin_m(visibility_m: float, clearance_m: float) -> float:
@@ -162,8 +164,6 @@ def estimate_floor(
     depth, spread = depth.reshape(rows, cols), spread.reshape(rows, cols)
     here = bottom.at(np.stack([east, north], axis=-1))
     limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
-    clear = np.where(np.isnan(here), limit, here - clearance_m)
-    _keep_above(clear, east, north, felt_m, clearance_m, STEEPEST_DIVE)
     if follows:
         smooth, slope = depth.copy(), STEEPEST_DIVE
         limit = np.fmin(limit, here - clearance_m)
@@ -177,8 +177,9 @@ def estimate_floor(
         _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), slope)
     return FloorEstimate(
         float(low[0]), float(low[1]), float(cell), depth, smooth,
-        np.minimum(_envelope(limit, cell, slope), depth - held_m), np.minimum(clear, depth - held_m),
-        np.minimum(depth - UNEVEN * spread - clearance_m, depth - held_m), held_to(bottom, clearance_m),
+        np.minimum(_envelope(limit, cell, slope), depth - held_m),
+        np.minimum(depth - UNEVEN * spread - clearance_m, depth - held_m),
+        held_to(bottom, felt_m, max(clearance_m, held_m)),
     )  # fmt: skip
 
 
@@ -262,14 +263,21 @@ def sample(raster: FloatArray, west: float, south: float, cell: float, x: float,
     return float(lower * (1.0 - v) + upper * v)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def held_at(held: HeldTo, x: float, y: float) -> float:
-    """Return how deep the constraints let a vehicle be at (x, y); inf outside of the raster."""
+@njit(cache=True, nogil=True)
+def deepest_dive_m(floor: FloorEstimate, x: float, y: float) -> float:
+    """Return how deep a vehicle may be at (x, y) that goes straight down and up again."""
+    held = floor.held_to
     col = int(np.floor((x - held.west_m) / held.cell_m))
     row = int(np.floor((y - held.south_m) / held.cell_m))
-    if row < 0 or col < 0 or row >= held.deepest_m.shape[0] or col >= held.deepest_m.shape[1]:
-        return np.inf
-    return float(held.deepest_m[row, col])
+    deepest = np.inf
+    if 0 <= row < held.deepest_m.shape[0] and 0 <= col < held.deepest_m.shape[1]:
+        deepest = held.deepest_m[row, col]
+    if deepest == np.inf:
+        deepest = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+    for k in range(len(held.felt_m)):
+        away = np.hypot(x - held.felt_m[k, 0], y - held.felt_m[k, 1])
+        deepest = min(deepest, held.felt_m[k, 2] + STEEPEST_DIVE * away)
+    return float(deepest)
 
 
 @njit(cache=True, nogil=True)

@@ -61,9 +61,8 @@ def hilly(seed: int, n: int = 120) -> Any:
 def flat(depth: float) -> Any:
     """An even floor over the cube."""
     side = np.full((41, 41), depth)
-    return FloorEstimate(
-        -1.0, -1.0, 0.05, side, side.copy(), side - HELD, side - HELD, side - HELD, held_to(Bottom.unknown(), HELD)
-    )
+    held = held_to(Bottom.unknown(), np.zeros((0, 3)), HELD)
+    return FloorEstimate(-1.0, -1.0, 0.05, side, side.copy(), side - HELD, side - HELD, held)
 
 
 def make_case(seed: int, stops: int = 4) -> Any:

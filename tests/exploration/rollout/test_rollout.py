@@ -24,7 +24,7 @@ from app.exploration.rollout.flight import (
     make_work,
     new_checkpoints,
 )
-from app.exploration.rollout.floor import ENVELOPE_SLOPE, estimate_floor, sample
+from app.exploration.rollout.floor import ENVELOPE_SLOPE, deepest_dive_m, estimate_floor, sample
 from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
@@ -135,7 +135,7 @@ def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: int) -> No
         for i in range(2):
             assert np.linalg.norm(after[i] - after[i + 1]) <= RULES.com_range_m + 1e-6
         for x, y, z in after:
-            clear = sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+            clear = deepest_dive_m(floor, x, y)
             assert z <= max(clear, sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)) + 1e-6
         at = after.copy()
     assert k == count, "the plan is flown to its end"
@@ -298,6 +298,19 @@ def test_a_dive_goes_no_deeper_than_its_constraints_let_it(seed: int, east: Any,
         assert limits.feasible(at, after[None], bottom)[0]
         at = after.copy()
     assert k == 1, "the dive ends"
+
+
+def test_a_dive_goes_down_into_a_pit_that_a_single_landmark_tells_of_and_not_onto_what_was_felt() -> None:
+    side = np.linspace(-1.0, 1.0, 34)
+    xy = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    pit = int(np.argmin(np.hypot(*(xy - 0.1).T)))
+    belief = Belief(
+        xy, np.where(np.arange(len(xy)) == pit, 0.9, 0.4), np.full(len(xy), 0.02), np.ones(len(xy), dtype=bool),
+        np.ones(len(xy)), 0.2,
+    )  # fmt: skip
+    felt = np.array([[*xy[pit], 0.7]])
+    for floor, deepest in ((floor_of(belief), 0.9), (floor_of(belief, felt), 0.7)):
+        assert deepest_dive_m(floor, *xy[pit]) == pytest.approx(deepest - CLEARANCE)
 
 
 def test_a_plan_that_leaves_what_can_be_taken_costs_more_than_one_that_takes_it() -> None:
