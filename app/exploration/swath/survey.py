@@ -14,8 +14,9 @@ from app.exploration.core.coverage import Coverage
 from app.exploration.core.routes import FreeSpace
 from app.exploration.swath.assignment import Assignment, FlownLine, Question, recalled
 from app.exploration.swath.crosslines import crosslines as crosslines_over
+from app.exploration.swath.entries import nearest_entry
 from app.exploration.swath.lines import lines, strips
-from app.exploration.swath.lines_ahead import best_direction, nearest_entry
+from app.exploration.swath.lines_ahead import best_direction
 from app.exploration.swath.missed import on_the_way, passable, touching
 from app.exploration.swath.near_zones import led_round
 from app.exploration.swath.passes import shared, tour
@@ -410,16 +411,16 @@ class SwathSurvey:
             return  # Nothing is known that was not known when the direction was chosen.
         self._directed = Directed(coverage.wanted, coverage.depth_m)
         # What is left has some shape; what speaks for another direction is the bottom of the whole area.
-        direction_rad = self._best_direction(replace(coverage, done=np.zeros_like(coverage.done)), asked.flying)
+        direction_rad = self._best_direction(replace(coverage, done=np.zeros_like(coverage.done)), asked)
         if not begins and direction_rad != self._direction_rad:
-            direction_rad = self._best_direction(coverage, asked.flying)
+            direction_rad = self._best_direction(coverage, asked)
         if begins or direction_rad != self._direction_rad:
             self._direction_rad = direction_rad
             share_out(self._sweeps, self._rasters.of(coverage, direction_rad), asked.flying, asked.team)
 
-    def _best_direction(self, coverage: Coverage, flying: Flying) -> float:
-        rasters = self._rasters
-        return best_direction(coverage, flying, rasters.guess_m, self._direction_rad, TURNING_GAIN, rasters.cell_m)[0]
+    def _best_direction(self, coverage: Coverage, asked: Question) -> float:
+        guess_m, cell_m = self._rasters.guess_m, self._rasters.cell_m
+        return best_direction(coverage, asked.flying, guess_m, self._direction_rad, TURNING_GAIN, asked.team, cell_m)[0]
 
     def remember(self) -> dict[str, Any]:
         """Return all that the survey knows, for ``recall``."""
