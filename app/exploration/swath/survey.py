@@ -32,7 +32,7 @@ MOST_REFUSED = 3
 LOOK_AGAIN_AT = (0.02, 0.08, 0.2, 0.4)
 """Shares of the area after which the direction of lines is looked at again, with the depths that are known by then."""
 
-TURNING_GAIN = 0.2
+TURNING_GAIN = 0.1
 """Lines are turned into another direction where that shortens what is left by more than this share."""
 
 
