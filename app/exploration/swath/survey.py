@@ -32,8 +32,9 @@ MOST_REFUSED = 3
 LOOK_AGAIN_AT = (0.02, 0.08, 0.2, 0.4)
 """Shares of the area after which the direction of lines is looked at again, with the depths that are known by then."""
 
-TURNING_GAIN = 0.1
-"""Lines are turned into another direction where that shortens what is left by more than this share."""
+TURNING_GAIN, TURNING_TEAM_GAIN = 0.1, 0.2
+"""Lines of one vehicle, and of a team, are turned into another direction where that shortens what is left by more than
+these shares: who of a team flies what when is foretold less surely."""
 
 
 @dataclass(frozen=True)
@@ -420,7 +421,8 @@ class SwathSurvey:
 
     def _best_direction(self, coverage: Coverage, asked: Question) -> float:
         guess_m, cell_m = self._rasters.guess_m, self._rasters.cell_m
-        return best_direction(coverage, asked.flying, guess_m, self._direction_rad, TURNING_GAIN, asked.team, cell_m)[0]
+        gain = TURNING_GAIN if len(asked.team) == 1 else TURNING_TEAM_GAIN
+        return best_direction(coverage, asked.flying, guess_m, self._direction_rad, gain, asked.team, cell_m)[0]
 
     def remember(self) -> dict[str, Any]:
         """Return all that the survey knows, for ``recall``."""

@@ -50,7 +50,8 @@ def test_what_is_foretold_is_flown_whichever_way_lines_lie(
     fleet = Fleet(scenario)
     coverage = fleet.coverage(scenario.true_depth_m())
     team = {name: craft.pose for name, craft in fleet.crafts.items()}
-    monkeypatch.setattr(survey, "TURNING_GAIN", 1.0)  # Lines stay in the direction that they are given.
+    for gain in ("TURNING_GAIN", "TURNING_TEAM_GAIN"):
+        monkeypatch.setattr(survey, gain, 1.0)  # Lines stay in the direction that they are given.
     ratios = []
     for direction_rad in np.radians(DIRECTIONS_DEG):
         _, foretold_m = best_direction(coverage, scenario.flying, CRUISE_M + 5.0, direction_rad, 1.0, team, 1.5)
