@@ -8,14 +8,14 @@ from scipy.ndimage import label
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.swath.assignment import Assignment, Question
-from app.exploration.swath.lines_ahead import approaches_m
-from app.exploration.swath.lines_ahead import pose as pose_of
-from app.exploration.swath.passes import MOST_TOURED, Pass, Passable, pieces, shared, tour
+from app.exploration.swath.entries import approaches_m
+from app.exploration.swath.entries import pose as pose_of
+from app.exploration.swath.passes import FILLING_OVERLAP, MOST_TOURED, Pass, Passable, pieces, shared, tour
 from app.exploration.swath.raster import LineRaster
 from app.exploration.swath.shares import free_at
 
-FILLING_OVERLAP, STUBBORN_OVERLAP = 0.4, 0.95
-"""Shares of half a swath that holes lie within: where a line to fill them sees them well, and where it is over them."""
+STUBBORN_OVERLAP = 0.95
+"""What was looked at in vain lies within so large a share less of half a swath: a line is over it."""
 
 EARLY = 0.4
 """Missed ground is passed on the way to a line where the detour is less than so much of the way back from the last."""

@@ -17,6 +17,9 @@ MOST_PIECES, MOST_TOURED = 30, 5
 BUSY = 0.25
 """A piece is left to a vehicle though its way is longer by this part of what another has still to fly before."""
 
+FILLING_OVERLAP = 0.4
+"""Holes lie within so large a share less of half a swath: a pass over them sees them well."""
+
 ASIDE = (-1.0, 0.0, 1.0)
 """Sides that a pass leaves a piece on, in what the swath is wider."""
 
@@ -71,18 +74,19 @@ class Passable:
 
 
 def pieces(
-    raster: LineRaster, missed: BoolArray, flying: Flying, near_m: FloatArray
+    raster: LineRaster, missed: BoolArray, flying: Flying, near_m: FloatArray | None = None
 ) -> tuple[list[Passable], BoolArray]:
-    """Return the nearest pieces of missed cells (along, across) that one pass sees, and the cells that none does.
+    """Return the pieces of missed cells (along, across) that one pass sees, and the cells that none does.
 
-    ``near_m``: a place, (2,).
+    Those nearest to a place ``near_m`` (2,), or the largest.
     """
     number, _ = label(missed, np.ones((3, 3)))
     found = []
     for k, where in enumerate(find_objects(number), start=1):
         cells = np.argwhere(number[where] == k) + np.array([where[0].start, where[1].start])
         places = raster.axes.to_en(raster.corner_m + (cells + 0.5) * raster.cell_m)
-        found.append((float(np.hypot(*(places - near_m).T).min()), cells, places))
+        rank = -float(len(cells)) if near_m is None else float(np.hypot(*(places - near_m).T).min())
+        found.append((rank, cells, places))
     found.sort(key=lambda one: one[0])
     wide = np.zeros_like(missed)
     passable = []

@@ -6,8 +6,8 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.swath.assignment import Assignment, Question, Strip
+from app.exploration.swath.entries import path_m
 from app.exploration.swath.lines import ALMOST, needed_lines
-from app.exploration.swath.lines_ahead import path_m
 from app.exploration.swath.passes import BUSY
 from app.exploration.swath.raster import Flying, LineRaster
 

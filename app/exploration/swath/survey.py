@@ -14,8 +14,9 @@ from app.exploration.core.coverage import Coverage
 from app.exploration.core.routes import FreeSpace
 from app.exploration.swath.assignment import Assignment, FlownLine, Question, recalled
 from app.exploration.swath.crosslines import crosslines as crosslines_over
+from app.exploration.swath.entries import nearest_entry
 from app.exploration.swath.lines import lines, strips
-from app.exploration.swath.lines_ahead import best_direction, nearest_entry
+from app.exploration.swath.lines_ahead import best_direction
 from app.exploration.swath.missed import on_the_way, passable, touching
 from app.exploration.swath.near_zones import led_round
 from app.exploration.swath.passes import shared, tour
@@ -31,8 +32,9 @@ MOST_REFUSED = 3
 LOOK_AGAIN_AT = (0.02, 0.08, 0.2, 0.4)
 """Shares of the area after which the direction of lines is looked at again, with the depths that are known by then."""
 
-TURNING_GAIN = 0.2
-"""Lines are turned into another direction where that shortens what is left by more than this share."""
+TURNING_GAIN, TURNING_TEAM_GAIN = 0.1, 0.2
+"""Lines of one vehicle, and of a team, are turned into another direction where that shortens what is left by more than
+these shares: who of a team flies what when is foretold less surely."""
 
 
 @dataclass(frozen=True)
@@ -410,16 +412,17 @@ class SwathSurvey:
             return  # Nothing is known that was not known when the direction was chosen.
         self._directed = Directed(coverage.wanted, coverage.depth_m)
         # What is left has some shape; what speaks for another direction is the bottom of the whole area.
-        direction_rad = self._best_direction(replace(coverage, done=np.zeros_like(coverage.done)), asked.flying)
+        direction_rad = self._best_direction(replace(coverage, done=np.zeros_like(coverage.done)), asked)
         if not begins and direction_rad != self._direction_rad:
-            direction_rad = self._best_direction(coverage, asked.flying)
+            direction_rad = self._best_direction(coverage, asked)
         if begins or direction_rad != self._direction_rad:
             self._direction_rad = direction_rad
             share_out(self._sweeps, self._rasters.of(coverage, direction_rad), asked.flying, asked.team)
 
-    def _best_direction(self, coverage: Coverage, flying: Flying) -> float:
-        rasters = self._rasters
-        return best_direction(coverage, flying, rasters.guess_m, self._direction_rad, TURNING_GAIN, rasters.cell_m)[0]
+    def _best_direction(self, coverage: Coverage, asked: Question) -> float:
+        guess_m, cell_m = self._rasters.guess_m, self._rasters.cell_m
+        gain = TURNING_GAIN if len(asked.team) == 1 else TURNING_TEAM_GAIN
+        return best_direction(coverage, asked.flying, guess_m, self._direction_rad, gain, asked.team, cell_m)[0]
 
     def remember(self) -> dict[str, Any]:
         """Return all that the survey knows, for ``recall``."""

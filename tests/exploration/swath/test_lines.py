@@ -12,7 +12,6 @@ from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.coverage import Coverage
 from app.exploration.swath.lines import STEEPEST, gentle, lines, strips
-from app.exploration.swath.lines_ahead import ahead, best_direction
 from app.exploration.swath.raster import Axes, Flying, raster_of
 
 FLYING = Flying(SwathSonar(), 2.0, 1.0, 5.0, 0.06)
@@ -50,17 +49,6 @@ def test_a_line_is_the_largest_that_bends_so_far(wish: FloatArray, cell_m: float
     edges = np.pad(level, width // 2, mode="edge")
     smooth = [edges[i : i + width].mean() for i in range(len(level))]
     assert np.allclose(gentle(wish, cell_m, radius_m), smooth)
-
-
-def test_lines_that_are_too_long_in_all_are_not_laid_to_the_end() -> None:
-    raster = raster_of(flat(150, 150, 8.0), 0.0, 2.0, 10.0)
-    at = np.array([0.0, 0.0, np.nan])
-    whole = ahead(raster, FLYING, at)
-    assert whole is not None
-    assert ahead(raster, FLYING, at, most_m=whole.length_m - 1.0) is None
-    again = ahead(raster, FLYING, at, most_m=whole.length_m + 1.0)
-    assert again is not None
-    assert again.length_m == whole.length_m
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-100, 100), st.floats(-100, 100))
@@ -123,25 +111,6 @@ def test_a_line_ends_where_nothing_open_is_seen_any_more(direction_deg: float, s
     for line in lines(raster, raster.open, sign, FLYING):
         seen = raster.seen(line.columns, line.across_m, FLYING) & raster.open[line.columns]
         assert seen[[0, -1]].any(axis=1).all()
-
-
-def test_all_lines_together_see_everything_and_are_as_long_as_needed() -> None:
-    coverage = flat(180, 300)
-    raster = raster_of(coverage, 0.0, 1.0, 10.0)
-    found = ahead(raster, FLYING, np.array([0.0, 0.0, np.nan]))
-    assert found is not None
-    assert len(found.paths) == 3, "62 m of swath on 180 m"
-    assert 900.0 < found.length_m < 1200.0
-    assert raster.open.all(), "foretelling changes nothing"
-
-
-def test_lines_lie_along_the_contours_of_a_slope() -> None:
-    depth = np.tile(np.linspace(5.0, 40.0, 200), (200, 1))
-    direction, length_m = best_direction(flat(200, 200, depth), FLYING, 10.0, 0.0, 0.05)
-    assert abs(math.cos(direction)) < 0.5, "north and south, where the depth changes eastwards"
-    assert length_m > 0.0
-    same, _ = best_direction(flat(100, 300), FLYING, 10.0, 0.0, 0.05)
-    assert same == 0.0
 
 
 @pytest.mark.parametrize("factor", [2, 3])
