@@ -110,7 +110,7 @@ def claims_of(terrain: Terrain, survey: Survey, planner: str, seed: int = 0, acc
     due = {max(1, round(part * survey.steps / 100)): part for part in MAPS_AT}
     coverage, noted = [], []
     for flown in fly(spec, members, starts, builder, terrain, spacing_m=survey.spacing_m):
-        part = due.get(flown.step)
+        part = due.pop(flown.step, None)
         if part is None:
             continue
         built = builder.build()

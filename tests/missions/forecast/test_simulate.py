@@ -13,8 +13,9 @@ from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
-from app.missions.forecast.simulate import Forecast, fly_over, forecast
+from app.missions.forecast.simulate import Forecast, fly, fly_over, forecast
 from app.missions.forecast.swarm import Flown, SoFar, Swarm
+from app.missions.maps.builder import MapBuilder
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
@@ -107,6 +108,21 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     assert view.steps_flown == view.steps_simulated == 1
     # After one step there is nothing to be sure of, and it is not drawn out to the end.
     assert view.coverage_pct_range.high < 20.0
+
+
+def test_a_vehicle_that_can_fly_no_further_line_has_nothing_left_in_a_forecast() -> None:
+    """Its rest was drawn out, as if there had been no time to fly it."""
+    vehicles = [{"name": name, "kind": "sim", "speed_mps": mps} for name, mps in (("quick", 2.0), ("slow", 1.0))]
+    spec = sim_spec(side_m=60.0, vehicles=vehicles, planner={"name": "lawnmower"}, budget={"km_per_vehicle": 0.31})
+    team = Team()
+    members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
+    starts, _ = request.starts_of(spec, members)
+    [floor] = [one for one, _ in zip(floors_of(spec, NONE, 4.0, None), range(1), strict=False)]
+    builder = MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m)
+    builder.build()
+    *_, last = fly(spec, members, starts, builder, floor.terrain)
+    assert last.left_m == 0.0
+    assert last.distance_m[1] < 310.0, "no whole line is left"
 
 
 def test_without_patience_one_floor_is_flown_and_that_is_said() -> None:
