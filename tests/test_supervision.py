@@ -146,5 +146,11 @@ def test_a_name_that_is_no_file_is_reached_too(tmp_path: Path) -> None:
 
 
 def test_a_supervisor_that_does_not_listen_is_no_reason_to_end(tmp_path: Path) -> None:
-    Supervisor(str(tmp_path / "nobody")).tell(READY="1")
-    Supervisor().tell(READY="1")
+    supervisor = Supervisor(str(tmp_path / "notify"))
+    supervisor.tell(READY="1")
+    assert list(tmp_path.iterdir()) == [], "nothing is made in its place"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+        sock.bind(str(tmp_path / "notify"))
+        supervisor.tell(STATUS="it listens now")
+        Supervisor().tell(STATUS="to nobody")
+        assert waiting(sock) == ["STATUS=it listens now"]

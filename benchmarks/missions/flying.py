@@ -4,9 +4,9 @@ A mission of the service with its simulated vehicles, in process or, with ``--ki
 processes of their own. Of the tracks as they were stored is told, by vehicle and in all: ``flown_m``; ``on_plan_pct``,
 the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
 ``waiting_pct``, the part of the time spent in them; ``loops_under_way``, those until its last leg was reached, after
-which a vehicle waits for the others; and how many legs were not reached. ``--slow-decisions 5`` makes
-each decision take that many seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a
-page.
+which a vehicle waits for the others; ``survey_minutes``, how long each vehicle surveyed by its clock, of which a
+mission has so many; and how many legs were not reached. ``--slow-decisions 5`` makes each decision take that many
+seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a page.
 """
 
 import asyncio
@@ -123,8 +123,9 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         while crafts and sum(view.link == "ready" for view in await service.vehicles()) < flight.vehicles:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
         await service.act(await service.get(identity), Action.START, actor="benchmark")
-        while (view := mission_view(await service.get(identity))).state not in ENDED:  # noqa: ASYNC110
+        while (view := mission_view(live := await service.get(identity))).state not in ENDED:  # noqa: ASYNC110
             await asyncio.sleep(0.5)
+        surveyed_s = [member.flown.survey_s for member in live.team]
         async with database.reading() as session:
             tracks = await track_points(session, identity)
             waypoints = await waypoints_between(session, identity, 1, 1_000_000)
@@ -147,6 +148,7 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
     return {
         "state": str(view.state),
         "wall_s": round(time.monotonic() - begun, 1),
+        "survey_minutes": [round(seconds / 60.0, 1) for seconds in surveyed_s],
         "flown_m": round(flown, 1),
         "planned_m": round(sum(found["planned_m"] for found in by_vehicle.values()), 1),
         "on_plan_pct": round(sum(f["on_plan_pct"] * f["flown_m"] for f in by_vehicle.values()) / max(flown, 1e-9), 1),

@@ -95,6 +95,8 @@ class Situation:
         last of these ends, and a proposal leaves them there.
     left_m : (n_vehicles,) or None
         How far each may still fly from its position; None: the remaining steps, each as long as a step may be.
+    turns_take_way : bool
+        Whether turns take some of that, as where time is counted; not where legs are, or their metres.
     swath : SwathTask or None
         What is to be ensonified, in a survey with swath sonars.
     at_rest : frozenset of str
@@ -115,6 +117,7 @@ class Situation:
     search: SearchTask | None = None
     moving: BoolArray | None = None
     left_m: FloatArray | None = None
+    turns_take_way: bool = True
     swath: SwathTask | None = None
     at_rest: frozenset[str] = frozenset()
 

@@ -147,8 +147,8 @@ class LawnmowerPlanner(PlannerBase):
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
     def _turn_radius_m(self, team: Situation) -> float:
-        # Where legs are counted a turn takes nothing.
-        return 0.0 if team.left_m is None else self.options.turn_radius_m
+        counted = team.left_m is not None and team.turns_take_way
+        return self.options.turn_radius_m if counted else 0.0
 
     def _left(self, team: Situation, i: int) -> float:
         return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])

@@ -11,6 +11,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.lines.lattice import flown_length, route_length
 from app.exploration.lines.lawnmower import LawnmowerPlanner, lawnmower_routes, route_across
+from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 
 WIDTH, HEIGHT = 120.0, 300.0
@@ -36,6 +37,15 @@ def test_no_more_lines_are_begun_than_a_vehicle_has_way_for_with_its_turns(radiu
     for start, route, without in zip(TEAM, routes, straight, strict=True):
         assert flown_length(start, route, radius_m) <= budget_m
         assert 2 <= len(route) <= len(without)
+
+
+@pytest.mark.parametrize("turns_take_way", [True, False])
+def test_turns_are_counted_where_they_take_way(turns_take_way: bool) -> None:
+    planner = create_planner("lawnmower", PlannerOptions(turn_radius_m=8.0))
+    told = replace(situation(1300.0, (2.0, 2.0)), turns_take_way=turns_take_way)
+    planner.propose(told, np.random.default_rng(0))
+    [route] = planner.ways_ahead_m().values()
+    assert len(np.unique(route[:, 0].round(3))) == (3 if turns_take_way else 4), "lines of 299 m"
 
 
 def test_lines_along_follow_those_across() -> None:

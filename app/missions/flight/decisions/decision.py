@@ -401,6 +401,7 @@ def _situation(
         search=knowledge.search,
         moving=None if moving.all() else moving,
         left_m=None if np.isnan(left_m).any() else left_m,
+        turns_take_way=spec.budget.minutes is not None,
         swath=knowledge.swath,
         at_rest=frozenset(place.vehicle for place in team if place.at_rest),
     )
