@@ -1,5 +1,6 @@
-"""The usual practice: evenly spaced parallel lines, an equal share of the area per vehicle."""
+"""The usual practice: evenly spaced parallel lines over the whole area, shared out by what each vehicle can fly."""
 
+import itertools
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -10,13 +11,29 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint, vertices_passed
+from app.exploration.core.routes import (
+    CORNER_TOLERANCE,
+    FreeSpace,
+    Turns,
+    Vehicles,
+    metres_left,
+    next_waypoint,
+    vertices_passed,
+)
+from app.exploration.lines.even_survey import fullest_surveys
 from app.exploration.lines.flown_lines import after_line
+from app.exploration.lines.ground import Ground
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, flown_length, longer_axis_rad, route_length
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
+PARTS = 8
+"""Into how many parts vehicles may share a line."""
+ACROSS = 0.9
+"""Lines lie across the longer axis where the ground is closer to them by this factor, squared and on average."""
+LEAST_LEG_M = 5.0
+"""Who can fly no farther is done."""
 LEAST_BUDGET_M = 1.0
 """Also who can fly no farther has a strip, a very narrow one."""
 
@@ -24,20 +41,39 @@ LEAST_BUDGET_M = 1.0
 def lawnmower_routes(
     constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float = 0.0
 ) -> list[FloatArray]:
-    """Return each vehicle's route (k, 2): lines along the longer axis, as many as fit into the distance it can travel.
+    """Return each vehicle's route (k, 2): neighbouring ones of the most even lines that the team can fly together.
+
+    Lines lie along the longer axis, or across it where that brings the ground clearly nearer; vehicles may share one.
 
     Parameters
     ----------
     constraints : Constraints
         Give the area and its keep-out zones.
     starts : (n_vehicles, 2)
-        Where the vehicles are; they take the strips in the order in which they stand across the lines.
+        Where the vehicles are.
     budgets_m : (n_vehicles,)
-        Distances that the vehicles can travel; their strips are in proportion to them.
+        Distances that the vehicles can travel, nearly all of which they do.
     turn_radius_m
         Of the circles in which they turn, which takes some of those distances.
     """
-    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
+    free, axis = FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area)
+    vehicles = Vehicles(np.ascontiguousarray(starts), np.full(len(starts), np.nan), np.asarray(budgets_m, dtype=float))
+    turns, ground = Turns(turn_radius_m, 0.0), Ground.of(constraints)
+    best: tuple[float, list[FloatArray]] | None = None
+    for direction, counts in ((axis, 1.0), (axis + np.pi / 2, 1.0 / ACROSS)):
+        for survey in fullest_surveys(Sweep(constraints, free, direction), vehicles, turns, PARTS):
+            ways = [np.vstack([start, route]) for start, route in zip(starts, survey.routes, strict=True)]
+            left_m2 = counts * float((ground.away_m(ways) ** 2).sum())
+            if best is None or left_m2 < best[0] * (1.0 - 1e-9):
+                best = left_m2, survey.routes
+    return _first_lines(constraints, free, starts, budgets_m, turn_radius_m) if best is None else best[1]
+
+
+def _first_lines(
+    constraints: Constraints, free: FreeSpace, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float
+) -> list[FloatArray]:
+    """Return a route (k, 2) for each vehicle of a team that cannot fly even one line: it begins one of its strip."""
+    sweep = Sweep(constraints, free, longer_axis_rad(constraints.area))
     order = np.argsort(sweep.to_uv(starts)[:, 0], kind="stable")
     cuts = sweep.shares(np.maximum(budgets_m[order], LEAST_BUDGET_M))
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
@@ -86,7 +122,7 @@ class LawnmowerPlanner(PlannerBase):
     """Follows the lines; a vehicle that leaves hands on its rest, one that joins takes half of the longest rest.
 
     A vehicle that can still fly when it has flown its lines, as one whose battery lasts longer than was sure at first,
-    gets more of them, across its strip.
+    gets more of them, across its strip; what is left then is flown as straight legs over ground that lines left out.
     """
 
     name: ClassVar[str] = "lawnmower"
@@ -99,6 +135,8 @@ class LawnmowerPlanner(PlannerBase):
         self._routes: dict[str, FloatArray] = {}
         self._passes: dict[str, int] = {}
         """How often vehicles got more lines."""
+        self._dealt: list[FloatArray] = []
+        """All ways that vehicles got, (k, 2) each."""
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
@@ -119,11 +157,13 @@ class LawnmowerPlanner(PlannerBase):
         return dict(self._routes)
 
     def _remember(self) -> dict[str, Any]:
-        return {"routes": self._routes, "passes": self._passes}
+        return {"routes": self._routes, "passes": self._passes, "dealt": self._dealt}
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._routes = {k: np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state["routes"].items()}
         self._passes = {k: int(count) for k, count in state.get("passes", {}).items()}
+        dealt = state.get("dealt", list(state["routes"].values()))
+        self._dealt = [np.array(way, dtype=np.float64).reshape(-1, 2) for way in dealt]
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
@@ -131,17 +171,24 @@ class LawnmowerPlanner(PlannerBase):
         self._lead_round(team)
         steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
         # The corner that a leg cuts may be that of a zone: then it is flown out.
-        cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
+        tolerances = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
+        cuts = [[cut] * len(team.vehicles) for cut in tolerances]
         targets = np.empty((len(cuts), len(team.vehicles), 2))
-        for k, cut in enumerate(cuts):
-            for i, name in enumerate(team.vehicles):
-                route = self._routes[name] if team.moves[i] else self._routes[name][:0]
-                x, y = team.positions[i, :2]
-                targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], cut)[:2]
+        area = Polygon(team.constraints.area)
+        for k, i in itertools.product(range(len(cuts)), range(len(team.vehicles))):
+            route = self._routes[team.vehicles[i]][: None if team.moves[i] else 0]
+            x, y = team.positions[i, :2]
+            targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], cuts[k][i])[:2]
+            # Nor does it cut a corner of the area that points inwards.
+            if not area.covers(LineString([team.positions[i, :2], targets[k, i]])):
+                cuts[k][i] = 0.0
+                targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], 0.0)[:2]
         positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
         for i, name in enumerate(team.vehicles):
             route, end_m = self._routes[name], positions[i, :2]
-            passed = vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which]) if team.moves[i] else 0
+            passed = (
+                vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which][i]) if team.moves[i] else 0
+            )
             self._routes[name] = route[passed or 0 :]
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
@@ -162,10 +209,23 @@ class LawnmowerPlanner(PlannerBase):
             passes = self._passes.get(name, 0)
             route = route_across(team.constraints, en, i, passes, float(left_m[i]), self._turn_radius_m(team))
             if route is not None:
-                self._routes[name], self._passes[name] = route, passes + 1
+                self._passes[name] = passes + 1
+            elif left_m[i] >= LEAST_LEG_M:
+                route = self._over_gaps(team, i, float(left_m[i]))
+            if route is not None:
+                self._routes[name] = route
+                self._dealt.append(np.vstack([en[i], route]))
             else:
                 done.add(name)
         return frozenset(done)
+
+    def _over_gaps(self, team: Situation, i: int, budget_m: float) -> FloatArray | None:
+        """Return the leg of a vehicle, (1, 2), over ground that is far from all lines; None where there is none."""
+        ground, free = Ground.of(team.constraints), FreeSpace(team.constraints, BORDER_MARGIN_M)
+        here_m, heading_rad = team.positions[i, :2], float(team.headings_rad[i])
+        radius_m = self._turn_radius_m(team)
+        end_m = ground.best_end(free, ground.away_m(self._dealt), here_m, heading_rad, budget_m, radius_m)
+        return None if end_m is None else end_m[None]
 
     def _lead_round(self, team: Situation) -> None:
         """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere."""
@@ -185,5 +245,6 @@ class LawnmowerPlanner(PlannerBase):
         if not self._routes.keys() & set(team.vehicles):
             routes = lawnmower_routes(team.constraints, en, metres_left(team), self._turn_radius_m(team))
             self._routes = dict(zip(team.vehicles, routes, strict=True))
+            self._dealt = [np.vstack([here, route]) for here, route in zip(en, routes, strict=True)]
             return
         self._routes = hand_over(self._routes, team.vehicles, en)

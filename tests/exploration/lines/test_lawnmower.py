@@ -1,4 +1,4 @@
-"""What a vehicle of a lawnmower survey flies that has flown its own lines."""
+"""Which lines the vehicles of a lawnmower survey fly, and what one flies that has flown its own."""
 
 from dataclasses import replace
 
@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely import LineString, Polygon
 
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
+from app.exploration.lines.ground import Ground
 from app.exploration.lines.lattice import flown_length, route_length
-from app.exploration.lines.lawnmower import LawnmowerPlanner, lawnmower_routes, route_across
+from app.exploration.lines.lawnmower import LEAST_LEG_M, LawnmowerPlanner, lawnmower_routes, route_across
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 
@@ -30,22 +32,46 @@ def test_lines_across_keep_to_their_vehicles_strip_and_to_what_it_can_fly() -> N
 
 
 @given(radius_m=st.floats(0.5, 12.0), budget_m=st.floats(1200.0, 6000.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_no_more_lines_are_begun_than_a_vehicle_has_way_for_with_its_turns(radius_m: float, budget_m: float) -> None:
     routes = lawnmower_routes(Constraints(AREA), TEAM, np.full(3, budget_m), radius_m)
-    straight = lawnmower_routes(Constraints(AREA), TEAM, np.full(3, budget_m))
-    for start, route, without in zip(TEAM, routes, straight, strict=True):
-        assert flown_length(start, route, radius_m) <= budget_m
-        assert 2 <= len(route) <= len(without)
+    flown_m = [flown_length(start, route, radius_m) for start, route in zip(TEAM, routes, strict=True)]
+    assert max(flown_m) <= budget_m
+    assert min(flown_m) > 0.0
+
+
+@pytest.mark.parametrize("budgets_m", [(1100.0, 1100.0, 1100.0), (2500.0, 1000.0, 1000.0), (600.0, 600.0, 3000.0)])
+@pytest.mark.parametrize("radius_m", [0.0, 5.0])
+def test_lines_take_most_of_what_every_vehicle_can_fly(budgets_m: tuple[float, float, float], radius_m: float) -> None:
+    routes = lawnmower_routes(Constraints(AREA), TEAM, np.array(budgets_m), radius_m)
+    flown_m = np.array([flown_length(start, route, radius_m) for start, route in zip(TEAM, routes, strict=True)])
+    assert (flown_m <= np.array(budgets_m)).all()
+    assert flown_m.sum() >= 0.92 * np.sum(budgets_m)
+    assert (flown_m >= 0.75 * np.array(budgets_m)).all()
+
+
+def test_lines_leave_no_ground_much_farther_from_them_than_half_their_distance() -> None:
+    budget_m = 1500.0
+    routes = lawnmower_routes(Constraints(AREA), TEAM, np.full(3, budget_m))
+    away_m = Ground.of(Constraints(AREA)).away_m([np.vstack([at, way]) for at, way in zip(TEAM, routes, strict=True)])
+    spacing_m = WIDTH * HEIGHT / (3 * budget_m)
+    assert away_m.max() < 0.85 * spacing_m, "the farthest are between the ends of lines, at the border"
+    assert np.quantile(away_m, 0.95) < 0.6 * spacing_m
 
 
 @pytest.mark.parametrize("turns_take_way", [True, False])
 def test_turns_are_counted_where_they_take_way(turns_take_way: bool) -> None:
-    planner = create_planner("lawnmower", PlannerOptions(turn_radius_m=8.0))
-    told = replace(situation(1300.0, (2.0, 2.0)), turns_take_way=turns_take_way)
-    planner.propose(told, np.random.default_rng(0))
-    [route] = planner.ways_ahead_m().values()
-    assert len(np.unique(route[:, 0].round(3))) == (3 if turns_take_way else 4), "lines of 299 m"
+    planner, left_m, radius_m = create_planner("lawnmower", PlannerOptions(turn_radius_m=8.0)), 1300.0, 8.0
+    place = (2.0, 2.0)
+    proposal = planner.propose(
+        replace(situation(left_m, place), turns_take_way=turns_take_way), np.random.default_rng(0)
+    )
+    [ahead] = planner.ways_ahead_m().values()
+    route = np.vstack([proposal.positions[:, :2], ahead])
+    assert route_length(np.array(place), route) <= left_m
+    counted_m = flown_length(np.array(place), route, radius_m if turns_take_way else 0.0)
+    assert 0.9 * left_m < counted_m <= left_m + 1.0
+    assert (flown_length(np.array(place), route, radius_m) <= left_m + 1.0) == turns_take_way
 
 
 def test_lines_along_follow_those_across() -> None:
@@ -99,8 +125,8 @@ def test_a_vehicle_whose_battery_lasts_longer_than_was_sure_does_not_wait_where_
     assert proposal.done == {"a"}, "who can fly no further line is done"
 
 
-def test_who_has_flown_its_lines_and_can_fly_no_other_one_is_done() -> None:
-    """It circled where its lines ended until its way was used up: up to a line's length."""
+def test_who_has_flown_its_lines_flies_over_gaps_and_is_done_when_its_way_is_used_up() -> None:
+    """It circled where its lines ended until its way was used up, later it was done: up to a line's length was lost."""
     planner, rng, place, left_m = create_planner("lawnmower"), np.random.default_rng(0), (2.0, 2.0), 1100.0
     for _ in range(100):
         proposal = planner.propose(situation(left_m, place), rng)
@@ -111,7 +137,7 @@ def test_who_has_flown_its_lines_and_can_fly_no_other_one_is_done() -> None:
         assert moved_m > 0.5, "it always has somewhere to go"
         left_m, place = left_m - moved_m, (float(east), float(north))
     assert proposal.done == {"a"}
-    assert 20.0 < left_m < HEIGHT
+    assert 0.0 <= left_m < LEAST_LEG_M, "it flies over ground between its lines for as long as it can"
 
 
 def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:
@@ -142,3 +168,17 @@ def test_lines_stay_side_by_side_where_a_step_is_as_long_as_a_line() -> None:
         place = end
     assert len(headings) >= 4
     assert max(min(h, 180.0 - h) for h in headings) < 2.0, "they do not become a zigzag"
+
+
+def test_no_corner_of_the_area_that_points_inwards_is_cut() -> None:
+    """Only corners of zones were not cut: vehicles came half a metre out of the area beside them."""
+    bent = np.array([[0.0, 0.0], [120.0, 0.0], [120.0, 120.0], [60.0, 120.0], [60.0, 60.0], [0.0, 60.0]])
+    told = situation(4000.0, (2.0, 2.0))
+    told = replace(told, constraints=Constraints(bent, max_step_m=20.0, max_depth_m=10.0))
+    planner, rng, place = create_planner("lawnmower"), np.random.default_rng(0), np.array([64.0, 68.0])
+    planner.propose(replace(told, positions=np.array([[*place, 2.0]])), rng)
+    planner.put_back("a", np.array([[60.5, 59.5], [55.0, 52.0]]), None)
+    ends = [place]
+    for _ in range(3):
+        ends.append(planner.propose(replace(told, positions=np.array([[*ends[-1], 2.0]])), rng).positions[0, :2])
+    assert Polygon(bent).buffer(1e-6).covers(LineString(ends))
