@@ -5,7 +5,7 @@ half flown. There are as many lines as the team can pay for, transits and turns 
 """
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,13 +57,13 @@ def even_survey(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern
 
     def survey(n: int) -> EvenSurvey | None:
         if n not in dealt:
-            dealt[n] = _survey_of(sweep, vehicles, turns, pattern, n)
+            dealt[n] = _survey_of(sweep, vehicles, [turns] * len(vehicles.en_m), pattern, n)
         return dealt[n]
 
     return survey(most_lines(lambda n: survey(n) is not None))
 
 
-def fullest_surveys(sweep: Sweep, vehicles: Vehicles, turns: Turns, parts: int) -> list[EvenSurvey]:
+def fullest_surveys(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], parts: int) -> list[EvenSurvey]:
     """Return even surveys in the direction of ``sweep`` that leave the team as little to fly as may be.
 
     How far lines end inside the border, up to half a spacing, makes up for what a whole line more or less would cost:
@@ -73,6 +73,8 @@ def fullest_surveys(sweep: Sweep, vehicles: Vehicles, turns: Turns, parts: int) 
 
     Parameters
     ----------
+    turns
+        What they cost each vehicle.
     parts
         Into so many parts vehicles may share a line.
     """
@@ -97,17 +99,19 @@ def fullest_surveys(sweep: Sweep, vehicles: Vehicles, turns: Turns, parts: int) 
     return found
 
 
-def _survey_of(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern, n: int) -> EvenSurvey | None:
+def _survey_of(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern, n: int) -> EvenSurvey | None:
     """Return the survey of ``n`` lines of a pattern that takes the least way; None where the team cannot fly it."""
 
     def length_m(way: list[FloatArray]) -> float:
-        return sum(way_m(vehicles, turns, i, route) for i, route in enumerate(way))
+        return sum(way_m(vehicles, turns[i], i, route) for i, route in enumerate(way))
 
     found = min(_ways(sweep, vehicles, turns, pattern, n), key=length_m, default=None)
     return None if found is None else EvenSurvey(found, _spacing_m(sweep, pattern, n))
 
 
-def _ways(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern, n: int) -> Iterator[list[FloatArray]]:
+def _ways(
+    sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern, n: int
+) -> Iterator[list[FloatArray]]:
     """Return the routes of all vehicles over ``n`` lines of a pattern, in every order in which the team can fly it."""
     u = sweep.to_uv(sweep.constraints.area)[:, 0]
     lines_u = even_lines(float(u.min()), float(u.max()), n, pattern.to_side, pattern.to_side)
@@ -175,7 +179,7 @@ def _subdivided(stops: FloatArray, parts: int) -> FloatArray:
 
 
 def _dealt(
-    free: FreeSpace, vehicles: Vehicles, turns: Turns, path: _Path, order: tuple[int, ...]
+    free: FreeSpace, vehicles: Vehicles, turns: Sequence[Turns], path: _Path, order: tuple[int, ...]
 ) -> list[FloatArray] | None:
     """Return the routes when the vehicles take parts of the path in this order; None when they cannot fly it all."""
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(order)
@@ -201,10 +205,12 @@ def _dealt(
             while high - low > 1:
                 middle = (low + high) // 2
                 low, high = (
-                    (middle, high) if way_m(vehicles, turns, i, route(middle)) <= vehicles.left_m[i] else (low, middle)
+                    (middle, high)
+                    if way_m(vehicles, turns[i], i, route(middle)) <= vehicles.left_m[i]
+                    else (low, middle)
                 )
-            if low and (-low, way_m(vehicles, turns, i, route(low))) < (-best[0], best[1]):
-                best = low, way_m(vehicles, turns, i, route(low))
+            if low and (-low, way_m(vehicles, turns[i], i, route(low))) < (-best[0], best[1]):
+                best = low, way_m(vehicles, turns[i], i, route(low))
                 routes[i] = route(low)
         begin += best[0]
         if begin == end:

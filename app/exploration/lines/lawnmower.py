@@ -39,7 +39,7 @@ LEAST_BUDGET_M = 1.0
 
 
 def lawnmower_routes(
-    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float = 0.0
+    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float | FloatArray = 0.0
 ) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): neighbouring ones of the most even lines that the team can fly together.
 
@@ -54,11 +54,12 @@ def lawnmower_routes(
     budgets_m : (n_vehicles,)
         Distances that the vehicles can travel, nearly all of which they do.
     turn_radius_m
-        Of the circles in which they turn, which takes some of those distances.
+        Of the circles in which they turn, which takes some of those distances; one of all or (n_vehicles,).
     """
     free, axis = FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area)
     vehicles = Vehicles(np.ascontiguousarray(starts), np.full(len(starts), np.nan), np.asarray(budgets_m, dtype=float))
-    turns, ground = Turns(turn_radius_m, 0.0), Ground.of(constraints)
+    radii_m, ground = np.broadcast_to(turn_radius_m, len(starts)), Ground.of(constraints)
+    turns = [Turns(float(radius_m), 0.0) for radius_m in radii_m]
     best: tuple[float, list[FloatArray]] | None = None
     for direction, counts in ((axis, 1.0), (axis + np.pi / 2, 1.0 / ACROSS)):
         for survey in fullest_surveys(Sweep(constraints, free, direction), vehicles, turns, PARTS):
@@ -66,11 +67,11 @@ def lawnmower_routes(
             left_m2 = counts * float((ground.away_m(ways) ** 2).sum())
             if best is None or left_m2 < best[0] * (1.0 - 1e-9):
                 best = left_m2, survey.routes
-    return _first_lines(constraints, free, starts, budgets_m, turn_radius_m) if best is None else best[1]
+    return _first_lines(constraints, free, starts, budgets_m, radii_m) if best is None else best[1]
 
 
 def _first_lines(
-    constraints: Constraints, free: FreeSpace, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float
+    constraints: Constraints, free: FreeSpace, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray
 ) -> list[FloatArray]:
     """Return a route (k, 2) for each vehicle of a team that cannot fly even one line: it begins one of its strip."""
     sweep = Sweep(constraints, free, longer_axis_rad(constraints.area))
@@ -79,7 +80,8 @@ def _first_lines(
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
     for strip, i in enumerate(order):
         low, high = float(cuts[strip]), float(cuts[strip + 1])
-        routes[i] = boustrophedon(sweep, starts[i], low, high, float(budgets_m[i]), turn_radius_m=turn_radius_m)
+        budget_m, radius_m = float(budgets_m[i]), float(radii_m[i])
+        routes[i] = boustrophedon(sweep, starts[i], low, high, budget_m, turn_radius_m=radius_m)
     return routes
 
 
@@ -193,9 +195,13 @@ class LawnmowerPlanner(PlannerBase):
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
-    def _turn_radius_m(self, team: Situation) -> float:
-        counted = team.left_m is not None and team.turns_take_way
-        return self.options.turn_radius_m if counted else 0.0
+    def _turn_radii_m(self, team: Situation) -> FloatArray:
+        """Return the radius of each vehicle's circles, (n_vehicles,); 0 where turns take no way."""
+        if team.left_m is None or not team.turns_take_way:
+            return np.zeros(len(team.vehicles))
+        return (
+            np.full(len(team.vehicles), self.options.turn_radius_m) if team.turn_radii_m is None else team.turn_radii_m
+        )
 
     def _left(self, team: Situation, i: int) -> float:
         return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])
@@ -203,11 +209,12 @@ class LawnmowerPlanner(PlannerBase):
     def _go_on(self, team: Situation) -> frozenset[str]:
         """Give those that have flown their lines more of them; returns those that can fly no others."""
         en, left_m, done = team.positions[:, :2], metres_left(team), set()
+        radii_m = self._turn_radii_m(team).tolist()
         for i, name in enumerate(team.vehicles):
             if not team.moves[i] or self._left(team, i) > 0.0:
                 continue
             passes = self._passes.get(name, 0)
-            route = route_across(team.constraints, en, i, passes, float(left_m[i]), self._turn_radius_m(team))
+            route = route_across(team.constraints, en, i, passes, float(left_m[i]), radii_m[i])
             if route is not None:
                 self._passes[name] = passes + 1
             elif left_m[i] >= LEAST_LEG_M:
@@ -223,7 +230,7 @@ class LawnmowerPlanner(PlannerBase):
         """Return the leg of a vehicle, (1, 2), over ground that is far from all lines; None where there is none."""
         ground, free = Ground.of(team.constraints), FreeSpace(team.constraints, BORDER_MARGIN_M)
         here_m, heading_rad = team.positions[i, :2], float(team.headings_rad[i])
-        radius_m = self._turn_radius_m(team)
+        radius_m = float(self._turn_radii_m(team)[i])
         end_m = ground.best_end(free, ground.away_m(self._dealt), here_m, heading_rad, budget_m, radius_m)
         return None if end_m is None else end_m[None]
 
@@ -243,7 +250,7 @@ class LawnmowerPlanner(PlannerBase):
         """Give every vehicle of the team a route."""
         en = team.positions[:, :2]
         if not self._routes.keys() & set(team.vehicles):
-            routes = lawnmower_routes(team.constraints, en, metres_left(team), self._turn_radius_m(team))
+            routes = lawnmower_routes(team.constraints, en, metres_left(team), self._turn_radii_m(team))
             self._routes = dict(zip(team.vehicles, routes, strict=True))
             self._dealt = [np.vstack([here, route]) for here, route in zip(en, routes, strict=True)]
             return

@@ -96,7 +96,7 @@ def fullest(left_m: FloatArray, radius_m: float, *, along: bool) -> list[EvenSur
     constraints = Constraints(AREA)
     sweep = Sweep(constraints, FreeSpace(constraints, 0.5), np.pi / 2 if along else 0.0)
     vehicles = Vehicles(STARTS[: len(left_m)], np.full(len(left_m), np.nan), left_m)
-    return fullest_surveys(sweep, vehicles, Turns(radius_m, 0.0), 8)
+    return fullest_surveys(sweep, vehicles, [Turns(radius_m, 0.0)] * len(left_m), 8)
 
 
 @given(left_m=st.lists(st.floats(900.0, 4000.0), min_size=1, max_size=3), radius_m=st.floats(0.0, 6.0))

@@ -74,6 +74,16 @@ def test_turns_are_counted_where_they_take_way(turns_take_way: bool) -> None:
     assert (flown_length(np.array(place), route, radius_m) <= left_m + 1.0) == turns_take_way
 
 
+def test_each_vehicle_pays_for_turns_by_its_own_circles() -> None:
+    """All paid for the widest of the team's: a slow one beside a fast one had way left when its lines were flown."""
+    radii_m, budgets_m = np.array([10.0, 4.0, 4.0]), np.array([2500.0, 1000.0, 1000.0])
+    routes = lawnmower_routes(Constraints(AREA), TEAM, budgets_m, radii_m)
+    by_own = [flown_length(at, way, r) for at, way, r in zip(TEAM, routes, radii_m, strict=True)]
+    by_widest = [flown_length(at, way, 10.0) for at, way in zip(TEAM, routes, strict=True)]
+    assert (np.array(by_own) <= budgets_m).all()
+    assert max(by_widest[1:]) > 1000.0
+
+
 def test_lines_along_follow_those_across() -> None:
     route = route_across(Constraints(AREA), TEAM, 2, 1, 700.0)
     assert route is not None
