@@ -38,7 +38,7 @@ def lawnmower_baseline(
     relative_noise: float = 0.01,
     seed: int = 0,
 ) -> Baseline:
-    """Fly even lines along the area's longer axis, an equal share of the area per vehicle, and map the soundings.
+    """Fly a lawnmower's lines, shared out by what each vehicle can fly, and map the soundings.
 
     Parameters
     ----------
