@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.rollout.floor import FloorEstimate, sample
+from app.exploration.rollout.floor import FloorEstimate, deepest_dive_m, sample
 
 WORTH_OF_EARLY = 2.5
 """What the sum over time of the part that remains counts, against a step more in the end: early gains are surer."""
@@ -29,7 +29,7 @@ PER_VISIT = 3.0
 WELL_SEEN = 0.75
 """From so far above, in visibilities, a landmark is well seen."""
 
-CLIMB_PASSES = 4
+CLIMB_PASSES = 8
 
 SINKING = 0.8
 """Part of a step by which vehicles sink at most where that may not wait."""
@@ -45,6 +45,9 @@ LOW = 0.25
 
 STILL_SINKING = 0.1
 """Part of a step: a vehicle at the waypoint of a dive that sinks by more is not down yet."""
+
+LIFTED, LIFTED_AT_LEISURE = 0.6, 0.9
+"""Parts of a step by which altimeters may lift vehicles off uneven floor without breaking limits, in the end more."""
 
 NEAREST = 1e-12
 """Square of the least distance of a landmark, in visibilities: a sensor right on it learns no more."""
@@ -92,7 +95,8 @@ class Work(NamedTuple):
 class Rules(NamedTuple):
     """What flying obeys, and what the sensor does; lengths in metres.
 
-    ``directed``: tasks have directions of their own; otherwise all of them are depths.
+    ``directed``: tasks have directions of their own; otherwise all of them are depths. ``lifted``: part of a step by
+    which altimeters may lift vehicles without breaking limits.
     """
 
     step_m: float
@@ -103,6 +107,7 @@ class Rules(NamedTuple):
     relative_noise: float
     cut_corners: bool
     directed: bool = False
+    lifted: float = LIFTED
 
 
 class Task(NamedTuple):
@@ -272,8 +277,11 @@ def advance(at: FloatArray, plan: Plan, k: int, count: int, reach: float, cut: b
 
 
 @njit(cache=True, nogil=True)
-def _keep_links(at: FloatArray, chain: IntArray, com_range: float) -> None:
-    """Raise the deeper one of neighbours in the chain until they are in range in three dimensions too."""
+def _keep_links(at: FloatArray, top: FloatArray, chain: IntArray, com_range: float) -> None:
+    """Raise the deeper one of neighbours in the chain until they are in range in three dimensions too.
+
+    They are then in range even where the less deep one is lifted to its ``top`` (n_vehicles,).
+    """
     n = len(chain)
     for turn in range(2):
         for e in range(n - 1):
@@ -282,8 +290,8 @@ def _keep_links(at: FloatArray, chain: IntArray, com_range: float) -> None:
             free = com_range * com_range - (at[i, 0] - at[j, 0]) ** 2 - (at[i, 1] - at[j, 1]) ** 2
             if 0.0 < free < np.inf:
                 allowed = 0.98 * np.sqrt(free)
-                at[i, 2] = min(at[i, 2], at[j, 2] + allowed)
-                at[j, 2] = min(at[j, 2], at[i, 2] + allowed)
+                at[i, 2] = min(at[i, 2], min(at[j, 2], top[j]) + allowed)
+                at[j, 2] = min(at[j, 2], min(at[i, 2], top[i]) + allowed)
 
 
 @njit(cache=True, nogil=True)
@@ -296,6 +304,7 @@ def fly_step(
     here = at[:, :2]
     reach = step
     there = np.empty((n, 2))
+    top = np.empty(n)
     after = k
     this = min(k, count - 1)
     height, sinking = plan.height_m[this], plan.sinking[this]
@@ -310,7 +319,8 @@ def fly_step(
             spare = np.sqrt(max(0.0, step * step - (x - at[i, 0]) ** 2 - (y - at[i, 1]) ** 2))
             lowest = at[i, 2]
             if steep:
-                limit = sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+                # Of a dive the constraints refuse, nothing would be flown, and the team would wait there for good.
+                limit = deepest_dive_m(floor, x, y)
                 wish = limit - max(0.0, height - LOW * rules.visibility_m)
                 lowest += spare
             else:
@@ -320,13 +330,13 @@ def fly_step(
             out[i, 2] = min(max(rules.min_depth_m, min(rules.max_depth_m, wish, limit)), lowest)
             out[i, 0] = x
             out[i, 1] = y
-        _keep_links(out, plan.chain, rules.com_range_m)
+            shoal = sample(floor.shoal_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+            top[i] = max(shoal, at[i, 2] - rules.lifted * step)
+        _keep_links(out, top, plan.chain, rules.com_range_m)
         longest = 0.0
         for i in range(n):
-            longest = max(
-                longest,
-                np.sqrt((out[i, 0] - at[i, 0]) ** 2 + (out[i, 1] - at[i, 1]) ** 2 + (out[i, 2] - at[i, 2]) ** 2),
-            )
+            x, y, z = out[i, 0], out[i, 1], min(out[i, 2], top[i])
+            longest = max(longest, np.sqrt((x - at[i, 0]) ** 2 + (y - at[i, 1]) ** 2 + (z - at[i, 2]) ** 2))
         if longest <= step * (1.0 + 1e-9):
             break
         # Climbing may not wait: the team goes less far.

@@ -30,12 +30,40 @@ MARGIN = 0.1
 MARGIN_OF_ROOM = 0.25
 """The same as a part of what visibility leaves above the required clearance, where that is less."""
 
+UNEVEN = 3.0
+"""How much shoaler than estimated the floor may be between landmarks: deviations of depths nearby from a plane."""
 
 ROUGHLY = 0.1
 """Deviation, in visibilities, up to which the depth of a landmark counts as estimated."""
 
+LEVEL = 1e-6
+"""What draws the plane through landmarks nearby towards level, so that three in a row have one."""
+
+PLANE = 3
+"""So many depths fix a plane: of more, only the rest of their deviations is seen beside it."""
+
 HELD_NEAR = 0.3
 """How far the height that a vehicle holds by its altimeter says something of the floor, in visibilities."""
+
+
+class HeldTo(NamedTuple):
+    """How deep the constraints let vehicles be, in steps: square cells, row 0 is south, column 0 is west.
+
+    Attributes
+    ----------
+    west_m, south_m, cell_m : float
+        Outer corner of the first cell, side of a cell.
+    deepest_m : (rows, cols)
+        Deepest that a vehicle may be; inf where the sea floor is unknown.
+    felt_m : (k, 3)
+        East, north and deepest that a vehicle may be where altimeters felt the sea floor.
+    """
+
+    west_m: float
+    south_m: float
+    cell_m: float
+    deepest_m: FloatArray
+    felt_m: FloatArray
 
 
 class FloorEstimate(NamedTuple):
@@ -51,8 +79,11 @@ class FloorEstimate(NamedTuple):
         The same without detail: what a team keeps its height above.
     deepest_m : (rows, cols)
         Deepest that a vehicle may be, so that it clears the floor here and can climb every rise ahead.
-    clear_m : (rows, cols)
-        Deepest that a vehicle may be that goes straight down and up again: it clears the floor here.
+    shoal_m : (rows, cols)
+        As deep as altimeters let vehicles be where the floor is as shoal between landmarks as it may be.
+    held_to : HeldTo
+        Deepest that a vehicle may be that goes straight down and up again. The constraints hold to steps that the
+        other rasters smooth.
     """
 
     west_m: float
@@ -61,7 +92,15 @@ class FloorEstimate(NamedTuple):
     depth_m: FloatArray
     smooth_m: FloatArray
     deepest_m: FloatArray
-    clear_m: FloatArray
+    shoal_m: FloatArray
+    held_to: HeldTo
+
+
+def held_to(bottom: Bottom, felt_m: FloatArray, clearance_m: float) -> HeldTo:
+    """Return how deep vehicles may be over a sea floor that altimeters have felt at some points (k, 3)."""
+    deepest = np.where(np.isnan(bottom.depth_m), np.inf, bottom.depth_m - clearance_m)
+    felt = np.ascontiguousarray(felt_m - [0.0, 0.0, clearance_m])
+    return HeldTo(float(bottom.west_m), float(bottom.south_m), float(bottom.cell_m), deepest, felt)
 
 
 def margin_m(visibility_m: float, clearance_m: float) -> float:
@@ -118,19 +157,18 @@ def estimate_floor(
         trust = np.minimum(np.sqrt(belief.covariance_m2[:, 2, 2]), ROUGHLY * visibility_m)
     if known.any():
         sure = np.vstack([felt_m, belief.sounded_m])
-        depth = _from_neighbours(
+        depth, spread = _from_neighbours(
             np.vstack([belief.xy_m[known], sure[:, :2], deeper[:, :2]]),
             np.concatenate([belief.depth_m[known], sure[:, 2], deeper[:, 2]]),
             np.concatenate([trust[known], np.zeros(len(sure)), np.full(len(deeper), ROUGHLY * visibility_m)]),
             np.column_stack([east.ravel(), north.ravel()]),
             visibility_m,
-        ).reshape(rows, cols)
+        )
     else:
-        depth = np.full((rows, cols), unknown_m)
+        depth, spread = np.full(rows * cols, unknown_m), np.zeros(rows * cols)
+    depth, spread = depth.reshape(rows, cols), spread.reshape(rows, cols)
     here = bottom.at(np.stack([east, north], axis=-1))
     limit = depth - clearance_m - margin_m(visibility_m, clearance_m)
-    clear = np.where(np.isnan(here), limit, here - clearance_m)
-    _keep_above(clear, east, north, felt_m, clearance_m, STEEPEST_DIVE)
     if follows:
         smooth, slope = depth.copy(), STEEPEST_DIVE
         limit = np.fmin(limit, here - clearance_m)
@@ -144,21 +182,35 @@ def estimate_floor(
         _keep_above(limit, east, north, felt_m, clearance_m + margin_m(visibility_m, clearance_m), slope)
     return FloorEstimate(
         float(low[0]), float(low[1]), float(cell), depth, smooth,
-        np.minimum(_envelope(limit, cell, slope), depth - held_m), np.minimum(clear, depth - held_m),
+        np.minimum(_envelope(limit, cell, slope), depth - held_m),
+        np.minimum(depth - UNEVEN * spread - clearance_m, depth - held_m),
+        held_to(bottom, felt_m, max(clearance_m, held_m)),
     )  # fmt: skip
 
 
 def _from_neighbours(
     seen_m: FloatArray, depth_m: FloatArray, sd_m: FloatArray, at_m: FloatArray, visibility_m: float
-) -> FloatArray:
-    """Weigh the closest seen landmarks by distance and trust; far from all of them return their mean."""
+) -> tuple[FloatArray, FloatArray]:
+    """Weigh the closest seen landmarks by distance and trust; return their mean and how uneven they lie.
+
+    That is the deviation from the plane that fits them best: slopes are not uneven. Far from all of them the mean is
+    that of all, and even.
+    """
     k = min(NEIGHBOURS, len(seen_m))
     found = cKDTree(seen_m).query(at_m, k=k)
     distance, index = (np.asarray(part).reshape(len(at_m), k) for part in found)
     weight = 1.0 / ((distance / visibility_m) ** 2 + 0.01) / (sd_m[index] ** 2 + (0.05 * visibility_m) ** 2)
     local = (weight * depth_m[index]).sum(axis=1) / weight.sum(axis=1)
     trust = np.exp(-np.maximum(0.0, distance[:, 0] / visibility_m - 0.25) / FADE)
-    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean())
+    offset = np.concatenate([np.ones((*index.shape, 1)), (seen_m[index] - at_m[:, None]) / visibility_m], axis=2)
+    share = weight / weight.sum(axis=1, keepdims=True)
+    normal = np.einsum("nki,nk,nkj->nij", offset, share, offset) + LEVEL * np.eye(3)
+    plane = np.linalg.solve(normal, np.einsum("nki,nk,nk->ni", offset, share, depth_m[index])[..., None])
+    off = depth_m[index] - (offset @ plane)[..., 0]
+    # What the depths' own deviations leave of it where the floor is a plane is no unevenness.
+    noise = max(0.0, 1.0 - PLANE / k) * (share * sd_m[index] ** 2).sum(axis=1)
+    spread = np.sqrt(np.maximum(0.0, (share * off**2).sum(axis=1) - noise))
+    return np.asarray(trust * local + (1.0 - trust) * depth_m.mean()), np.asarray(trust * spread)
 
 
 @njit(cache=True, nogil=True)
@@ -222,6 +274,23 @@ def sample(raster: FloatArray, west: float, south: float, cell: float, x: float,
     lower = raster[r, c] * (1.0 - u) + raster[r, c + 1] * u
     upper = raster[r + 1, c] * (1.0 - u) + raster[r + 1, c + 1] * u
     return float(lower * (1.0 - v) + upper * v)
+
+
+@njit(cache=True, nogil=True)
+def deepest_dive_m(floor: FloorEstimate, x: float, y: float) -> float:
+    """Return how deep a vehicle may be at (x, y) that goes straight down and up again."""
+    held = floor.held_to
+    col = int(np.floor((x - held.west_m) / held.cell_m))
+    row = int(np.floor((y - held.south_m) / held.cell_m))
+    deepest = np.inf
+    if 0 <= row < held.deepest_m.shape[0] and 0 <= col < held.deepest_m.shape[1]:
+        deepest = held.deepest_m[row, col]
+    if deepest == np.inf:
+        deepest = sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+    for k in range(len(held.felt_m)):
+        away = np.hypot(x - held.felt_m[k, 0], y - held.felt_m[k, 1])
+        deepest = min(deepest, held.felt_m[k, 2] + STEEPEST_DIVE * away)
+    return float(deepest)
 
 
 @njit(cache=True, nogil=True)

@@ -24,6 +24,7 @@ from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.rollout.flight import (
     DIVE,
+    LIFTED_AT_LEISURE,
     LOW,
     SINKING,
     Checkpoints,
@@ -355,6 +356,8 @@ class _Mission:
             belief.covariance_m2 is not None,
         )
         self._work: Work = self._left(belief, least_m, options)
+        if not self.far_from_done:
+            self._rules = self._rules._replace(lifted=LIFTED_AT_LEISURE)
         self._task = Task(self._work, self._floor, self._rules, self._horizon)
 
     def _left(self, belief: Belief, least_m: FloatArray, options: PlannerOptions) -> Work:

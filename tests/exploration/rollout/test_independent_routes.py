@@ -17,7 +17,7 @@ from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 from app.exploration.rollout.flight import Rules
-from app.exploration.rollout.floor import FloorEstimate, estimate_floor, hold_to, let_stay, sample
+from app.exploration.rollout.floor import FloorEstimate, estimate_floor, held_to, hold_to, let_stay, sample
 from app.exploration.rollout.free_space import free_space
 from app.exploration.rollout.independent_mission import apart_mission
 from app.exploration.rollout.independent_routes import (
@@ -61,7 +61,8 @@ def hilly(seed: int, n: int = 120) -> Any:
 def flat(depth: float) -> Any:
     """An even floor over the cube."""
     side = np.full((41, 41), depth)
-    return FloorEstimate(-1.0, -1.0, 0.05, side, side.copy(), side - HELD, side - HELD)
+    held = held_to(Bottom.unknown(), np.zeros((0, 3)), HELD)
+    return FloorEstimate(-1.0, -1.0, 0.05, side, side.copy(), side - HELD, side - HELD, held)
 
 
 def make_case(seed: int, stops: int = 4) -> Any:

@@ -24,7 +24,7 @@ from app.exploration.rollout.flight import (
     make_work,
     new_checkpoints,
 )
-from app.exploration.rollout.floor import ENVELOPE_SLOPE, estimate_floor, sample
+from app.exploration.rollout.floor import ENVELOPE_SLOPE, deepest_dive_m, estimate_floor, sample
 from app.exploration.rollout.free_space import clear_ways, free_space, settle_waypoint
 from app.exploration.rollout.initial_plans import Backbone, backbones, with_team
 from app.exploration.rollout.local_search import DRAWS, improve
@@ -49,6 +49,12 @@ def hilly(seed: int, n: int = 250) -> Any:
         xy, np.where(seen, depth, np.nan), np.where(seen, 0.03, np.inf), np.zeros(n, dtype=bool), np.ones(n), 0.2
     )
     return belief, depth
+
+
+def rough(rng: np.random.Generator) -> Belief:
+    """Landmarks that are known, each at a depth of its own."""
+    xy, depth = rng.uniform(-1.0, 1.0, (400, 2)), rng.uniform(0.3, 0.9, 400)
+    return Belief(xy, depth, np.full(400, 0.02), np.ones(400, dtype=bool), np.ones(400), 0.2)
 
 
 def floor_of(belief: Belief, felt: Any = None) -> Any:
@@ -129,7 +135,7 @@ def test_flying_obeys_step_links_depths_and_the_estimated_floor(seed: int) -> No
         for i in range(2):
             assert np.linalg.norm(after[i] - after[i + 1]) <= RULES.com_range_m + 1e-6
         for x, y, z in after:
-            clear = sample(floor.clear_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+            clear = deepest_dive_m(floor, x, y)
             assert z <= max(clear, sample(floor.deepest_m, floor.west_m, floor.south_m, floor.cell_m, x, y)) + 1e-6
         at = after.copy()
     assert k == count, "the plan is flown to its end"
@@ -234,6 +240,88 @@ def test_only_a_dive_goes_down_into_a_steep_pit_and_comes_up_again() -> None:
         assert (path[-1][:, 2] < 0.3).all()
     assert lowest[0] < 0.45
     assert lowest[1] > 0.7
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_a_step_is_no_longer_than_allowed_where_uneven_floor_lifts_the_vehicle(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    floor = floor_of(rough(rng))
+    at = np.array([[-0.8, -0.8, 0.3]])
+    plan = Plan(rng.uniform(-0.8, 0.8, (4, 1, 2)), np.full(4, 0.15), np.full(4, 0.3), np.arange(1))
+    after, k = np.empty_like(at), 0
+    for _ in range(60):
+        if k == 4:
+            break
+        k = fly_step(at, plan, k, 4, floor, RULES, after)
+        x, y, z = after[0]
+        shoal = sample(floor.shoal_m, floor.west_m, floor.south_m, floor.cell_m, x, y)
+        lifted = np.array([x, y, min(z, max(shoal, at[0, 2] - RULES.lifted * RULES.step_m))])
+        assert np.linalg.norm(lifted - at[0]) <= RULES.step_m + 1e-9
+        at = after.copy()
+
+
+def test_what_depths_are_not_known_to_does_not_make_the_floor_uneven() -> None:
+    rng = np.random.default_rng(0)
+    xy = rng.uniform(-1.0, 1.0, (400, 2))
+    depth = 0.6 + 0.1 * xy[:, 0] + 0.03 * rng.standard_normal(400)
+    presumed = []
+    for sd in (0.03, 1e-4):
+        floor = floor_of(Belief(xy, depth, np.full(400, sd), np.ones(400, dtype=bool), np.ones(400), 0.2))
+        presumed.append(float((floor.depth_m - floor.shoal_m - CLEARANCE).mean()))
+    assert presumed[0] < 0.6 * presumed[1]
+
+
+def test_over_uneven_floor_the_deeper_one_of_two_stays_in_range_of_one_that_is_lifted() -> None:
+    # In the west the floor is as uneven as can be, in the east there is a pit.
+    xy = np.random.default_rng(0).uniform(-1.0, 1.0, (600, 2))
+    depth = np.where(xy[:, 0] < 0.0, np.where(np.arange(600) % 2 == 0, 0.25, 0.65), 0.95)
+    belief = Belief(xy, depth, np.full(600, 0.02), np.ones(600, dtype=bool), np.ones(600), 0.2)
+    floor = floor_of(belief)
+    at = np.array([[-0.05, 0.0, 0.15], [0.05, 0.0, 0.15]])
+    plan = Plan(at[None, :, :2].copy(), np.full(1, 0.1), np.full(1, DIVE), np.arange(2))
+    after, k = np.empty_like(at), 0
+    for _ in range(30):
+        if k == 1:
+            break
+        k = fly_step(at, plan, k, 1, floor, RULES, after)
+        lifted = after.copy()
+        lifted[0, 2] = min(after[0, 2], at[0, 2] - RULES.lifted * RULES.step_m)
+        assert np.linalg.norm(lifted[0] - lifted[1]) <= RULES.com_range_m
+        at = after.copy()
+    assert at[1, 2] - at[0, 2] > 0.15, "the one over the pit goes down"
+
+
+@given(seed=st.integers(0, 1000), east=st.floats(-0.9, 0.9), north=st.floats(-0.9, 0.9))
+@settings(max_examples=40, deadline=None)
+def test_a_dive_goes_no_deeper_than_its_constraints_let_it(seed: int, east: Any, north: Any) -> None:
+    # Else the move is refused each time, and a team stands over what it left for as long as the plan stands.
+    belief = rough(np.random.default_rng(seed))
+    bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m)
+    limits = Constraints(CUBE, max_step_m=RULES.step_m, min_depth_m=-1.0, max_depth_m=1.0, min_altitude_m=CLEARANCE)
+    at = np.array([[east, north, 0.2]])
+    plan = Plan(at[None, :, :2].copy(), np.full(1, 0.1), np.full(1, DIVE), np.arange(1))
+    floor, after, k = floor_of(belief), np.empty_like(at), 0
+    for _ in range(30):
+        if k == 1:
+            break
+        k = fly_step(at, plan, k, 1, floor, RULES, after)
+        assert limits.feasible(at, after[None], bottom)[0]
+        at = after.copy()
+    assert k == 1, "the dive ends"
+
+
+def test_a_dive_goes_down_into_a_pit_that_a_single_landmark_tells_of_and_not_onto_what_was_felt() -> None:
+    side = np.linspace(-1.0, 1.0, 34)
+    xy = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    pit = int(np.argmin(np.hypot(*(xy - 0.1).T)))
+    belief = Belief(
+        xy, np.where(np.arange(len(xy)) == pit, 0.9, 0.4), np.full(len(xy), 0.02), np.ones(len(xy), dtype=bool),
+        np.ones(len(xy)), 0.2,
+    )  # fmt: skip
+    felt = np.array([[*xy[pit], 0.7]])
+    for floor, deepest in ((floor_of(belief), 0.9), (floor_of(belief, felt), 0.7)):
+        assert deepest_dive_m(floor, *xy[pit]) == pytest.approx(deepest - CLEARANCE)
 
 
 def test_a_plan_that_leaves_what_can_be_taken_costs_more_than_one_that_takes_it() -> None:
