@@ -1,5 +1,6 @@
 """The usual practice: evenly spaced parallel lines, an equal share of the area per vehicle."""
 
+import itertools
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -131,18 +132,25 @@ class LawnmowerPlanner(PlannerBase):
         self._lead_round(team)
         steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
         # The corner that a leg cuts may be that of a zone: then it is flown out.
-        cuts = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
+        tolerances = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
+        cuts = [[cut] * len(team.vehicles) for cut in tolerances]
         targets = np.empty((len(cuts), len(team.vehicles), 2))
-        for k, cut in enumerate(cuts):
-            for i, name in enumerate(team.vehicles):
-                route = self._routes[name] if team.moves[i] else self._routes[name][:0]
-                x, y = team.positions[i, :2]
-                targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], cut)[:2]
+        area = Polygon(team.constraints.area)
+        for k, i in itertools.product(range(len(cuts)), range(len(team.vehicles))):
+            route = self._routes[team.vehicles[i]][: None if team.moves[i] else 0]
+            x, y = team.positions[i, :2]
+            targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], cuts[k][i])[:2]
+            # Nor does it cut a corner of the area that points inwards.
+            if not area.covers(LineString([team.positions[i, :2], targets[k, i]])):
+                cuts[k][i] = 0.0
+                targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], 0.0)[:2]
         positions, which = settle(team, bottom, self._at_cruise(team, bottom, targets))
         for i, name in enumerate(team.vehicles):
             route, end_m = self._routes[name], positions[i, :2]
-            passed = vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which]) if team.moves[i] else 0
-            self._routes[name] = route[passed or 0 :]
+            passed = 0
+            if team.moves[i]:
+                passed = vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which][i]) or 0
+            self._routes[name] = route[passed:]
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 

@@ -39,9 +39,6 @@ ROUGHLY = 0.1
 LEVEL = 1e-6
 """What draws the plane through landmarks nearby towards level, so that three in a row have one."""
 
-PLANE = 3
-"""So many depths fix a plane: of more, only the rest of their deviations is seen beside it."""
-
 HELD_NEAR = 0.3
 """How far the height that a vehicle holds by its altimeter says something of the floor, in visibilities."""
 
@@ -207,9 +204,7 @@ def _from_neighbours(
     normal = np.einsum("nki,nk,nkj->nij", offset, share, offset) + LEVEL * np.eye(3)
     plane = np.linalg.solve(normal, np.einsum("nki,nk,nk->ni", offset, share, depth_m[index])[..., None])
     off = depth_m[index] - (offset @ plane)[..., 0]
-    # What the depths' own deviations leave of it where the floor is a plane is no unevenness.
-    noise = max(0.0, 1.0 - PLANE / k) * (share * sd_m[index] ** 2).sum(axis=1)
-    spread = np.sqrt(np.maximum(0.0, (share * off**2).sum(axis=1) - noise))
+    spread = np.sqrt((share * off**2).sum(axis=1))
     return np.asarray(trust * local + (1.0 - trust) * depth_m.mean()), np.asarray(trust * spread)
 
 

@@ -135,11 +135,13 @@ def test_what_is_claimed_of_done_landmarks_holds_beside_walls_too() -> None:
     assert run_explore(blind, "random", PlannerOptions()).done_nees is None
 
 
-def test_rollouts_finish_before_the_lawnmower(smooth: Terrain) -> None:
-    first = {name: run(smooth, name, steps=250).t99 for name in ("rollout", "lawnmower")}
-    assert first["rollout"] is not None
-    assert first["lawnmower"] is not None
-    assert first["rollout"] < first["lawnmower"]
+def test_rollouts_finish_before_the_lawnmower_on_average() -> None:
+    """Single runs differ by a tenth and more by chance."""
+    floors = [generate("smooth", seed, width_m=80.0, height_m=60.0) for seed in (2, 4, 6)]
+    first = {name: [run(floor, name, steps=250).t99 for floor in floors] for name in ("rollout", "lawnmower")}
+    finished = {name: [t99 for t99 in steps if t99 is not None] for name, steps in first.items()}
+    assert {name: len(steps) for name, steps in finished.items()} == {"rollout": 3, "lawnmower": 3}
+    assert sum(finished["rollout"]) < sum(finished["lawnmower"])
 
 
 def test_vehicles_keep_their_numbers_when_others_leave_and_join(smooth: Terrain) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely import LineString, Polygon
 
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
@@ -142,3 +143,17 @@ def test_lines_stay_side_by_side_where_a_step_is_as_long_as_a_line() -> None:
         place = end
     assert len(headings) >= 4
     assert max(min(h, 180.0 - h) for h in headings) < 2.0, "they do not become a zigzag"
+
+
+def test_no_corner_of_the_area_that_points_inwards_is_cut() -> None:
+    """Only corners of zones were not cut: vehicles came half a metre out of the area beside them."""
+    bent = np.array([[0.0, 0.0], [120.0, 0.0], [120.0, 120.0], [60.0, 120.0], [60.0, 60.0], [0.0, 60.0]])
+    told = situation(4000.0, (2.0, 2.0))
+    told = replace(told, constraints=Constraints(bent, max_step_m=20.0, max_depth_m=10.0))
+    planner, rng, place = create_planner("lawnmower"), np.random.default_rng(0), np.array([64.0, 68.0])
+    planner.propose(replace(told, positions=np.array([[*place, 2.0]])), rng)
+    planner.put_back("a", np.array([[60.5, 59.5], [55.0, 52.0]]), None)
+    ends = [place]
+    for _ in range(3):
+        ends.append(planner.propose(replace(told, positions=np.array([[*ends[-1], 2.0]])), rng).positions[0, :2])
+    assert Polygon(bent).buffer(1e-6).covers(LineString(ends))

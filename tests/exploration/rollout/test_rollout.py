@@ -261,17 +261,6 @@ def test_a_step_is_no_longer_than_allowed_where_uneven_floor_lifts_the_vehicle(s
         at = after.copy()
 
 
-def test_what_depths_are_not_known_to_does_not_make_the_floor_uneven() -> None:
-    rng = np.random.default_rng(0)
-    xy = rng.uniform(-1.0, 1.0, (400, 2))
-    depth = 0.6 + 0.1 * xy[:, 0] + 0.03 * rng.standard_normal(400)
-    presumed = []
-    for sd in (0.03, 1e-4):
-        floor = floor_of(Belief(xy, depth, np.full(400, sd), np.ones(400, dtype=bool), np.ones(400), 0.2))
-        presumed.append(float((floor.depth_m - floor.shoal_m - CLEARANCE).mean()))
-    assert presumed[0] < 0.6 * presumed[1]
-
-
 def test_over_uneven_floor_the_deeper_one_of_two_stays_in_range_of_one_that_is_lifted() -> None:
     # In the west the floor is as uneven as can be, in the east there is a pit.
     xy = np.random.default_rng(0).uniform(-1.0, 1.0, (600, 2))
