@@ -131,7 +131,7 @@ class LawnmowerPlanner(PlannerBase):
         done = self._go_on(team)
         self._lead_round(team)
         steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
-        # The corner that a leg cuts may be that of a zone: then it is flown out.
+        # The corner that a leg cuts may be that of a zone, or an inward one of the area: then it is flown out.
         tolerances = (CORNER_TOLERANCE, 0.0) if team.constraints.keep_out else (CORNER_TOLERANCE,)
         cuts = [[cut] * len(team.vehicles) for cut in tolerances]
         targets = np.empty((len(cuts), len(team.vehicles), 2))
@@ -140,7 +140,6 @@ class LawnmowerPlanner(PlannerBase):
             route = self._routes[team.vehicles[i]][: None if team.moves[i] else 0]
             x, y = team.positions[i, :2]
             targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], cuts[k][i])[:2]
-            # Nor does it cut a corner of the area that points inwards.
             if not area.covers(LineString([team.positions[i, :2], targets[k, i]])):
                 cuts[k][i] = 0.0
                 targets[k, i] = next_waypoint(x, y, route, 0, len(route), steps[i], 0.0)[:2]

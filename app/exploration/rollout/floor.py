@@ -44,7 +44,7 @@ HELD_NEAR = 0.3
 
 
 class HeldTo(NamedTuple):
-    """How deep the constraints let vehicles be, in steps: square cells, row 0 is south, column 0 is west.
+    """How deep the constraints let vehicles be: the same all over a cell. Row 0 is south, column 0 is west.
 
     Attributes
     ----------
@@ -79,8 +79,8 @@ class FloorEstimate(NamedTuple):
     shoal_m : (rows, cols)
         As deep as altimeters let vehicles be where the floor is as shoal between landmarks as it may be.
     held_to : HeldTo
-        Deepest that a vehicle may be that goes straight down and up again. The constraints hold to steps that the
-        other rasters smooth.
+        Deepest that a vehicle may be that goes straight down and up again, by the constraints' own cells: rasters that
+        are interpolated smooth the steps between these.
     """
 
     west_m: float
