@@ -1,18 +1,22 @@
 """The OpenAPI document and the page that shows it."""
 
 import re
+import threading
 from typing import Any
 
 import httpx
 import pytest
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
 
+from app.api.http import openapi
 from app.main import Server
 from tests.support.api.contract import CONTRACT
 
 
 @pytest.fixture
 async def document(shared_server: Server) -> dict[str, Any]:
-    async with httpx.AsyncClient(base_url=shared_server.url) as client:
+    async with httpx.AsyncClient(base_url=shared_server.url, timeout=60) as client:
         answer: dict[str, Any] = (await client.get("/api/openapi.json")).json()
     return answer
 
@@ -72,8 +76,26 @@ async def test_what_is_always_sent_is_required_in_the_document(document: dict[st
     assert document["components"]["schemas"]["MissionSpec"]["required"] == ["name", "area"]
 
 
+async def test_vehicles_are_heard_while_the_document_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    app = FastAPI(title="bathyfleet")
+    openapi.install(app)
+    made_in = []
+
+    def noted(**told: Any) -> dict[str, Any]:
+        made_in.append(threading.current_thread())
+        return get_openapi(**told)
+
+    monkeypatch.setattr("app.api.http.openapi.get_openapi", noted)
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+        answers = [(await client.get("/openapi.json")).json() for _ in range(2)]
+    assert answers[0]["info"]["title"] == "bathyfleet"
+    assert answers[1] == answers[0]
+    assert len(made_in) == 1
+    assert made_in[0] is not threading.current_thread()
+
+
 async def test_the_page_needs_no_internet(shared_server: Server) -> None:
-    async with httpx.AsyncClient(base_url=shared_server.url) as client:
+    async with httpx.AsyncClient(base_url=shared_server.url, timeout=60) as client:
         page = await client.get("/api/docs")
         assert page.status_code == 200
         addresses = re.findall(r'(?:src|href)="([^"]+)"', page.text)

@@ -52,7 +52,7 @@ def measured(extended: Service) -> str:
 def test_an_added_layer_is_in_rest_and_its_document(extended: Service, measured: str) -> None:
     assert "roughness" in {layer["name"] for layer in extended.get("/layers")}
     assert "roughness" in extended.get(f"/missions/{measured}/map?layer=roughness")["layers"]
-    schemas = httpx.get(f"{extended.url}/api/openapi.json").json()["components"]["schemas"]
+    schemas = httpx.get(f"{extended.url}/api/openapi.json", timeout=60).json()["components"]["schemas"]
     for name in ("LayerName", "OverlayLayer", "FurtherLayer"):
         assert "roughness" in schemas[name]["enum"]
 
