@@ -162,9 +162,8 @@ class Forecaster:
             found = Forecast(list(flights), floors)
         else:
             found = await self._here(spec, ours, starts, so_far, floor_depth_m)
-        return _view(
-            spec, found, where, spec.steps - so_far.first_step + 1, await asyncio.to_thread(_whole, spec, ours, found)
-        )
+        steps = max(spec.steps - so_far.first_step + 1, 0)
+        return _view(spec, found, where, steps, await asyncio.to_thread(_whole, spec, ours, found))
 
     async def _here(
         self,

@@ -439,7 +439,7 @@ class LiveMission:
         swept = self.builder.ensonified()
         return Progress(
             step=header.step,
-            steps=self.spec.steps,
+            steps=max(self.spec.steps, header.step),
             budget=self.spec.budget,
             minutes_left=left.minutes,
             km_left_per_vehicle=left.km_per_vehicle,

@@ -181,7 +181,10 @@ class Progress(View):
     """How far a mission has come."""
 
     step: int = Field(description="Last committed step; 0 before the first")
-    steps: int
+    steps: int = Field(
+        description="Steps after which it is finished; with a budget in minutes or kilometres about so many, as legs "
+        "may be shorter than limits.max_step_m"
+    )
     budget: Budget = Field(description="How long the mission is, as it was given")
     minutes_left: float | None = Field(
         default=None, description="Vehicle time under way that is left, of the vehicle with most; null: not known"

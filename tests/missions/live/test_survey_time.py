@@ -67,6 +67,13 @@ async def test_who_flies_its_leg_at_its_speed_has_what_its_legs_leave(under_way:
         assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0, abs=0.1)
 
 
+async def test_a_mission_in_minutes_never_shows_more_steps_than_it_has(under_way: Made) -> None:
+    live = (await under_way()).live
+    assert live.progress().steps == live.spec.steps
+    live.header.step = live.spec.steps + 14
+    assert live.progress().steps == live.spec.steps + 14
+
+
 async def test_turns_and_waiting_take_the_time_that_they_take(under_way: Made) -> None:
     vehicle = await under_way()
     vehicle.reports(20.0, 10.0)

@@ -1413,6 +1413,9 @@ class Progress(Model):
     step: int
     """Last committed step; 0 before the first"""
     steps: int
+    """Steps after which it is finished; with a budget in minutes or kilometres about so many, as legs may be shorter
+    than limits.max_step_m
+    """
     budget: Budget
     """How long the mission is, as it was given"""
     minutes_left: float | None

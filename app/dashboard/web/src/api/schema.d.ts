@@ -4987,7 +4987,10 @@ export interface components {
              * @description Last committed step; 0 before the first
              */
             step: number;
-            /** Steps */
+            /**
+             * Steps
+             * @description Steps after which it is finished; with a budget in minutes or kilometres about so many, as legs may be shorter than limits.max_step_m
+             */
             steps: number;
             /** @description How long the mission is, as it was given */
             budget: components["schemas"]["Budget"];

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { AlarmView, EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
-import { ageSeconds, EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
+import { ageSeconds, allDecided, EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
 
 const vehicle = (
   name: string,
@@ -250,5 +250,23 @@ describe("who follows a mission", () => {
 
   it("is nobody after what a person finished: what vehicles answered is still to be read", () => {
     expect(nextOf(finished("Ana"), list)).toBeNull();
+  });
+});
+
+describe("whether a step is to come", () => {
+  const left = { minutes_left: 12, km_left_per_vehicle: 0.7 };
+  const length = { minutes: null, km_per_vehicle: null, steps: null };
+  const many = { step: 92, steps: 92 };
+
+  it("goes by the steps of a mission that is counted in them", () => {
+    const budget = { ...length, steps: 40 };
+    expect(allDecided({ ...left, budget, step: 39, steps: 40 })).toBe(false);
+    expect(allDecided({ ...left, budget, step: 40, steps: 40 })).toBe(true);
+  });
+  it("goes by what is left to fly in any other, however many legs that took", () => {
+    expect(allDecided({ ...left, ...many, budget: { ...length, minutes: 30 } })).toBe(false);
+    expect(allDecided({ ...left, ...many, budget: { ...length, km_per_vehicle: 2 } })).toBe(false);
+    const none = { minutes_left: 0, km_left_per_vehicle: 0 };
+    expect(allDecided({ ...none, ...many, budget: { ...length, minutes: 30 } })).toBe(true);
   });
 });

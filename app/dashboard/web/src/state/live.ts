@@ -228,3 +228,13 @@ export function nextOf(
   );
   return next?.id ?? null;
 }
+
+/** Whether no step is to come; one of a mission that is not counted in steps is, while there is something left to fly. */
+export function allDecided({ budget, step, steps, minutes_left, km_left_per_vehicle }: Decided): boolean {
+  return budget.steps != null ? step >= steps : minutes_left === 0 || km_left_per_vehicle === 0;
+}
+
+type Decided = Pick<
+  MissionView["progress"],
+  "budget" | "step" | "steps" | "minutes_left" | "km_left_per_vehicle"
+>;
