@@ -111,12 +111,12 @@ class SwathSurvey:
         for name in team:
             self._sweeps.setdefault(name, Assignment())
         sweep = self._sweeps[vehicle]
-        left = self._tries.left(coverage)
+        left = self._left(coverage)
         if sweep.skipped is not None:
             self._count(sweep.skipped, flying, left, tries=MOST_TRIES)
             sweep.skipped = None
         self._take_back(sweep, pose, flying, left)
-        asked = Question(vehicle, pose, flying, self._tries.left(coverage), team)
+        asked = Question(vehicle, pose, flying, self._left(coverage), team)
         for one in self._sweeps.values():
             forget_flown(one.expected, coverage)
         if sweep.laid_on is not coverage:
@@ -229,7 +229,7 @@ class SwathSurvey:
             return
         raster = self._rasters.of(without(asked.coverage, sweep.hidden), course.direction_rad)
         free = raster.open & ~expected(self._sweeps, raster, asked.flying, asked.vehicle)
-        if sweep.share is not None:
+        if sweep.share is not None and self._sweeps_in_share(course, asked.flying):
             free &= between(raster, sweep.share)
         rest = rest_of_line(course, asked.pose[:2], asked.flying, raster, free)
         if rest is not None:
@@ -363,7 +363,7 @@ class SwathSurvey:
         if course.overlap == asked.flying.overlap:
             sweep.hidden = self._hidden(coverage, asked.flying)
             coverage = without(coverage, sweep.hidden)
-        self._count(course.path, asked.flying, coverage)
+        sweep.counted = self._count(course.path, asked.flying, coverage)
 
     def _hidden(self, coverage: Coverage, flying: Flying) -> BoolArray:
         """Return the cells (rows, cols) in small pieces that two lines were to see and did not: they are passed over.
@@ -382,9 +382,22 @@ class SwathSurvey:
         """Return which cells of the raster hold ground that two lines were to see and did not."""
         return self._rasters.of(self._tries.again(coverage), self._direction_rad).open
 
-    def _count(self, path: FloatArray, flying: Flying, coverage: Coverage, tries: int = 1) -> None:
-        """Note what a line that is begun is to see."""
-        self._tries.count(path, flying, coverage, self._rasters.of(coverage, self._direction_rad), tries)
+    def _count(self, path: FloatArray, flying: Flying, coverage: Coverage, tries: int = 1) -> BoolArray:
+        """Note what a line that is begun is to see, and return these cells (rows, cols)."""
+        return self._tries.count(path, flying, coverage, self._rasters.of(coverage, self._direction_rad), tries)
+
+    def _left(self, coverage: Coverage) -> Coverage:
+        """Return the same without what is given up: what lines under way are to see is not, before they end."""
+        under_way = (
+            sweep.counted
+            for sweep in self._sweeps.values()
+            if sweep.counted is not None and sweep.course is not None and sweep.course.begun and len(sweep.course.path)
+        )
+        return self._tries.left(coverage, under_way)
+
+    def _sweeps_in_share(self, course: FlownLine, flying: Flying) -> bool:
+        """Return whether a line is one of its vehicle's share: passes lie anywhere, and so does what was turned."""
+        return course.overlap == flying.overlap and course.direction_rad == self._direction_rad
 
     def _take_crossline(self, sweep: Assignment, asked: Question) -> None:
         """Give a vehicle the next line across all others, if one is left."""
