@@ -277,6 +277,7 @@ class SwathSurvey:
         missed = small & ~touching(raster.open, foreseen)
         share = sweep.share
         own = share is not None and bool((large & between(raster, share)).any())
+        before = {name: replace(one.share) for name, one in self._sweeps.items() if one.share is not None}
         if not own:
             share = sweep.share = part_of_others(self._sweeps, asked.vehicle, left, large, flying)
         sign = 1 if share is None else share.sign
@@ -290,6 +291,10 @@ class SwathSurvey:
                 self._pass_before(sweep, asked, left, (mine, missed), (path, away_m))
                 return True
             choice = [other for other in choice if other is not line]
+        if not own:
+            # Who sweeps nothing of what others have left leaves it to them.
+            for name, one in self._sweeps.items():
+                one.share = before.get(name)
         if any(self._sweeps[name].course is not None for name in asked.team if name != asked.vehicle):
             small = missed  # What others may see yet is not missed.
         return bool(small.any()) and self._fill(sweep, asked, left, small)

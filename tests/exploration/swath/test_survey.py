@@ -293,6 +293,23 @@ def test_a_hole_is_left_to_who_waits_nearest() -> None:
     assert survey.next_leg("near", near, FLYING, sea.coverage(), team, 20.0) is not None
 
 
+def test_lines_are_left_to_who_flies_beside_them_however_often_another_asks() -> None:
+    sea = Sea(np.full((400, 100), 8.0))
+    sea.seen[60:] = True
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    near, far = np.array([2.0, 8.0, np.pi / 2]), np.array([50.0, 390.0, np.nan])
+    team = {"near": near, "far": far}
+    assert survey.next_leg("near", near, FLYING, sea.coverage(), team, 20.0) is not None
+    kept = survey.remember()
+    kept["sweeps"]["far"]["share"] = {"low_m": 60.0, "high_m": 1000.0, "sign": -1}
+    kept["sweeps"]["near"]["share"] = {"low_m": -1000.0, "high_m": 60.0, "sign": 1}
+    survey.recall(kept)
+    shares = survey.remember()["sweeps"]["near"]["share"]
+    for _ in range(3):
+        assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is None
+    assert survey.remember()["sweeps"]["near"]["share"] == shares
+
+
 def test_a_hole_is_left_to_nobody_who_was_told_that_there_is_nothing() -> None:
     sea = Sea(np.full((100, 300), 8.0))
     sea.seen[:] = True
