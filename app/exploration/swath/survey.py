@@ -286,7 +286,7 @@ class SwathSurvey:
         while choice:
             line, path, away_m = nearest_entry(left, choice, asked.pose, flying.radius_m)
             path = self._led(simple(path, 0.1 * raster.cell_m), flying, coverage)
-            if len(path) > 1 and (own or not better_by_another(self._sweeps, asked, path, away_m)):
+            if len(path) > 1 and (own or not self._leaves(asked, path, away_m)):
                 sweep.course = FlownLine(self._direction_rad, sign, path, flying.overlap)
                 self._pass_before(sweep, asked, left, (mine, missed), (path, away_m))
                 return True
@@ -298,6 +298,12 @@ class SwathSurvey:
         if any(self._sweeps[name].course is not None for name in asked.team if name != asked.vehicle):
             small = missed  # What others may see yet is not missed.
         return bool(small.any()) and self._fill(sweep, asked, left, small)
+
+    def _leaves(self, asked: Question, path: FloatArray, away_m: float) -> bool:
+        """Return whether a line is left to another vehicle; not when all were told that nothing is left for them."""
+        if all(self._sweeps[name].idle for name in asked.team):
+            return False
+        return better_by_another(self._sweeps, asked, path, away_m)
 
     def _pass_before(
         self,
@@ -344,7 +350,7 @@ class SwathSurvey:
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(simple(path, 0.1 * left.cell_m), flying, coverage)
-            if len(path) > 1 and not better_by_another(self._sweeps, asked, path, away_m):
+            if len(path) > 1 and not self._leaves(asked, path, away_m):
                 sweep.course = FlownLine(self._direction_rad, 1, path, overlap)
                 return True
             choice = [other for other in choice if other is not line]
