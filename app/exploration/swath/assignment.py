@@ -64,6 +64,8 @@ class Assignment:
     """A line (k, 2) that its operator wants left out, until that is noted."""
     hidden: BoolArray | None = None
     """Cells (rows, cols) that its line leaves alone, since two lines before did not see them."""
+    counted: BoolArray | None = None
+    """Cells (rows, cols) that its line was begun for, which is a try of them; None: it has begun none."""
     idle: bool = False
     """Whether there was nothing for it when it was last asked for."""
 
@@ -78,12 +80,13 @@ class Assignment:
             "refused": self.refused,
             "skipped": None if self.skipped is None else self.skipped.tolist(),
             "hidden": None if self.hidden is None else packed(self.hidden.astype(np.int64)),
+            "counted": None if self.counted is None else packed(self.counted.astype(np.int64)),
         }
 
 
 def recalled(kept: dict[str, Any]) -> Assignment:
     """Return what was remembered. Raises KeyError, TypeError or ValueError when it is not that."""
-    course, skipped, hidden = kept["course"], kept.get("skipped"), kept.get("hidden")
+    course, skipped, hidden, counted = kept["course"], kept.get("skipped"), kept.get("hidden"), kept.get("counted")
     return Assignment(
         None if kept["share"] is None else Strip(**kept["share"]),
         None
@@ -100,6 +103,7 @@ def recalled(kept: dict[str, Any]) -> Assignment:
         int(kept.get("refused", 0)),
         skipped=None if skipped is None else _path(skipped),
         hidden=None if hidden is None else unpacked(hidden) > 0,
+        counted=None if counted is None else unpacked(counted) > 0,
     )
 
 

@@ -111,12 +111,12 @@ class SwathSurvey:
         for name in team:
             self._sweeps.setdefault(name, Assignment())
         sweep = self._sweeps[vehicle]
-        left = self._tries.left(coverage)
+        left = self._left(coverage)
         if sweep.skipped is not None:
             self._count(sweep.skipped, flying, left, tries=MOST_TRIES)
             sweep.skipped = None
         self._take_back(sweep, pose, flying, left)
-        asked = Question(vehicle, pose, flying, self._tries.left(coverage), team)
+        asked = Question(vehicle, pose, flying, self._left(coverage), team)
         for one in self._sweeps.values():
             forget_flown(one.expected, coverage)
         if sweep.laid_on is not coverage:
@@ -229,7 +229,7 @@ class SwathSurvey:
             return
         raster = self._rasters.of(without(asked.coverage, sweep.hidden), course.direction_rad)
         free = raster.open & ~expected(self._sweeps, raster, asked.flying, asked.vehicle)
-        if sweep.share is not None:
+        if sweep.share is not None and self._sweeps_in_share(course, asked.flying):
             free &= between(raster, sweep.share)
         rest = rest_of_line(course, asked.pose[:2], asked.flying, raster, free)
         if rest is not None:
@@ -277,6 +277,7 @@ class SwathSurvey:
         missed = small & ~touching(raster.open, foreseen)
         share = sweep.share
         own = share is not None and bool((large & between(raster, share)).any())
+        before = {name: replace(one.share) for name, one in self._sweeps.items() if one.share is not None}
         if not own:
             share = sweep.share = part_of_others(self._sweeps, asked.vehicle, left, large, flying)
         sign = 1 if share is None else share.sign
@@ -285,14 +286,24 @@ class SwathSurvey:
         while choice:
             line, path, away_m = nearest_entry(left, choice, asked.pose, flying.radius_m)
             path = self._led(simple(path, 0.1 * raster.cell_m), flying, coverage)
-            if len(path) > 1 and (own or not better_by_another(self._sweeps, asked, path, away_m)):
+            if len(path) > 1 and (own or not self._leaves(asked, path, away_m)):
                 sweep.course = FlownLine(self._direction_rad, sign, path, flying.overlap)
                 self._pass_before(sweep, asked, left, (mine, missed), (path, away_m))
                 return True
             choice = [other for other in choice if other is not line]
+        if not own:
+            # Who sweeps nothing of what others have left leaves it to them.
+            for name, one in self._sweeps.items():
+                one.share = before.get(name)
         if any(self._sweeps[name].course is not None for name in asked.team if name != asked.vehicle):
             small = missed  # What others may see yet is not missed.
         return bool(small.any()) and self._fill(sweep, asked, left, small)
+
+    def _leaves(self, asked: Question, path: FloatArray, away_m: float) -> bool:
+        """Return whether a line is left to another vehicle; not when all were told that nothing is left for them."""
+        if all(self._sweeps[name].idle for name in asked.team):
+            return False
+        return better_by_another(self._sweeps, asked, path, away_m)
 
     def _pass_before(
         self,
@@ -363,7 +374,7 @@ class SwathSurvey:
         if course.overlap == asked.flying.overlap:
             sweep.hidden = self._hidden(coverage, asked.flying)
             coverage = without(coverage, sweep.hidden)
-        self._count(course.path, asked.flying, coverage)
+        sweep.counted = self._count(course.path, asked.flying, coverage)
 
     def _hidden(self, coverage: Coverage, flying: Flying) -> BoolArray:
         """Return the cells (rows, cols) in small pieces that two lines were to see and did not: they are passed over.
@@ -382,9 +393,22 @@ class SwathSurvey:
         """Return which cells of the raster hold ground that two lines were to see and did not."""
         return self._rasters.of(self._tries.again(coverage), self._direction_rad).open
 
-    def _count(self, path: FloatArray, flying: Flying, coverage: Coverage, tries: int = 1) -> None:
-        """Note what a line that is begun is to see."""
-        self._tries.count(path, flying, coverage, self._rasters.of(coverage, self._direction_rad), tries)
+    def _count(self, path: FloatArray, flying: Flying, coverage: Coverage, tries: int = 1) -> BoolArray:
+        """Note what a line that is begun is to see, and return these cells (rows, cols)."""
+        return self._tries.count(path, flying, coverage, self._rasters.of(coverage, self._direction_rad), tries)
+
+    def _left(self, coverage: Coverage) -> Coverage:
+        """Return the same without what is given up: what lines under way are to see is not, before they end."""
+        under_way = (
+            sweep.counted
+            for sweep in self._sweeps.values()
+            if sweep.counted is not None and sweep.course is not None and sweep.course.begun and len(sweep.course.path)
+        )
+        return self._tries.left(coverage, under_way)
+
+    def _sweeps_in_share(self, course: FlownLine, flying: Flying) -> bool:
+        """Return whether a line is one of its vehicle's share: passes lie anywhere, and so does what was turned."""
+        return course.overlap == flying.overlap and course.direction_rad == self._direction_rad
 
     def _take_crossline(self, sweep: Assignment, asked: Question) -> None:
         """Give a vehicle the next line across all others, if one is left."""

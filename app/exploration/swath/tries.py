@@ -2,6 +2,7 @@
 
 import base64
 import zlib
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -41,26 +42,40 @@ class Tries:
     def __init__(self) -> None:
         self._counts: IntArray = np.zeros((0, 0), dtype=np.int64)
 
-    def left(self, coverage: Coverage) -> Coverage:
-        """Return the same without what is given up; all begins anew on another grid."""
+    def left(self, coverage: Coverage, under_way: Iterable[BoolArray] = ()) -> Coverage:
+        """Return the same without what is given up; all begins anew on another grid.
+
+        ``under_way``: what each line that is flown now was counted for, (rows, cols): it is no try in vain yet.
+        """
         if self._counts.shape != coverage.wanted.shape:
             self._counts = np.zeros(coverage.wanted.shape, dtype=np.int64)
-        return replace(coverage, done=coverage.done | (self._counts >= MOST_TRIES))
+        ended = self._counts.copy()
+        for cells in under_way:
+            if cells.shape == ended.shape:
+                ended -= cells
+        return replace(coverage, done=coverage.done | (ended >= MOST_TRIES))
 
     def again(self, coverage: Coverage) -> Coverage:
         """Return the same with nothing left but what two lines were to see and did not."""
         return replace(coverage, done=coverage.done | (self._counts < 2))
 
-    def count(self, path: FloatArray, flying: Flying, coverage: Coverage, raster: LineRaster, tries: int = 1) -> None:
-        """Note what a line (k, 2) that is begun is to see, what it leads over in any case; -1: it was not flown."""
+    def count(
+        self, path: FloatArray, flying: Flying, coverage: Coverage, raster: LineRaster, tries: int = 1
+    ) -> BoolArray:
+        """Note what a line (k, 2) that is begun is to see, what it leads over in any case; -1: it was not flown.
+
+        Returns the cells (rows, cols) that this was noted for.
+        """
         seen = raster.under(path, flying)
         turned = raster.axes.turned(path)
         seen[raster.columns_of(turned[:, 0]), raster.rows_of(turned[:, 1])] = True
         places = raster.axes.turned(coverage.places_m(coverage.left))
         inside = seen[raster.columns_of(places[:, 0]), raster.rows_of(places[:, 1])]
         rows, cols = np.nonzero(coverage.left)
-        counts = self._counts[rows[inside], cols[inside]]
-        self._counts[rows[inside], cols[inside]] = np.maximum(counts + tries, 0)
+        counted = np.zeros(coverage.left.shape, dtype=bool)
+        counted[rows[inside], cols[inside]] = True
+        self._counts[counted] = np.maximum(self._counts[counted] + tries, 0)
+        return counted
 
     def remember(self) -> list[Any]:
         """Return the counts, for ``recall``."""

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
@@ -93,7 +93,7 @@ def test_memory_of_earlier_versions_is_read() -> None:
         survey.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0)
     kept = json.loads(json.dumps(survey.remember()))
     for sweep_of in kept["sweeps"].values():
-        del sweep_of["ends"]
+        del sweep_of["ends"], sweep_of["counted"]
     again = SwathSurvey(0.0, 1.0, 8.0)
     again.recall(kept)
     assert again.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0) is not None
@@ -209,6 +209,79 @@ def test_ground_that_lines_beside_it_saw_in_vain_is_not_given_up_before_a_line_l
     assert tries.left(sea.coverage()).left[hidden].all()
 
 
+def test_ground_is_not_given_up_while_its_last_line_is_under_way() -> None:
+    sea = Sea(np.full((60, 300), 4.0))
+    sea.seen[:] = True
+    sea.seen[20:23, 200:260] = False
+    survey = tried(SwathSurvey(0.0, 1.0, 4.0), sea, MOST_TRIES - 1)
+    fly(survey, sea, {"a": np.array([5.0, 50.0, np.nan])})
+    assert sea.seen.all()
+
+
+@pytest.mark.parametrize("vehicles", [1, 2])
+def test_ground_that_cannot_be_seen_is_given_up(vehicles: int) -> None:
+    sea = Sea(np.full((80, 160), 9.0))
+    blind = np.zeros(sea.seen.shape, dtype=bool)
+    blind[30:34, 60:66] = True
+    blind[60:, 100:150] = True
+    poses = {f"v{k}": np.array([2.0 + 5.0 * k, 2.0, np.nan]) for k in range(vehicles)}
+    flown = fly(SwathSurvey(0.0, 1.0, 9.0), sea, poses, blind)
+    alone = fly(SwathSurvey(0.0, 1.0, 9.0), Sea(sea.depth_m), poses)
+    assert sea.seen[~blind].mean() > 0.99
+    assert flown < alone + 2 * MOST_TRIES * 160.0
+
+
+def test_missed_ground_is_passed_wherever_its_vehicle_sweeps() -> None:
+    sea = Sea(np.full((200, 300), 4.0))
+    sea.seen[:60] = True
+    sea.seen[40:43, 230:290] = False
+    survey, team = SwathSurvey(0.0, 1.0, 4.0), {"a": np.array([225.0, 35.0, 0.0]), "b": np.array([2.0, 198.0, 0.0])}
+    for _ in range(6):
+        end = survey.next_leg("a", team["a"], FLYING, sea.coverage(), dict(team), 20.0)
+        assert end is not None
+        sea.fly(team["a"][:2], end)
+        team["a"] = np.array([*end, math.atan2(*(end - team["a"][:2]))])
+        kept = survey.remember()
+        kept["sweeps"]["a"]["share"] = {"low_m": 80.0, "high_m": 120.0, "sign": 1}
+        survey.recall(kept)
+    assert sea.seen[:60].all()
+
+
+def tried(survey: SwathSurvey, sea: Sea, times: int) -> SwathSurvey:
+    """Return the survey as if what is left had been looked at in vain so many times."""
+    tries, coverage = Tries(), sea.coverage()
+    tries.left(coverage)
+    over = raster_of(coverage, 0.0, 1.0, 20.0)
+    rows, cols = np.nonzero(coverage.left)
+    for _ in range(times):
+        over_it = np.array([[cols.min(), rows.mean()], [cols.max() + 1.0, rows.mean()]])
+        tries.count(over_it, FLYING, coverage, over)
+    survey.recall(survey.remember() | {"tried": tries.remember()})
+    return survey
+
+
+def fly(survey: SwathSurvey, sea: Sea, poses: dict[str, FloatArray], blind: BoolArray | None = None) -> float:
+    """Fly a survey to its end from its vehicles' poses and return the metres; ``blind`` cells are never seen."""
+    poses, flown, idle = dict(poses), 0.0, 0
+    for turn in range(2000):
+        name = list(poses)[turn % len(poses)]
+        end = survey.next_leg(name, poses[name], FLYING, sea.coverage(), dict(poses), 20.0)
+        if end is None:
+            survey.expect_nothing(name)
+        idle = idle + 1 if end is None else 0
+        if idle > 2 * len(poses):
+            return flown
+        if end is None:
+            continue
+        leg = end - poses[name][:2]
+        sea.fly(poses[name][:2], end)
+        if blind is not None:
+            sea.seen[blind] = False
+        flown += float(np.hypot(*leg))
+        poses[name] = np.array([*end, math.atan2(*leg)])
+    raise AssertionError("it does not end")
+
+
 def test_a_hole_is_left_to_who_waits_nearest() -> None:
     sea = Sea(np.full((100, 300), 8.0))
     sea.seen[:] = True
@@ -220,6 +293,23 @@ def test_a_hole_is_left_to_who_waits_nearest() -> None:
     assert survey.next_leg("near", near, FLYING, sea.coverage(), team, 20.0) is not None
 
 
+def test_lines_are_left_to_who_flies_beside_them_however_often_another_asks() -> None:
+    sea = Sea(np.full((400, 100), 8.0))
+    sea.seen[60:] = True
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    near, far = np.array([2.0, 8.0, np.pi / 2]), np.array([50.0, 390.0, np.nan])
+    team = {"near": near, "far": far}
+    assert survey.next_leg("near", near, FLYING, sea.coverage(), team, 20.0) is not None
+    kept = survey.remember()
+    kept["sweeps"]["far"]["share"] = {"low_m": 60.0, "high_m": 1000.0, "sign": -1}
+    kept["sweeps"]["near"]["share"] = {"low_m": -1000.0, "high_m": 60.0, "sign": 1}
+    survey.recall(kept)
+    shares = survey.remember()["sweeps"]["near"]["share"]
+    for _ in range(3):
+        assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is None
+    assert survey.remember()["sweeps"]["near"]["share"] == shares
+
+
 def test_a_hole_is_left_to_nobody_who_was_told_that_there_is_nothing() -> None:
     sea = Sea(np.full((100, 300), 8.0))
     sea.seen[:] = True
@@ -228,6 +318,18 @@ def test_a_hole_is_left_to_nobody_who_was_told_that_there_is_nothing() -> None:
     team = {"far": far, "near": near}
     assert survey.next_leg("near", near, FLYING, sea.coverage(), team, 20.0) is None
     sea.seen[40:48, 280:290] = False
+    assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is not None
+
+
+def test_lines_are_left_to_nobody_when_all_were_told_that_there_is_nothing() -> None:
+    sea = Sea(np.full((100, 300), 8.0))
+    sea.seen[:] = True
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    far, near = np.array([5.0, 90.0, np.nan]), np.array([295.0, 30.0, np.nan])
+    team = {"far": far, "near": near}
+    for name, pose in team.items():
+        assert survey.next_leg(name, pose, FLYING, sea.coverage(), team, 20.0) is None
+    sea.seen[:60, 200:] = False
     assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is not None
 
 
