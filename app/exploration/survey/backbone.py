@@ -1,7 +1,6 @@
 """The coverage backbone of a survey: even lines, every other one first and the rest coming back, or all in order."""
 
 import itertools
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, Vehicles
-from app.exploration.lines.even_survey import EvenSurvey, Pattern, even_survey, fullest_surveys, orders_across, way_m
+from app.exploration.lines.even_survey import Pattern, even_survey, orders_across, way_m
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value
 
@@ -23,10 +22,6 @@ TO_END = 0.25
 PARTS = 8
 """Into how many parts vehicles may share a line."""
 IN_ORDER = (Pattern(), Pattern(TO_BORDER, 0.0), Pattern(TO_BORDER, TO_END, PARTS))
-FULLEST = Pattern(TO_BORDER, parts=PARTS)
-"""Also flown in order, in either direction; where its lines end is found, so that the team has hardly any way left."""
-OTHERWISE = 0.9
-"""In the other direction lines must promise a smaller U by this factor."""
 ADAPTS, MANY_LINES = 0.85, 11
 """How much better every other line first counts than all in order where every vehicle flies many lines: what it has met
 may be followed up. After fewer the map tells too little of where it is rough."""
@@ -88,26 +83,14 @@ def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objecti
     if many:
         value *= ADAPTS
     unknown = np.full(len(nodes.x), np.inf)
-
-    def better(surveys: Iterable[EvenSurvey], value: float, counts: float = 1.0) -> tuple[float, list[Share] | None]:
-        best = None
-        for survey in surveys:
-            left = counts * plan_value(unknown, nodes, objective, vehicles, *packed(survey.routes))
-            if left < value * (1 - 1e-9):
-                value, best = left, [Share(route, 0) for route in survey.routes]
-        return value, best
-
-    whole_lines = (even_survey(sweep, vehicles, objective.turns, pattern) for pattern in IN_ORDER)
-    value, in_order = better((survey for survey in whole_lines if survey is not None), value)
-    if in_order is None:
-        return shares
-    # There and back is left only for whole lines: what it has met may be followed up, which this value does not tell.
-    for direction in sweeps:
-        turns = [objective.turns] * len(vehicles.en_m)
-        fullest = fullest_surveys(direction, vehicles, turns, FULLEST)
-        value, found = better(fullest, value, 1.0 if direction is sweep else 1.0 / OTHERWISE)
-        in_order = in_order if found is None else found
-    return in_order
+    for pattern in IN_ORDER:
+        survey = even_survey(sweep, vehicles, objective.turns, pattern)
+        if survey is None:
+            continue
+        left = plan_value(unknown, nodes, objective, vehicles, *packed(survey.routes))
+        if left < value * (1 - 1e-9):
+            value, shares = left, [Share(route, 0) for route in survey.routes]
+    return shares
 
 
 def there_and_back(

@@ -271,22 +271,6 @@ def test_the_backbone_is_as_long_as_each_vehicle_can_fly(left: tuple[float, floa
     assert value < plan_value(far, nodes, objective, vehicles, *packed([share.stops for share in other]))
 
 
-def test_few_lines_leave_a_team_hardly_any_way_over() -> None:
-    """Whole lines left it 12 % of it: up to a line's length."""
-    area, left_m = np.array([[0.0, 0.0], [300.0, 0.0], [300.0, 200.0], [0.0, 200.0]]), np.full(3, 1170.0)
-    vehicles = Vehicles(np.array([[2.0, 2.0], [7.0, 2.0], [12.0, 2.0]]), np.full(3, np.nan), left_m)
-    rng = np.random.default_rng(1)
-    nodes = make_nodes(rng.uniform(0.0, 1.0, (600, 2)) * [300.0, 200.0], np.ones(600))
-    objective = SurveyObjective(60.0, 2.0, Turns(5.2, 0.0), 1e6)
-    shares = backbone(Constraints(area, max_step_m=10.0), vehicles, nodes, objective)
-    flown = [
-        flown_m(at[0], at[1], np.nan, share.stops, objective.turns)
-        for at, share in zip(vehicles.en_m, shares, strict=True)
-    ]
-    assert (np.array(flown) <= left_m).all()
-    assert sum(flown) > 0.96 * left_m.sum()
-
-
 def most_across_m(left_m: float, legs: int) -> float:
     """Survey a floor that is rough in one corner; return how far the leg goes to the side that does so most."""
     situation = make_situation(belief=make_belief(cell=5.0))
