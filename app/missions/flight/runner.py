@@ -122,6 +122,7 @@ class Runner:
                 keeper.cancel()
             await asyncio.gather(*keepers, return_exceptions=True)
             await self._maps.end()
+            live.stop_counting()
             await to_the_end(save_elapsed(live))
             live.flight_ends()
 

@@ -141,6 +141,7 @@ class LiveMission:
         self.standstill = ""
         """Why no vehicle may be sent anywhere now; empty while at least one may."""
         self.running_since_s: float | None = None
+        self._counting = False
         self.database = database
         """What is written through it is refused once another process has the mission."""
         self.waypoints = WaypointViews(spec, self.team, self.broadcaster)
@@ -220,6 +221,7 @@ class LiveMission:
     def flight_begins(self) -> None:
         """Note that its flight goes on in this process from now on."""
         self.running_since_s = asyncio.get_running_loop().time()
+        self._counting = True
         self.call_everybody_home()
 
     def count_elapsed(self, seconds: float) -> None:
@@ -227,6 +229,10 @@ class LiveMission:
         if self.running_since_s is not None:
             self.running_since_s += seconds
         self.header.elapsed_s += seconds
+
+    def stop_counting(self) -> None:
+        """Count nothing any more of what vehicles fly: what is stored now is what was flown."""
+        self._counting = False
 
     def flight_ends(self) -> None:
         """Note that nobody flies it here any more."""
@@ -302,7 +308,7 @@ class LiveMission:
 
     def receive(self, event: FleetEvent) -> None:
         """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
-        self.reports.take(event, self.spec, running=self.running, standing=bool(self.standstill))
+        self.reports.take(event, self.spec, running=self._counting, standing=bool(self.standstill))
 
     def withdraw(self, member: Member, response: Response, why: str, *, asked: bool = False) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.

@@ -175,6 +175,11 @@ def view(scene: Scene, mission: str) -> dict[str, Any]:
     return found
 
 
+def link(scene: Scene, vehicle: str) -> str:
+    [state] = [v["link"] for v in view(scene, scene.mission)["vehicles"] if v["name"] == vehicle]
+    return str(state)
+
+
 def depth_m(scene: Scene, vehicle: str) -> float:
     [depth] = [v["depth_m"] for v in view(scene, scene.mission)["vehicles"] if v["name"] == vehicle]
     return float(depth)
@@ -197,6 +202,8 @@ def a_ship_comes(scene: Scene) -> None:
 
 
 def somebody_else_aborts(scene: Scene) -> None:
+    # Nothing is taken from us while it does not follow: on a busy machine it may have to be engaged anew.
+    scene.wait(lambda: link(scene, "other_console") == "engaged", "it follows")
     abort = imcpy.Abort()
 
     def send(node: Any) -> None:

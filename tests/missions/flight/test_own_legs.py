@@ -30,6 +30,7 @@ from app.missions.states import MissionState
 from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
+from app.storage.queries import missions as mission_queries
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_state
 from tests.support.waiting import until
 
@@ -252,7 +253,7 @@ async def test_after_a_pause_no_leg_is_left_out_as_after_a_restart(
     """A later leg may pass the vehicle closer than the one that it flies."""
     monkeypatch.setattr(runner, "nearest_leg", lambda *_: 1)
     service = await harbour_closed.open(time_scale=2.0)
-    mission = (await service.create(sim_spec("a", steps=12, side_m=60.0, **APART))).id
+    mission = (await service.create(sim_spec("a", steps=60, side_m=60.0, **APART))).id
 
     async def left_out() -> int:
         await live.journal.flush()
@@ -270,11 +271,36 @@ async def test_after_a_pause_no_leg_is_left_out_as_after_a_restart(
     await act(service, mission, "resume")
     await until(lambda: resumed(1), "it goes on")
     assert await left_out() == 0
+    await until(lambda: len(live.team.named("a").ahead) >= 2, "several legs again")
     service = await harbour_closed.reopen(time_scale=2.0)
     live = await service.get(mission)
     await until(lambda: resumed(2), "it goes on")
     assert await left_out() == 1
     await act(service, mission, "abort")
+
+
+async def test_what_was_flown_is_the_same_after_the_service_started_again(
+    harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A vehicle tells where it is while the end is written down, too."""
+    keep_flown = mission_queries.keep_flown
+
+    async def slowly(*arguments: Any) -> None:
+        await keep_flown(*arguments)
+        heard = live.team.named("a").report
+        await until(lambda: live.team.named("a").report is not heard, "it tells where it is meanwhile")
+
+    monkeypatch.setattr(mission_queries, "keep_flown", slowly)
+    service = await harbour_closed.open(time_scale=10.0)
+    mission = (await service.create(sim_spec("a", steps=400, side_m=60.0, **APART))).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: live.team.named("a").flown.on_plan_m > 10.0, "it flies")
+    await act(service, mission, "finish")
+    await until_state(service, mission, MissionState.FINISHED)
+    before = live.team.named("a").flown.remember()
+    service = await harbour_closed.reopen()
+    assert (await service.get(mission)).team.named("a").flown.remember() == before
 
 
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
