@@ -175,7 +175,7 @@ def fly(
     for i in range(len(members)):
         for end in swarm.legs_ahead(i):
             sound(i, swarm.fly(i, end, ahead=True))
-    told, ended = so_far.first_step - 1, False
+    told, untold = so_far.first_step - 1, False
     while (due := swarm.due(apart=apart)).any():
         number = int(swarm.legs[due].max()) + 1
         known = Knowledge(builder.belief(), builder.sounded_at_m()[0])
@@ -184,14 +184,14 @@ def fly(
         for i in map(int, np.flatnonzero(due)):
             if members[i].name in decision.done:
                 swarm.end(i)
-                ended = True
                 continue
             sound(i, swarm.fly(i, target.get(members[i].name, swarm.here[i])))
-        if number > told:
+        untold = number <= told
+        if not untold:
             told = number
             yield swarm.flown(number)
-    if ended:
-        yield swarm.flown(told)  # who is done has nothing left
+    if untold:
+        yield swarm.flown(told)  # who was done meanwhile, or flew legs that others had before, has less left
 
 
 def _sounded(

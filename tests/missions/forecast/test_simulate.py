@@ -10,11 +10,12 @@ import pytest
 
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import Position, VehicleReport
+from app.missions.flight.own_legs import least_way_m
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
 from app.missions.forecast.simulate import Forecast, fly, fly_over, forecast
-from app.missions.forecast.swarm import Flown, SoFar, Swarm
+from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
@@ -110,10 +111,10 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     assert view.coverage_pct_range.high < 20.0
 
 
-def test_a_vehicle_that_can_fly_no_further_line_has_nothing_left_in_a_forecast() -> None:
-    """Its rest was drawn out, as if there had been no time to fly it."""
+def left_of_a_slow_and_a_quick_one(planner: str, **budget: float) -> tuple[StepFlown, MissionSpec]:
+    """Return the last that a forecast tells of them, and their mission."""
     vehicles = [{"name": name, "kind": "sim", "speed_mps": mps} for name, mps in (("quick", 2.0), ("slow", 1.0))]
-    spec = sim_spec(side_m=60.0, vehicles=vehicles, planner={"name": "lawnmower"}, budget={"km_per_vehicle": 0.31})
+    spec = sim_spec(side_m=60.0, vehicles=vehicles, planner={"name": planner}, budget=budget)
     team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     starts, _ = request.starts_of(spec, members)
@@ -121,8 +122,21 @@ def test_a_vehicle_that_can_fly_no_further_line_has_nothing_left_in_a_forecast()
     builder = MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m)
     builder.build()
     *_, last = fly(spec, members, starts, builder, floor.terrain)
+    return last, spec
+
+
+def test_a_vehicle_that_can_fly_no_further_line_has_nothing_left_in_a_forecast() -> None:
+    """Its rest was drawn out, as if there had been no time to fly it."""
+    last, _ = left_of_a_slow_and_a_quick_one("lawnmower", km_per_vehicle=0.31)
     assert last.left_m == 0.0
     assert last.distance_m[1] < 310.0, "no whole line is left"
+
+
+def test_a_slow_vehicle_beside_a_quick_one_has_nothing_left_in_a_forecast() -> None:
+    """What it flew after the quick one's last leg was drawn out, as if there had been no time to fly it."""
+    last, spec = left_of_a_slow_and_a_quick_one("cao", km_per_vehicle=0.2)
+    assert last.left_m <= 2 * least_way_m(spec)
+    assert last.distance_m[1] > 150.0
 
 
 def test_without_patience_one_floor_is_flown_and_that_is_said() -> None:
