@@ -386,6 +386,7 @@ def _situation(
     """Return what the planner is asked about vehicles that are at ``origin``, (n, 3)."""
     moving = np.array([p.moving for p in team])
     left_m = np.array([p.left_m for p in team])
+    radii_m = {vehicle.name: turn_radius_m(spec, vehicle) for vehicle in spec.vehicles}
     doubtful_en_m = knowledge.doubtful_en_m
     return Situation(
         step=step,
@@ -402,6 +403,7 @@ def _situation(
         moving=None if moving.all() else moving,
         left_m=None if np.isnan(left_m).any() else left_m,
         turns_take_way=spec.budget.minutes is not None,
+        turn_radii_m=np.array([radii_m.get(place.vehicle, place.turn_radius_m) for place in team]),
         swath=knowledge.swath,
         at_rest=frozenset(place.vehicle for place in team if place.at_rest),
     )
