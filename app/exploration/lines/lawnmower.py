@@ -34,6 +34,8 @@ ACROSS = 0.9
 """Lines lie across the longer axis where the ground is closer to them by this factor, squared and on average."""
 LEAST_LEG_M = 5.0
 """Who can fly no farther is done."""
+CORNER_LOSS = 0.4
+"""Part of a step that a corner costs where steps are counted: the leg to it ends early."""
 LEAST_BUDGET_M = 1.0
 """Also who can fly no farther has a strip, a very narrow one."""
 
@@ -67,7 +69,7 @@ def lawnmower_routes(
 
 
 def shared_lines(
-    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray
+    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray, corner_m: float = 0.0
 ) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): neighbouring ones of the most even lines that the team can fly together.
 
@@ -84,10 +86,12 @@ def shared_lines(
         Distances that the vehicles can travel, nearly all of which they do.
     radii_m : (n_vehicles,)
         Of the circles in which each turns, which takes some of those distances.
+    corner_m
+        What a corner takes of them besides.
     """
     free, axis = FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area)
     vehicles = Vehicles(np.ascontiguousarray(starts), np.full(len(starts), np.nan), np.asarray(budgets_m, dtype=float))
-    ground, turns = Ground.of(constraints), [Turns(float(radius_m), 0.0) for radius_m in radii_m]
+    ground, turns = Ground.of(constraints), [Turns(float(radius_m), corner_m) for radius_m in radii_m]
     best: tuple[float, list[FloatArray]] | None = None
     for direction, counts in ((axis, 1.0), (axis + np.pi / 2, 1.0 / ACROSS)):
         for survey in fullest_surveys(Sweep(constraints, free, direction), vehicles, turns, SHARED):
@@ -262,7 +266,8 @@ class LawnmowerPlanner(PlannerBase):
         """Give every vehicle of the team a route."""
         en = team.positions[:, :2]
         if not self._routes.keys() & set(team.vehicles):
-            routes = shared_lines(team.constraints, en, metres_left(team), self._turn_radii_m(team))
+            corner_m = CORNER_LOSS * team.constraints.max_step_m if team.left_m is None else 0.0
+            routes = shared_lines(team.constraints, en, metres_left(team), self._turn_radii_m(team), corner_m)
             self._routes = dict(zip(team.vehicles, routes, strict=True))
             self._dealt = [np.vstack([here, route]) for here, route in zip(en, routes, strict=True)]
             return
