@@ -1,6 +1,8 @@
 """Where there is room in the area: beside zones and other vehicles, for circles, ways in and what lies beyond a leg."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -11,6 +13,7 @@ from shapely.ops import nearest_points, unary_union
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.routes import FreeSpace
 from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAST_LEG_M = 0.5
@@ -24,6 +27,10 @@ CIRCLE_WITHIN = 2.5
 """A circle farther from the target than so many radii is none of its leg's."""
 START_OUTSIDE_M = 2.0
 """A vehicle drifts at the surface: so far outside the area it may be when its leg begins."""
+BEYOND_M = 20.0
+"""So far beside the ground that straight ways into the area lead over may a way round zones lead."""
+ROUND_TO = 40
+"""Of the places where a vehicle may come in, about so many are looked at for a way round zones."""
 
 
 def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, lead_m: float) -> FloatArray:
@@ -104,9 +111,13 @@ def nearest_inside(area: Polygon, place: FloatArray) -> FloatArray:
 
 
 def way_in(
-    constraints: Constraints, place: FloatArray, inset_m: float, taken: Sequence[FloatArray]
+    constraints: Constraints, place: FloatArray, inset_m: float, taken: Sequence[FloatArray], room_m: float
 ) -> FloatArray | None:
-    """Return the nearest point of the area that a vehicle outside of it may go straight to; None when there is none.
+    """Return where a vehicle outside the area goes first that is to come into it; None when there is no way.
+
+    That is the nearest point of the area that it may go straight to. Where keep-out zones bar all of them, it is the
+    first corner of a way round these, hardly outside the ground that straight ways lead over: the next one is found
+    from there.
 
     Parameters
     ----------
@@ -116,25 +127,63 @@ def way_in(
         How far inside the border the point should lie.
     taken : sequence of (2,)
         Places of other vehicles, from which the point keeps the least separation.
+    room_m
+        How far from zones corners lie: farther than a vehicle is from where it should be when it arrives.
     """
-    zones = [Polygon(zone) for zone in constraints.keep_out]
-    ahead = [zone for zone in zones if not zone.contains(Point(place))]
+    entries = [entry for entry in _entries(constraints, place, inset_m) if _apart(constraints, entry, taken)]
+    for entry in entries:
+        if not barred(constraints, place, entry):
+            return entry
+    return _first_corner(constraints, place, entries[:: max(1, len(entries) // ROUND_TO)], taken, room_m)
+
+
+def barred(constraints: Constraints, place: FloatArray, goal: FloatArray) -> bool:
+    """Return whether a keep-out zone that a vehicle is not in lies between it and a goal, both (2,)."""
+    leg = LineString([place, goal])
+    zones = (Polygon(zone) for zone in constraints.keep_out)
+    return any(zone.intersects(leg) and not zone.contains(Point(place)) for zone in zones)
+
+
+def _entries(constraints: Constraints, place: FloatArray, inset_m: float) -> list[FloatArray]:
+    """Return places at the area's border, and at that of its zones, (n of (2,)), the nearest one first."""
     free: BaseGeometry = Polygon(constraints.area).buffer(-inset_m)
     if free.is_empty:
         free = Polygon(constraints.area)
-    for zone in zones:
-        free = free.difference(zone.buffer(LEAD_CLEARANCE_M))
+    for zone in constraints.keep_out:
+        free = free.difference(Polygon(zone).buffer(LEAD_CLEARANCE_M))
     if free.is_empty:
-        return None
+        return []
     border = free.boundary
     spacing = max(border.length / ENTRY_POINTS, inset_m)
     along = np.arange(0.0, border.length, spacing)
     points = [nearest_points(free, Point(place))[0], *(border.interpolate(distance) for distance in along)]
-    for goal in sorted(points, key=Point(place).distance):
-        leg = LineString(np.array([place, (goal.x, goal.y)]))
-        apart = all(goal.distance(Point(other)) >= constraints.min_separation_m for other in taken)
-        if apart and not any(zone.intersects(leg) for zone in ahead):
-            return np.array([goal.x, goal.y])
+    return [np.array([goal.x, goal.y]) for goal in sorted(points, key=Point(place).distance)]
+
+
+def _apart(constraints: Constraints, goal: FloatArray, taken: Sequence[FloatArray]) -> bool:
+    return all(np.linalg.norm(goal - other) >= constraints.min_separation_m for other in taken)
+
+
+def _first_corner(
+    constraints: Constraints,
+    place: FloatArray,
+    entries: Sequence[FloatArray],
+    taken: Sequence[FloatArray],
+    room_m: float,
+) -> FloatArray | None:
+    """Return how far a vehicle goes straight along a way round zones to the first of the entries that has one, (2,)."""
+    ground = (
+        Polygon(constraints.area).union(Point(place)).convex_hull.buffer(BEYOND_M + 0.5 * room_m, join_style="mitre")
+    )
+    ahead = tuple(zone for zone in constraints.keep_out if not Polygon(zone).contains(Point(place)))
+    # Free space keeps off zones by twice its margin, off the border by once.
+    free = FreeSpace(replace(constraints, area=np.array(ground.exterior.coords)[:-1], keep_out=ahead), 0.5 * room_m)
+    for entry in entries:
+        stops = [place, *free.way(place, entry)]
+        if any(barred(constraints, *leg) for leg in pairwise(stops)):
+            continue
+        corner = next(stop for stop in stops[:0:-1] if not barred(constraints, place, stop))
+        return corner if _apart(constraints, corner, taken) else None
     return None
 
 
