@@ -29,6 +29,11 @@ START_OUTSIDE_M = 2.0
 """A vehicle drifts at the surface: so far outside the area it may be when its leg begins."""
 BEYOND_M = 20.0
 """So far beside the ground that straight ways into the area lead over may a way round zones lead."""
+NEARER = 0.9
+"""A way may lead as near to a zone as this part of how near a vehicle is already."""
+LEAST_ROOM = 0.4
+"""Part of the room beside a zone with which a straight way is better than one round: who is a little beside where its
+way was to begin would cross the zone."""
 ROUND_TO = 40
 """Of the places where a vehicle may come in, about so many are looked at for a way round zones."""
 
@@ -131,17 +136,26 @@ def way_in(
         How far from zones corners lie: farther than a vehicle is from where it should be when it arrives.
     """
     entries = [entry for entry in _entries(constraints, place, inset_m) if _apart(constraints, entry, taken)]
-    for entry in entries:
-        if not barred(constraints, place, entry):
-            return entry
-    return _first_corner(constraints, place, entries[:: max(1, len(entries) // ROUND_TO)], taken, room_m)
+    for part in (1.0, LEAST_ROOM):
+        for entry in entries:
+            if not barred(constraints, place, entry, part * room_m):
+                return entry
+    corner = _first_corner(constraints, place, entries[:: max(1, len(entries) // ROUND_TO)], taken, room_m)
+    if corner is not None:
+        return corner
+    return next((entry for entry in entries if not barred(constraints, place, entry)), None)
 
 
-def barred(constraints: Constraints, place: FloatArray, goal: FloatArray) -> bool:
-    """Return whether a keep-out zone that a vehicle is not in lies between it and a goal, both (2,)."""
-    leg = LineString([place, goal])
-    zones = (Polygon(zone) for zone in constraints.keep_out)
-    return any(zone.intersects(leg) and not zone.contains(Point(place)) for zone in zones)
+def barred(constraints: Constraints, place: FloatArray, goal: FloatArray, room_m: float = 0.0) -> bool:
+    """Return whether a keep-out zone that a vehicle is not in lies between it and a goal, both (2,).
+
+    Or closer than ``room_m`` to the way, where the vehicle is not that close itself.
+    """
+    leg, here = LineString([place, goal]), Point(place)
+    for zone in map(Polygon, constraints.keep_out):
+        if not zone.contains(here) and zone.distance(leg) <= min(room_m, NEARER * zone.distance(here)):
+            return True
+    return False
 
 
 def _entries(constraints: Constraints, place: FloatArray, inset_m: float) -> list[FloatArray]:
@@ -182,7 +196,14 @@ def _first_corner(
         stops = [place, *free.way(place, entry)]
         if any(barred(constraints, *leg) for leg in pairwise(stops)):
             continue
-        corner = next(stop for stop in stops[:0:-1] if not barred(constraints, place, stop))
+        # From where it was to be it sees the first one clear of zones; from beside it, at least clear enough.
+        corner = next(
+            stop
+            for part in (LEAST_ROOM, 0.0)
+            for stop in stops[:0:-1]
+            if (part == 0.0 or np.linalg.norm(stop - place) > room_m)
+            and not barred(constraints, place, stop, part * room_m)
+        )
         return corner if _apart(constraints, corner, taken) else None
     return None
 
