@@ -302,7 +302,7 @@ def test_a_vehicle_behind_a_zone_that_bars_every_straight_way_in_comes_round_it(
         assert leg.target_m[2] == 0.0
         zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
         legs.append(LineString([at, leg.target_m[:2]]))
-        assert np.linalg.norm(leg.target_m[:2] - at) > 3.5, "it gets on"
+        assert np.linalg.norm(leg.target_m[:2] - at) > 17.0, "it drifts to what is closer"
         way = leg.target_m[:2] - np.array(zone.centroid.coords[0])
         at = leg.target_m[:2] - off_m * way / np.linalg.norm(way)
         if area.contains(Point(leg.target_m[:2])):

@@ -14,6 +14,7 @@ from shapely.ops import nearest_points, unary_union
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace
+from imc_bridge.control.orders import FLOWN_STRAIGHT_M
 from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAST_LEG_M = 0.5
@@ -31,9 +32,9 @@ BEYOND_M = 20.0
 """So far beside the ground that straight ways into the area lead over may a way round zones lead."""
 NEARER = 0.9
 """A way may lead as near to a zone as this part of how near a vehicle is already."""
-LEAST_ROOM = 0.4
-"""Part of the room beside a zone with which a straight way is better than one round: who is a little beside where its
-way was to begin would cross the zone."""
+CLEAR, NARROW = 0.9, 0.4
+"""Parts of the room beside a zone with which a way is clear of it, and with which a straight way is still better than
+one round it: who is a little beside where its way was to begin would cross the zone otherwise."""
 ROUND_TO = 40
 """Of the places where a vehicle may come in, about so many are looked at for a way round zones."""
 
@@ -136,7 +137,7 @@ def way_in(
         How far from zones corners lie: farther than a vehicle is from where it should be when it arrives.
     """
     entries = [entry for entry in _entries(constraints, place, inset_m) if _apart(constraints, entry, taken)]
-    for part in (1.0, LEAST_ROOM):
+    for part in (CLEAR, NARROW):
         for entry in entries:
             if not barred(constraints, place, entry, part * room_m):
                 return entry
@@ -197,15 +198,19 @@ def _first_corner(
         if any(barred(constraints, *leg) for leg in pairwise(stops)):
             continue
         # From where it was to be it sees the first one clear of zones; from beside it, at least clear enough.
-        corner = next(
-            stop
-            for part in (LEAST_ROOM, 0.0)
-            for stop in stops[:0:-1]
-            if (part == 0.0 or np.linalg.norm(stop - place) > room_m)
-            and not barred(constraints, place, stop, part * room_m)
-        )
-        return corner if _apart(constraints, corner, taken) else None
+        corners = [_flown_to(place, stop, room_m) for stop in stops[:0:-1]]
+        for part in (CLEAR, 0.0):
+            for corner in corners:
+                if not barred(constraints, place, corner, part * room_m):
+                    return corner if _apart(constraints, corner, taken) else None
     return None
+
+
+def _flown_to(place: FloatArray, goal: FloatArray, room_m: float) -> FloatArray:
+    """Return a goal, (2,), that a vehicle at the surface flies to: where it is close it would drift, motor off."""
+    way, least_m = goal - place, FLOWN_STRAIGHT_M + room_m
+    far_m = float(np.hypot(*way))
+    return goal if far_m >= least_m or far_m == 0.0 else place + way * (least_m / far_m)
 
 
 def distance_outside_m(area: Polygon, place: FloatArray) -> float:
