@@ -286,6 +286,48 @@ def test_the_way_in_goes_round_keep_out_zones() -> None:
     assert way.distance(zone) > 0
 
 
+@pytest.mark.parametrize("north_m", [26.0, 30.0, 33.0])
+@pytest.mark.parametrize("off_m", [0.0, 3.4])
+def test_a_vehicle_behind_a_zone_that_bars_every_straight_way_in_comes_round_it(north_m: float, off_m: float) -> None:
+    """It stayed behind it. ``off_m``: so far from where it is sent it arrives, on the side of the zone."""
+    wall = rectangle(-30, 12, -20, 48)
+    at, zone, legs = np.array([-40.0, north_m]), None, []
+    for _ in range(8):
+        decision, _, spec = decide_for(
+            [place("a", *at)], [], keep_out=[wall], limits={"keep_out_margin_m": 2.0, "max_step_m": 12.0}
+        )
+        (leg,) = decision.legs
+        assert leg.refusal == ""
+        assert leg.comes_in
+        assert leg.target_m[2] == 0.0
+        zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
+        legs.append(LineString([at, leg.target_m[:2]]))
+        assert np.linalg.norm(leg.target_m[:2] - at) > 17.0, "it drifts to what is closer"
+        way = leg.target_m[:2] - np.array(zone.centroid.coords[0])
+        at = leg.target_m[:2] - off_m * way / np.linalg.norm(way)
+        if area.contains(Point(leg.target_m[:2])):
+            break
+    assert area.contains(Point(legs[-1].coords[-1]))
+    assert min(leg.distance(zone) for leg in legs) > 1.99
+    assert (
+        "sent round a keep-out zone"
+        in decide_for(
+            [place("a", -40, north_m)], [], keep_out=[wall], limits={"keep_out_margin_m": 2.0, "max_step_m": 12.0}
+        )[0].notes[0]
+    )
+
+
+def test_a_vehicle_beyond_a_zone_close_to_the_border_is_not_planned_for_from_there() -> None:
+    """It was within ten metres of the border, and its leg would have led through the zone."""
+    quay = rectangle(-6, 20, -4, 40)
+    decision, planner, spec = decide_for([place("a", -9, 30)], [], keep_out=[quay], limits={"keep_out_margin_m": 1.0})
+    assert planner.asked == []
+    (leg,) = decision.legs
+    assert leg.comes_in
+    zone = Polygon(spec.to_local(spec.keep_out[0]))
+    assert LineString([(-9.0, 30.0), tuple(leg.target_m[:2])]).distance(zone) > 0.9
+
+
 def test_a_vehicle_without_a_way_in_stays_where_it_is() -> None:
     decision, _, _ = decide_for([place("a", -40, 35)], [], keep_out=[rectangle(-5, -500, 8, 500)])
     (leg,) = decision.legs

@@ -97,6 +97,8 @@ class Situation:
         How far each may still fly from its position; None: the remaining steps, each as long as a step may be.
     turns_take_way : bool
         Whether turns take some of that, as where time is counted; not where legs are, or their metres.
+    turn_radii_m : (n_vehicles,) or None
+        Of each vehicle's turning circle; None: as the planner's options say.
     swath : SwathTask or None
         What is to be ensonified, in a survey with swath sonars.
     at_rest : frozenset of str
@@ -118,6 +120,7 @@ class Situation:
     moving: BoolArray | None = None
     left_m: FloatArray | None = None
     turns_take_way: bool = True
+    turn_radii_m: FloatArray | None = None
     swath: SwathTask | None = None
     at_rest: frozenset[str] = frozenset()
 
@@ -136,6 +139,7 @@ class Situation:
             localization=None if self.localization is None else self.localization.of(rows),
             moving=None if self.moving is None else self.moving[rows],
             left_m=None if self.left_m is None else self.left_m[rows],
+            turn_radii_m=None if self.turn_radii_m is None else self.turn_radii_m[rows],
         )
 
 

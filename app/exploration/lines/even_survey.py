@@ -5,7 +5,8 @@ half flown. There are as many lines as the team can pay for, transits and turns 
 """
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from app.exploration.lines.lattice import Sweep, even_lines, most_lines
 
 MOST_ORDERS = 3
 """Teams up to this size are dealt the lines in every order."""
+MOST_TO_END = 0.5
+"""Lines end at most so many spacings inside the border: there the ways between them lie as an outer line would."""
+HALVINGS = 6
+"""How often the place of the lines' ends is halved in: to less than a hundredth of a spacing."""
 
 
 @dataclass(frozen=True)
@@ -48,26 +53,80 @@ class _Path:
 
 def even_survey(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern) -> EvenSurvey | None:
     """Return the survey of the most lines in the direction of ``sweep`` that the team can fly; None without any."""
-    u = sweep.to_uv(sweep.constraints.area)[:, 0]
-    low, high = float(u.min()), float(u.max())
-    orders = orders_across(sweep.to_uv(vehicles.en_m)[:, 0])
-    dealt: dict[int, list[FloatArray] | None] = {}
+    dealt: dict[int, EvenSurvey | None] = {}
 
-    def length_m(way: list[FloatArray]) -> float:
-        return sum(way_m(vehicles, turns, i, route) for i, route in enumerate(way))
-
-    def routes(n: int) -> list[FloatArray] | None:
+    def survey(n: int) -> EvenSurvey | None:
         if n not in dealt:
-            lines_u = even_lines(low, high, n, pattern.to_side, pattern.to_side)
-            inset_m = pattern.to_end * (high - low) / (n - 1 + 2 * pattern.to_side)
-            paths = [_path(sweep, lines_u, inset_m, pattern.parts, upwards=upwards) for upwards in (True, False)]
-            ways = (_dealt(sweep.free, vehicles, turns, path, order) for path in paths for order in orders)
-            dealt[n] = min((way for way in ways if way is not None), key=length_m, default=None)
+            dealt[n] = _survey_of(sweep, vehicles, [turns] * len(vehicles.en_m), pattern, n)
         return dealt[n]
 
-    n = most_lines(lambda k: routes(k) is not None)
-    found = routes(n)
-    return None if found is None else EvenSurvey(found, (high - low) / (n - 1 + 2 * pattern.to_side))
+    return survey(most_lines(lambda n: survey(n) is not None))
+
+
+def fullest_surveys(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern) -> list[EvenSurvey]:
+    """Return even surveys in the direction of ``sweep`` that leave the team as little to fly as may be.
+
+    How far lines end inside the border, up to half a spacing, makes up for what a whole line more or less would cost:
+    that far inside, the ways from line to line lie as an outer line would. Two numbers of lines, the largest that the
+    team can fly and one line less, each with ends as near to the border as it can fly. No survey is returned where the
+    team can fly none.
+
+    Parameters
+    ----------
+    turns
+        What they cost each vehicle.
+    pattern
+        How lines lie; where they end is found.
+    """
+
+    def ending(to_end: float) -> Pattern:
+        return replace(pattern, to_end=to_end)
+
+    def affordable(n: int, to_end: float) -> bool:
+        return next(_ways(sweep, vehicles, turns, ending(to_end), n), None) is not None
+
+    most = most_lines(lambda n: affordable(n, MOST_TO_END))
+    found: list[EvenSurvey] = []
+    for n in range(max(1, most - 1), most + 1):
+        low, high = 0.0, MOST_TO_END
+        if affordable(n, low):
+            high = low
+        for _ in range(HALVINGS if high > low else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if affordable(n, middle) else (middle, high)
+        survey = _survey_of(sweep, vehicles, turns, ending(high), n)
+        found += [] if survey is None else [survey]
+    return found
+
+
+def _survey_of(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern, n: int) -> EvenSurvey | None:
+    """Return the survey of ``n`` lines of a pattern that takes the least way; None where the team cannot fly it."""
+
+    def length_m(way: list[FloatArray]) -> float:
+        return sum(way_m(vehicles, turns[i], i, route) for i, route in enumerate(way))
+
+    found = min(_ways(sweep, vehicles, turns, pattern, n), key=length_m, default=None)
+    return None if found is None else EvenSurvey(found, _spacing_m(sweep, pattern, n))
+
+
+def _ways(
+    sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern, n: int
+) -> Iterator[list[FloatArray]]:
+    """Return the routes of all vehicles over ``n`` lines of a pattern, in every order in which the team can fly it."""
+    u = sweep.to_uv(sweep.constraints.area)[:, 0]
+    lines_u = even_lines(float(u.min()), float(u.max()), n, pattern.to_side, pattern.to_side)
+    inset_m = pattern.to_end * _spacing_m(sweep, pattern, n)
+    orders = orders_across(sweep.to_uv(vehicles.en_m)[:, 0])
+    for upwards in (True, False):
+        path = _path(sweep, lines_u, inset_m, pattern.parts, upwards=upwards)
+        for order in orders:
+            way = _dealt(sweep.free, vehicles, turns, path, order)
+            if way is not None:
+                yield way
+
+
+def _spacing_m(sweep: Sweep, pattern: Pattern, n: int) -> float:
+    return float(np.ptp(sweep.to_uv(sweep.constraints.area)[:, 0])) / (n - 1 + 2 * pattern.to_side)
 
 
 def orders_across(u: FloatArray) -> list[tuple[int, ...]]:
@@ -120,7 +179,7 @@ def _subdivided(stops: FloatArray, parts: int) -> FloatArray:
 
 
 def _dealt(
-    free: FreeSpace, vehicles: Vehicles, turns: Turns, path: _Path, order: tuple[int, ...]
+    free: FreeSpace, vehicles: Vehicles, turns: Sequence[Turns], path: _Path, order: tuple[int, ...]
 ) -> list[FloatArray] | None:
     """Return the routes when the vehicles take parts of the path in this order; None when they cannot fly it all."""
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(order)
@@ -146,10 +205,12 @@ def _dealt(
             while high - low > 1:
                 middle = (low + high) // 2
                 low, high = (
-                    (middle, high) if way_m(vehicles, turns, i, route(middle)) <= vehicles.left_m[i] else (low, middle)
+                    (middle, high)
+                    if way_m(vehicles, turns[i], i, route(middle)) <= vehicles.left_m[i]
+                    else (low, middle)
                 )
-            if low and (-low, way_m(vehicles, turns, i, route(low))) < (-best[0], best[1]):
-                best = low, way_m(vehicles, turns, i, route(low))
+            if low and (-low, way_m(vehicles, turns[i], i, route(low))) < (-best[0], best[1]):
+                best = low, way_m(vehicles, turns[i], i, route(low))
                 routes[i] = route(low)
         begin += best[0]
         if begin == end:

@@ -1,4 +1,4 @@
-"""The usual practice: evenly spaced parallel lines, an equal share of the area per vehicle."""
+"""Even parallel lines: a strip for each vehicle, as usual practice has it, or shared out over the whole area."""
 
 import itertools
 from dataclasses import replace
@@ -11,13 +11,31 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import CORNER_TOLERANCE, FreeSpace, metres_left, next_waypoint, vertices_passed
+from app.exploration.core.routes import (
+    CORNER_TOLERANCE,
+    FreeSpace,
+    Turns,
+    Vehicles,
+    metres_left,
+    next_waypoint,
+    vertices_passed,
+)
+from app.exploration.lines.even_survey import Pattern, fullest_surveys
 from app.exploration.lines.flown_lines import after_line
+from app.exploration.lines.ground import Ground
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, flown_length, longer_axis_rad, route_length
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
+SHARED = Pattern(parts=8)
+"""How lines lie that a team shares out."""
+ACROSS = 0.9
+"""Lines lie across the longer axis where the ground is closer to them by this factor, squared and on average."""
+LEAST_LEG_M = 5.0
+"""Who can fly no farther is done."""
+CORNER_LOSS = 0.4
+"""Part of a step that a corner costs where steps are counted: the leg to it ends early."""
 LEAST_BUDGET_M = 1.0
 """Also who can fly no farther has a strip, a very narrow one."""
 
@@ -26,6 +44,8 @@ def lawnmower_routes(
     constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float = 0.0
 ) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): lines along the longer axis, as many as fit into the distance it can travel.
+
+    This is the usual practice that surveys are compared with.
 
     Parameters
     ----------
@@ -46,6 +66,40 @@ def lawnmower_routes(
         low, high = float(cuts[strip]), float(cuts[strip + 1])
         routes[i] = boustrophedon(sweep, starts[i], low, high, float(budgets_m[i]), turn_radius_m=turn_radius_m)
     return routes
+
+
+def shared_lines(
+    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray, corner_m: float = 0.0
+) -> list[FloatArray]:
+    """Return each vehicle's route (k, 2): neighbouring ones of the most even lines that the team can fly together.
+
+    Lines lie along the longer axis, or across it where that brings the ground clearly nearer; vehicles may share one.
+    A team that cannot fly even one line begins those of :func:`lawnmower_routes`.
+
+    Parameters
+    ----------
+    constraints : Constraints
+        Give the area and its keep-out zones.
+    starts : (n_vehicles, 2)
+        Where the vehicles are.
+    budgets_m : (n_vehicles,)
+        Distances that the vehicles can travel, nearly all of which they do.
+    radii_m : (n_vehicles,)
+        Of the circles in which each turns, which takes some of those distances.
+    corner_m
+        What a corner takes of them besides.
+    """
+    free, axis = FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area)
+    vehicles = Vehicles(np.ascontiguousarray(starts), np.full(len(starts), np.nan), np.asarray(budgets_m, dtype=float))
+    ground, turns = Ground.of(constraints), [Turns(float(radius_m), corner_m) for radius_m in radii_m]
+    best: tuple[float, list[FloatArray]] | None = None
+    for direction, counts in ((axis, 1.0), (axis + np.pi / 2, 1.0 / ACROSS)):
+        for survey in fullest_surveys(Sweep(constraints, free, direction), vehicles, turns, SHARED):
+            ways = [np.vstack([start, route]) for start, route in zip(starts, survey.routes, strict=True)]
+            left_m2 = counts * float((ground.away_m(ways) ** 2).sum())
+            if best is None or left_m2 < best[0] * (1.0 - 1e-9):
+                best = left_m2, survey.routes
+    return lawnmower_routes(constraints, starts, budgets_m, float(np.max(radii_m))) if best is None else best[1]
 
 
 def route_across(
@@ -87,7 +141,7 @@ class LawnmowerPlanner(PlannerBase):
     """Follows the lines; a vehicle that leaves hands on its rest, one that joins takes half of the longest rest.
 
     A vehicle that can still fly when it has flown its lines, as one whose battery lasts longer than was sure at first,
-    gets more of them, across its strip.
+    gets more of them, across its strip; what is left then is flown as straight legs over ground that lines left out.
     """
 
     name: ClassVar[str] = "lawnmower"
@@ -100,6 +154,8 @@ class LawnmowerPlanner(PlannerBase):
         self._routes: dict[str, FloatArray] = {}
         self._passes: dict[str, int] = {}
         """How often vehicles got more lines."""
+        self._dealt: list[FloatArray] = []
+        """All ways that vehicles got, (k, 2) each."""
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
@@ -120,11 +176,13 @@ class LawnmowerPlanner(PlannerBase):
         return dict(self._routes)
 
     def _remember(self) -> dict[str, Any]:
-        return {"routes": self._routes, "passes": self._passes}
+        return {"routes": self._routes, "passes": self._passes, "dealt": self._dealt}
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._routes = {k: np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state["routes"].items()}
         self._passes = {k: int(count) for k, count in state.get("passes", {}).items()}
+        dealt = state.get("dealt", list(state["routes"].values()))
+        self._dealt = [np.array(way, dtype=np.float64).reshape(-1, 2) for way in dealt]
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
@@ -153,9 +211,13 @@ class LawnmowerPlanner(PlannerBase):
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
-    def _turn_radius_m(self, team: Situation) -> float:
-        counted = team.left_m is not None and team.turns_take_way
-        return self.options.turn_radius_m if counted else 0.0
+    def _turn_radii_m(self, team: Situation) -> FloatArray:
+        """Return the radius of each vehicle's circles, (n_vehicles,); 0 where turns take no way."""
+        if team.left_m is None or not team.turns_take_way:
+            return np.zeros(len(team.vehicles))
+        if team.turn_radii_m is None:
+            return np.full(len(team.vehicles), self.options.turn_radius_m)
+        return team.turn_radii_m
 
     def _left(self, team: Situation, i: int) -> float:
         return route_length(team.positions[i, :2], self._routes[team.vehicles[i]])
@@ -163,16 +225,30 @@ class LawnmowerPlanner(PlannerBase):
     def _go_on(self, team: Situation) -> frozenset[str]:
         """Give those that have flown their lines more of them; returns those that can fly no others."""
         en, left_m, done = team.positions[:, :2], metres_left(team), set()
+        radii_m = self._turn_radii_m(team).tolist()
         for i, name in enumerate(team.vehicles):
             if not team.moves[i] or self._left(team, i) > 0.0:
                 continue
             passes = self._passes.get(name, 0)
-            route = route_across(team.constraints, en, i, passes, float(left_m[i]), self._turn_radius_m(team))
+            route = route_across(team.constraints, en, i, passes, float(left_m[i]), radii_m[i])
             if route is not None:
-                self._routes[name], self._passes[name] = route, passes + 1
+                self._passes[name] = passes + 1
+            elif left_m[i] >= LEAST_LEG_M:
+                route = self._over_gaps(team, i, float(left_m[i]))
+            if route is not None:
+                self._routes[name] = route
+                self._dealt.append(np.vstack([en[i], route]))
             else:
                 done.add(name)
         return frozenset(done)
+
+    def _over_gaps(self, team: Situation, i: int, budget_m: float) -> FloatArray | None:
+        """Return the leg of a vehicle, (1, 2), over ground that is far from all lines; None where there is none."""
+        ground, free = Ground.of(team.constraints), FreeSpace(team.constraints, BORDER_MARGIN_M)
+        here_m, heading_rad = team.positions[i, :2], float(team.headings_rad[i])
+        radius_m = float(self._turn_radii_m(team)[i])
+        end_m = ground.best_end(free, ground.away_m(self._dealt), here_m, heading_rad, budget_m, radius_m)
+        return None if end_m is None else end_m[None]
 
     def _lead_round(self, team: Situation) -> None:
         """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere."""
@@ -190,7 +266,9 @@ class LawnmowerPlanner(PlannerBase):
         """Give every vehicle of the team a route."""
         en = team.positions[:, :2]
         if not self._routes.keys() & set(team.vehicles):
-            routes = lawnmower_routes(team.constraints, en, metres_left(team), self._turn_radius_m(team))
+            corner_m = CORNER_LOSS * team.constraints.max_step_m if team.left_m is None else 0.0
+            routes = shared_lines(team.constraints, en, metres_left(team), self._turn_radii_m(team), corner_m)
             self._routes = dict(zip(team.vehicles, routes, strict=True))
+            self._dealt = [np.vstack([here, route]) for here, route in zip(en, routes, strict=True)]
             return
         self._routes = hand_over(self._routes, team.vehicles, en)

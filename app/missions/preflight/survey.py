@@ -9,9 +9,10 @@ from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
 from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState, Position
-from app.missions.flight.decisions.decision import INSET_M, from_outside, make_constraints
+from app.missions.flight.decisions.decision import INSET_M, arrival_room_m, from_outside, make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
@@ -147,12 +148,12 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
                 message="it lies in a keep-out zone",
                 remedy="Bring it out of there, or change the zone",
             )
-        elif from_outside(_en_m(place), inner, live.spec) and way_in(constraints, _en_m(place), INSET_M, []) is None:
+        elif from_outside(_en_m(place), inner, live.spec) and not _comes_in(live.spec, constraints, _en_m(place)):
             yield CheckView(
                 id=name,
                 title=title,
                 status=PROBLEM,
-                message=f"it is {distance:.0f} m from the area, and a keep-out zone bars every straight way in",
+                message=f"it is {distance:.0f} m from the area, and a keep-out zone bars every way in",
                 remedy="Bring it to another side of the area, or change the zone",
             )
         elif distance > FAR_M:
@@ -166,6 +167,10 @@ def _places(live: LiveMission) -> Iterator[CheckView]:
         else:
             words = "in the area" if distance == 0 else f"{distance:.0f} m from the area"
             yield CheckView(id=name, title=title, status=OK, message=words)
+
+
+def _comes_in(spec: MissionSpec, constraints: Constraints, en_m: FloatArray) -> bool:
+    return way_in(constraints, en_m, INSET_M, [], arrival_room_m(spec)) is not None
 
 
 def _en_m(place: Point) -> FloatArray:

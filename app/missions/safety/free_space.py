@@ -1,6 +1,8 @@
 """Where there is room in the area: beside zones and other vehicles, for circles, ways in and what lies beyond a leg."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -11,6 +13,8 @@ from shapely.ops import nearest_points, unary_union
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.routes import FreeSpace
+from imc_bridge.control.orders import FLOWN_STRAIGHT_M
 from imc_bridge.control.plans import CIRCLE_RADIUS_M
 
 LEAST_LEG_M = 0.5
@@ -24,6 +28,15 @@ CIRCLE_WITHIN = 2.5
 """A circle farther from the target than so many radii is none of its leg's."""
 START_OUTSIDE_M = 2.0
 """A vehicle drifts at the surface: so far outside the area it may be when its leg begins."""
+BEYOND_M = 20.0
+"""So far beside the ground that straight ways into the area lead over may a way round zones lead."""
+NEARER = 0.9
+"""A way may lead as near to a zone as this part of how near a vehicle is already."""
+CLEAR, NARROW = 0.9, 0.4
+"""Parts of the room beside a zone with which a way is clear of it, and with which a straight way is still better than
+one round it: who is a little beside where its way was to begin would cross the zone otherwise."""
+ROUND_TO = 40
+"""Of the places where a vehicle may come in, about so many are looked at for a way round zones."""
 
 
 def lead_point(constraints: Constraints, start: FloatArray, target: FloatArray, lead_m: float) -> FloatArray:
@@ -104,9 +117,13 @@ def nearest_inside(area: Polygon, place: FloatArray) -> FloatArray:
 
 
 def way_in(
-    constraints: Constraints, place: FloatArray, inset_m: float, taken: Sequence[FloatArray]
+    constraints: Constraints, place: FloatArray, inset_m: float, taken: Sequence[FloatArray], room_m: float
 ) -> FloatArray | None:
-    """Return the nearest point of the area that a vehicle outside of it may go straight to; None when there is none.
+    """Return where a vehicle outside the area goes first that is to come into it; None when there is no way.
+
+    That is the nearest point of the area that it may go straight to. Where keep-out zones bar all of them, it is the
+    first corner of a way round these, hardly outside the ground that straight ways lead over: the next one is found
+    from there.
 
     Parameters
     ----------
@@ -116,26 +133,84 @@ def way_in(
         How far inside the border the point should lie.
     taken : sequence of (2,)
         Places of other vehicles, from which the point keeps the least separation.
+    room_m
+        How far from zones corners lie: farther than a vehicle is from where it should be when it arrives.
     """
-    zones = [Polygon(zone) for zone in constraints.keep_out]
-    ahead = [zone for zone in zones if not zone.contains(Point(place))]
+    entries = [entry for entry in _entries(constraints, place, inset_m) if _apart(constraints, entry, taken)]
+    for part in (CLEAR, NARROW):
+        for entry in entries:
+            if not barred(constraints, place, entry, part * room_m):
+                return entry
+    corner = _first_corner(constraints, place, entries[:: max(1, len(entries) // ROUND_TO)], taken, room_m)
+    if corner is not None:
+        return corner
+    return next((entry for entry in entries if not barred(constraints, place, entry)), None)
+
+
+def barred(constraints: Constraints, place: FloatArray, goal: FloatArray, room_m: float = 0.0) -> bool:
+    """Return whether a keep-out zone that a vehicle is not in lies between it and a goal, both (2,).
+
+    Or closer than ``room_m`` to the way, where the vehicle is not that close itself.
+    """
+    leg, here = LineString([place, goal]), Point(place)
+    for zone in map(Polygon, constraints.keep_out):
+        if not zone.contains(here) and zone.distance(leg) <= min(room_m, NEARER * zone.distance(here)):
+            return True
+    return False
+
+
+def _entries(constraints: Constraints, place: FloatArray, inset_m: float) -> list[FloatArray]:
+    """Return places at the area's border, and at that of its zones, (n of (2,)), the nearest one first."""
     free: BaseGeometry = Polygon(constraints.area).buffer(-inset_m)
     if free.is_empty:
         free = Polygon(constraints.area)
-    for zone in zones:
-        free = free.difference(zone.buffer(LEAD_CLEARANCE_M))
+    for zone in constraints.keep_out:
+        free = free.difference(Polygon(zone).buffer(LEAD_CLEARANCE_M))
     if free.is_empty:
-        return None
+        return []
     border = free.boundary
     spacing = max(border.length / ENTRY_POINTS, inset_m)
     along = np.arange(0.0, border.length, spacing)
     points = [nearest_points(free, Point(place))[0], *(border.interpolate(distance) for distance in along)]
-    for goal in sorted(points, key=Point(place).distance):
-        leg = LineString(np.array([place, (goal.x, goal.y)]))
-        apart = all(goal.distance(Point(other)) >= constraints.min_separation_m for other in taken)
-        if apart and not any(zone.intersects(leg) for zone in ahead):
-            return np.array([goal.x, goal.y])
+    return [np.array([goal.x, goal.y]) for goal in sorted(points, key=Point(place).distance)]
+
+
+def _apart(constraints: Constraints, goal: FloatArray, taken: Sequence[FloatArray]) -> bool:
+    return all(np.linalg.norm(goal - other) >= constraints.min_separation_m for other in taken)
+
+
+def _first_corner(
+    constraints: Constraints,
+    place: FloatArray,
+    entries: Sequence[FloatArray],
+    taken: Sequence[FloatArray],
+    room_m: float,
+) -> FloatArray | None:
+    """Return how far a vehicle goes straight along a way round zones to the first of the entries that has one, (2,)."""
+    ground = (
+        Polygon(constraints.area).union(Point(place)).convex_hull.buffer(BEYOND_M + 0.5 * room_m, join_style="mitre")
+    )
+    ahead = tuple(zone for zone in constraints.keep_out if not Polygon(zone).contains(Point(place)))
+    # Free space keeps off zones by twice its margin, off the border by once.
+    free = FreeSpace(replace(constraints, area=np.array(ground.exterior.coords)[:-1], keep_out=ahead), 0.5 * room_m)
+    for entry in entries:
+        stops = [place, *free.way(place, entry)]
+        if any(barred(constraints, *leg) for leg in pairwise(stops)):
+            continue
+        # From where it was to be it sees the first one clear of zones; from beside it, at least clear enough.
+        corners = [_flown_to(place, stop, room_m) for stop in stops[:0:-1]]
+        for part in (CLEAR, 0.0):
+            for corner in corners:
+                if not barred(constraints, place, corner, part * room_m):
+                    return corner if _apart(constraints, corner, taken) else None
     return None
+
+
+def _flown_to(place: FloatArray, goal: FloatArray, room_m: float) -> FloatArray:
+    """Return a goal, (2,), that a vehicle at the surface flies to: where it is close it would drift, motor off."""
+    way, least_m = goal - place, FLOWN_STRAIGHT_M + room_m
+    far_m = float(np.hypot(*way))
+    return goal if far_m >= least_m or far_m == 0.0 else place + way * (least_m / far_m)
 
 
 def distance_outside_m(area: Polygon, place: FloatArray) -> float:

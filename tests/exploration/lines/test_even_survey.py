@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, Turns, Vehicles, flown_m
-from app.exploration.lines.even_survey import EvenSurvey, Pattern, even_survey
+from app.exploration.lines.even_survey import EvenSurvey, Pattern, even_survey, fullest_surveys
 from app.exploration.lines.lattice import Sweep
 from app.exploration.lines.lawnmower import lawnmower_routes
 
@@ -91,3 +91,27 @@ def test_lawnmowers_strips_are_in_proportion_to_what_vehicles_can_fly() -> None:
     assert np.ptp(fast[:, 0]) > 2.0 * np.ptp(slow[:, 0])
     for start, route, most in zip(STARTS, (slow, fast), (800.0, 2400.0), strict=False):
         assert flown_m(start[0], start[1], np.nan, route, Turns(0.0, 0.0)) <= most
+
+
+def fullest(left_m: FloatArray, radius_m: float, *, along: bool) -> list[EvenSurvey]:
+    constraints = Constraints(AREA)
+    sweep = Sweep(constraints, FreeSpace(constraints, 0.5), np.pi / 2 if along else 0.0)
+    vehicles = Vehicles(STARTS[: len(left_m)], np.full(len(left_m), np.nan), left_m)
+    return fullest_surveys(sweep, vehicles, [Turns(radius_m, 0.0)] * len(left_m), Pattern(parts=8))
+
+
+@given(left_m=st.lists(st.floats(900.0, 4000.0), min_size=1, max_size=3), radius_m=st.floats(0.0, 6.0))
+@settings(max_examples=10, deadline=None)
+def test_where_lines_end_makes_up_for_what_a_whole_line_would_cost(left_m: list[float], radius_m: float) -> None:
+    most_m, turns = np.array(left_m), Turns(radius_m, 0.0)
+    best = 0.0
+    for found in fullest(most_m, radius_m, along=False):
+        starts = STARTS[: len(most_m)]
+        way_m = [flown_m(at[0], at[1], np.nan, route, turns) for at, route in zip(starts, found.routes, strict=True)]
+        assert (np.array(way_m) <= most_m).all()
+        best = max(best, float(np.sum(way_m)))
+    assert best > 0.88 * most_m.sum()
+
+
+def test_no_lines_are_told_where_the_team_can_fly_none() -> None:
+    assert fullest(np.array([40.0, 50.0]), 0.0, along=True) == []

@@ -1,4 +1,4 @@
-"""What a vehicle of a lawnmower survey flies that has flown its own lines."""
+"""Which lines the vehicles of a lawnmower survey fly, and what one flies that has flown its own."""
 
 from dataclasses import replace
 
@@ -10,8 +10,15 @@ from shapely import LineString, Polygon
 
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
+from app.exploration.lines.ground import Ground
 from app.exploration.lines.lattice import flown_length, route_length
-from app.exploration.lines.lawnmower import LawnmowerPlanner, lawnmower_routes, route_across
+from app.exploration.lines.lawnmower import (
+    LEAST_LEG_M,
+    LawnmowerPlanner,
+    lawnmower_routes,
+    route_across,
+    shared_lines,
+)
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 
@@ -40,13 +47,57 @@ def test_no_more_lines_are_begun_than_a_vehicle_has_way_for_with_its_turns(radiu
         assert 2 <= len(route) <= len(without)
 
 
+@given(radius_m=st.floats(0.5, 12.0), budget_m=st.floats(1200.0, 6000.0))
+@settings(max_examples=8, deadline=None)
+def test_nobody_is_dealt_more_than_it_has_way_for_with_its_turns(radius_m: float, budget_m: float) -> None:
+    routes = shared_lines(Constraints(AREA), TEAM, np.full(3, budget_m), np.full(3, radius_m))
+    flown_m = [flown_length(start, route, radius_m) for start, route in zip(TEAM, routes, strict=True)]
+    assert max(flown_m) <= budget_m
+    assert min(flown_m) > 0.0
+
+
+@pytest.mark.parametrize("budgets_m", [(1100.0, 1100.0, 1100.0), (2500.0, 1000.0, 1000.0), (600.0, 600.0, 3000.0)])
+@pytest.mark.parametrize("radius_m", [0.0, 5.0])
+def test_lines_take_most_of_what_every_vehicle_can_fly(budgets_m: tuple[float, float, float], radius_m: float) -> None:
+    routes = shared_lines(Constraints(AREA), TEAM, np.array(budgets_m), np.full(3, radius_m))
+    flown_m = np.array([flown_length(start, route, radius_m) for start, route in zip(TEAM, routes, strict=True)])
+    assert (flown_m <= np.array(budgets_m)).all()
+    assert flown_m.sum() >= 0.92 * np.sum(budgets_m)
+    assert (flown_m >= 0.75 * np.array(budgets_m)).all()
+
+
+def test_lines_leave_no_ground_much_farther_from_them_than_half_their_distance() -> None:
+    budget_m = 1500.0
+    routes = shared_lines(Constraints(AREA), TEAM, np.full(3, budget_m), np.zeros(3))
+    away_m = Ground.of(Constraints(AREA)).away_m([np.vstack([at, way]) for at, way in zip(TEAM, routes, strict=True)])
+    spacing_m = WIDTH * HEIGHT / (3 * budget_m)
+    assert away_m.max() < 0.85 * spacing_m, "the farthest are between the ends of lines, at the border"
+    assert np.quantile(away_m, 0.95) < 0.6 * spacing_m
+
+
 @pytest.mark.parametrize("turns_take_way", [True, False])
 def test_turns_are_counted_where_they_take_way(turns_take_way: bool) -> None:
-    planner = create_planner("lawnmower", PlannerOptions(turn_radius_m=8.0))
-    told = replace(situation(1300.0, (2.0, 2.0)), turns_take_way=turns_take_way)
-    planner.propose(told, np.random.default_rng(0))
-    [route] = planner.ways_ahead_m().values()
-    assert len(np.unique(route[:, 0].round(3))) == (3 if turns_take_way else 4), "lines of 299 m"
+    planner, left_m, radius_m = create_planner("lawnmower", PlannerOptions(turn_radius_m=8.0)), 1300.0, 8.0
+    place = (2.0, 2.0)
+    proposal = planner.propose(
+        replace(situation(left_m, place), turns_take_way=turns_take_way), np.random.default_rng(0)
+    )
+    [ahead] = planner.ways_ahead_m().values()
+    route = np.vstack([proposal.positions[:, :2], ahead])
+    assert route_length(np.array(place), route) <= left_m
+    counted_m = flown_length(np.array(place), route, radius_m if turns_take_way else 0.0)
+    assert 0.9 * left_m < counted_m <= left_m + 1.0
+    assert (flown_length(np.array(place), route, radius_m) <= left_m + 1.0) == turns_take_way
+
+
+def test_each_vehicle_pays_for_turns_by_its_own_circles() -> None:
+    """All paid for the widest of the team's: a slow one beside a fast one had way left when its lines were flown."""
+    radii_m, budgets_m = np.array([10.0, 4.0, 4.0]), np.array([2500.0, 1000.0, 1000.0])
+    routes = shared_lines(Constraints(AREA), TEAM, budgets_m, radii_m)
+    by_own = [flown_length(at, way, r) for at, way, r in zip(TEAM, routes, radii_m, strict=True)]
+    by_widest = [flown_length(at, way, 10.0) for at, way in zip(TEAM, routes, strict=True)]
+    assert (np.array(by_own) <= budgets_m).all()
+    assert max(by_widest[1:]) > 1000.0
 
 
 def test_lines_along_follow_those_across() -> None:
@@ -100,8 +151,8 @@ def test_a_vehicle_whose_battery_lasts_longer_than_was_sure_does_not_wait_where_
     assert proposal.done == {"a"}, "who can fly no further line is done"
 
 
-def test_who_has_flown_its_lines_and_can_fly_no_other_one_is_done() -> None:
-    """It circled where its lines ended until its way was used up: up to a line's length."""
+def test_who_has_flown_its_lines_flies_over_gaps_and_is_done_when_its_way_is_used_up() -> None:
+    """It circled where its lines ended until its way was used up, later it was done: up to a line's length was lost."""
     planner, rng, place, left_m = create_planner("lawnmower"), np.random.default_rng(0), (2.0, 2.0), 1100.0
     for _ in range(100):
         proposal = planner.propose(situation(left_m, place), rng)
@@ -112,7 +163,7 @@ def test_who_has_flown_its_lines_and_can_fly_no_other_one_is_done() -> None:
         assert moved_m > 0.5, "it always has somewhere to go"
         left_m, place = left_m - moved_m, (float(east), float(north))
     assert proposal.done == {"a"}
-    assert 20.0 < left_m < HEIGHT
+    assert 0.0 <= left_m < LEAST_LEG_M, "it flies over ground between its lines for as long as it can"
 
 
 def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:

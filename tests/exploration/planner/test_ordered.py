@@ -65,8 +65,8 @@ def test_a_vehicle_gets_where_it_is_ordered_round_zones_and_inside_the_area(
 def test_a_place_nobody_may_be_at_ends_the_order_and_not_the_survey() -> None:
     constraints = Constraints(SQUARE, max_step_m=10.0, max_depth_m=20.0, min_separation_m=5.0)
     planner, situation = planner_of("lawnmower"), make_situation(constraints=constraints)
-    here = fly(planner, situation, 3)[-1]
-    # The other one waits there, and does not move.
+    here = fly(planner, situation, 8)[-1]
+    # The other one waits there, off the lines of the first, and does not move.
     planner.lead("a", 4, here[1:, :2], np.zeros((0, 2)), here[0, :2])
     alone = replace(situation, positions=here, moving=np.array([True, False]))
     places = fly(planner, alone, 12)

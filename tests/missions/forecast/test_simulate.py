@@ -125,16 +125,10 @@ def left_of_a_slow_and_a_quick_one(planner: str, **budget: float) -> tuple[StepF
     return last, spec
 
 
-def test_a_vehicle_that_can_fly_no_further_line_has_nothing_left_in_a_forecast() -> None:
-    """Its rest was drawn out, as if there had been no time to fly it."""
-    last, _ = left_of_a_slow_and_a_quick_one("lawnmower", km_per_vehicle=0.31)
-    assert last.left_m == 0.0
-    assert last.distance_m[1] < 310.0, "no whole line is left"
-
-
-def test_a_slow_vehicle_beside_a_quick_one_has_nothing_left_in_a_forecast() -> None:
+@pytest.mark.parametrize(("planner", "km"), [("cao", 0.2), ("lawnmower", 0.31)])
+def test_a_slow_vehicle_beside_a_quick_one_has_nothing_left_in_a_forecast(planner: str, km: float) -> None:
     """What it flew after the quick one's last leg was drawn out, as if there had been no time to fly it."""
-    last, spec = left_of_a_slow_and_a_quick_one("cao", km_per_vehicle=0.2)
+    last, spec = left_of_a_slow_and_a_quick_one(planner, km_per_vehicle=km)
     assert last.left_m <= 2 * least_way_m(spec)
     assert last.distance_m[1] > 150.0
 

@@ -70,7 +70,7 @@ async def test_vehicles_go_over_into_the_next_block_clear_of_zones_and_of_each_o
             assert {str(waypoint.status) for waypoint in view.waypoints} == {"reached"}
             said = [event.message for event in await events_after(await service.get(second.id))]
             assert any("m outside the area: it is sent to the border" in words for words in said), said
-            assert not [words for words in said if "keep-out zone" in words], said
+            assert not [words for words in said if "crosses a keep-out zone" in words], said
             assert (await view_of(service, second.id)).after == first.id
 
             async with harbour.database.reading() as session:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 
 from app.arrays import BoolArray, FloatArray
 from app.estimation import Sensor, SingleBeam
@@ -173,7 +173,7 @@ def make_constraints(spec: MissionSpec) -> Constraints:
     margins = [free_space.widened(zone, limits.keep_out_margin_m) for zone in zones if limits.keep_out_margin_m > 0]
     area = spec.local_inner_area()
     # A search keeps off everything by more than a vehicle's arrival radius.
-    room_m = spec.arrival_radius_m + REACTS_WITHIN_M if spec.search is None else 0.0
+    room_m = arrival_room_m(spec) if spec.search is None else 0.0
     return Constraints(
         area=area,
         # A vehicle that came too near by turning may leave the margin by any way but one through the zone itself.
@@ -189,6 +189,11 @@ def make_constraints(spec: MissionSpec) -> Constraints:
         min_vertical_separation_m=limits.min_vertical_separation_m,
         climb=travel_depth.RISE,
     )
+
+
+def arrival_room_m(spec: MissionSpec) -> float:
+    """Return how far at most a vehicle is from where its leg ends when it begins the next one."""
+    return spec.arrival_radius_m + REACTS_WITHIN_M
 
 
 def turn_radius_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:
@@ -347,7 +352,10 @@ def _planned_for(
     legs: list[Leg] = []
     for place in places:
         outside_m = free_space.distance_outside_m(polygon, place.en_m)
-        far = from_outside(place.en_m, polygon, spec)
+        border = free_space.nearest_inside(polygon, place.en_m)
+        # Who is beyond a zone at the border is not planned for as if it were there.
+        cut_off = outside_m > arrival_room_m(spec) and free_space.barred(constraints, place.en_m, border)
+        far = cut_off or from_outside(place.en_m, polygon, spec)
         if far and not place.moving:
             continue
         if far and site_unknown:
@@ -358,8 +366,9 @@ def _planned_for(
             legs.append(Leg(place.vehicle, np.append(place.en_m, 0.0), refusal))
         elif far:
             others = [p.en_m for p in places if p is not place] + [other.target_m[:2] for other in legs]
-            leg = _come_in(place, constraints, others)
-            what = leg.refusal or "it is sent to the border"
+            leg = _come_in(place, constraints, others, arrival_room_m(spec))
+            inside = polygon.contains(Point(leg.target_m[:2]))
+            what = leg.refusal or ("it is sent to the border" if inside else "it is sent round a keep-out zone")
             notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
             legs.append(leg)
         elif outside_m > 0:
@@ -386,6 +395,7 @@ def _situation(
     """Return what the planner is asked about vehicles that are at ``origin``, (n, 3)."""
     moving = np.array([p.moving for p in team])
     left_m = np.array([p.left_m for p in team])
+    radii_m = {vehicle.name: turn_radius_m(spec, vehicle) for vehicle in spec.vehicles}
     doubtful_en_m = knowledge.doubtful_en_m
     return Situation(
         step=step,
@@ -402,6 +412,7 @@ def _situation(
         moving=None if moving.all() else moving,
         left_m=None if np.isnan(left_m).any() else left_m,
         turns_take_way=spec.budget.minutes is not None,
+        turn_radii_m=np.array([radii_m.get(place.vehicle, place.turn_radius_m) for place in team]),
         swath=knowledge.swath,
         at_rest=frozenset(place.vehicle for place in team if place.at_rest),
     )
@@ -466,11 +477,14 @@ def surfacing(team: list[Place], policy: SurfacePolicy | None) -> tuple[list[boo
     return up, told
 
 
-def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray]) -> Leg:
-    """Send a vehicle that is far outside to the area's border, clear of keep-out zones and of others (n of (2,))."""
-    goal = free_space.way_in(constraints, place.en_m, INSET_M, taken)
+def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray], room_m: float) -> Leg:
+    """Send a vehicle that is far outside to the area's border, clear of keep-out zones and of others (n of (2,)).
+
+    Where no straight way leads there it is sent to the first corner of a way round zones, ``room_m`` from them.
+    """
+    goal = free_space.way_in(constraints, place.en_m, INSET_M, taken, room_m)
     if goal is None:
-        return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every straight way in")
+        return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every way in")
     # The bottom on the way is unknown: it comes at the surface.
     return Leg(place.vehicle, np.append(goal, 0.0), comes_in=True)
 

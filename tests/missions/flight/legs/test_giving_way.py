@@ -98,9 +98,9 @@ async def test_who_waits_waits_no_longer_than_a_minute(scene: PlacedVehicles) ->
 
 
 def test_vehicles_whose_lines_lead_past_each_other_pass_and_survey(monkeypatch: pytest.MonkeyPatch) -> None:
-    routes = lawnmower.lawnmower_routes
+    routes = lawnmower.shared_lines
     # Each has the other's strip, at one depth: neither could set out while the other stood in its way.
-    monkeypatch.setattr(lawnmower, "lawnmower_routes", lambda *given: routes(*given)[::-1])
+    monkeypatch.setattr(lawnmower, "shared_lines", lambda *given: routes(*given)[::-1])
     frame, side_m = LocalFrame(LAT, LON), 60.0
 
     def lon_lat(east_m: float, north_m: float) -> list[float]:
