@@ -369,12 +369,19 @@ class SimFleetLink(FleetLink):
             then_s = now_s
             while left_s > 0.0:
                 for deployed in list(self._deployed.values()):
-                    for event in self._advance(deployed, min(left_s, PIECE_S)):
-                        self._sink(event)
+                    self._live_through(deployed, min(left_s, PIECE_S))
                     if loop.time() - now_s > PAUSE_S:
                         await asyncio.sleep(0)
                         now_s = loop.time()
                 left_s -= PIECE_S
+
+    def _live_through(self, deployed: DeployedVehicle, passed_s: float) -> None:
+        """Let time pass for one vehicle, and tell what came of it; what goes wrong with it holds no other up."""
+        try:
+            for event in self._advance(deployed, passed_s):
+                self._sink(event)
+        except Exception:
+            log.exception("a simulated vehicle could not live on for a moment", vehicle=deployed.body.name)
 
     def _advance(self, deployed: DeployedVehicle, passed_s: float) -> list[FleetEvent]:
         events: list[FleetEvent] = []

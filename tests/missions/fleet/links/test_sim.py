@@ -80,6 +80,30 @@ async def test_one_that_is_asked_to_be_fast_is() -> None:
     assert max(speeds) == pytest.approx(2.5, abs=0.1)
 
 
+async def test_one_whose_report_cannot_be_taken_in_holds_nobody_up() -> None:
+    events: list[FleetEvent] = []
+    refused: list[FleetEvent] = []
+
+    def sink(event: FleetEvent) -> None:
+        if event.vehicle == "other" and len(refused) < 3:
+            refused.append(event)
+            raise ValueError("not to be taken in")
+        events.append(event)
+
+    link = SimFleetLink(SimulationSettings(), 20.0)
+    await link.start(sink)
+    try:
+        link.launch(replace(launch(BatterySpec()), vehicle="other", start=None))
+        link.launch(launch(BatterySpec()))
+        await link.engage(NAME)
+        await link.order(order(1, 50, 40))
+        await until(lambda: has_arrived(events), "it has arrived", 60.0)
+        await until(lambda: any(e.vehicle == "other" for e in events), "the other one lives, too", 60.0)
+    finally:
+        await link.close()
+    assert len(refused) == 3
+
+
 async def test_one_that_joins_others_under_way_is_put_to_sea_far_from_them() -> None:
     link = SimFleetLink(SimulationSettings(), 1.0)
     await link.start(lambda _event: None)
