@@ -142,6 +142,7 @@ class LiveMission:
         """Why no vehicle may be sent anywhere now; empty while at least one may."""
         self.running_since_s: float | None = None
         self._counting = False
+        """Whether what vehicles fly is counted: while the flight goes on, until that is stored at its end."""
         self.database = database
         """What is written through it is refused once another process has the mission."""
         self.waypoints = WaypointViews(spec, self.team, self.broadcaster)

@@ -15,7 +15,7 @@ from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
 from app.missions.forecast.simulate import Forecast, fly, fly_over, forecast
-from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm
+from app.missions.forecast.swarm import Flown, SoFar, Swarm
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
@@ -111,10 +111,11 @@ def test_time_that_is_up_leaves_a_forecast_that_says_so() -> None:
     assert view.coverage_pct_range.high < 20.0
 
 
-def left_of_a_slow_and_a_quick_one(planner: str, **budget: float) -> tuple[StepFlown, MissionSpec]:
-    """Return the last that a forecast tells of them, and their mission."""
+@pytest.mark.parametrize(("planner", "km"), [("cao", 0.2), ("lawnmower", 0.31)])
+def test_a_slow_vehicle_beside_a_quick_one_has_nothing_left_in_a_forecast(planner: str, km: float) -> None:
+    """What it flew after the quick one's last leg was drawn out, as if there had been no time to fly it."""
     vehicles = [{"name": name, "kind": "sim", "speed_mps": mps} for name, mps in (("quick", 2.0), ("slow", 1.0))]
-    spec = sim_spec(side_m=60.0, vehicles=vehicles, planner={"name": planner}, budget=budget)
+    spec = sim_spec(side_m=60.0, vehicles=vehicles, planner={"name": planner}, budget={"km_per_vehicle": km})
     team = Team()
     members = [team.join(vehicle, slot) for slot, vehicle in enumerate(spec.vehicles)]
     starts, _ = request.starts_of(spec, members)
@@ -122,13 +123,6 @@ def left_of_a_slow_and_a_quick_one(planner: str, **budget: float) -> tuple[StepF
     builder = MapBuilder(spec.local_area(), spec.cell_m, spec.accuracy_m)
     builder.build()
     *_, last = fly(spec, members, starts, builder, floor.terrain)
-    return last, spec
-
-
-@pytest.mark.parametrize(("planner", "km"), [("cao", 0.2), ("lawnmower", 0.31)])
-def test_a_slow_vehicle_beside_a_quick_one_has_nothing_left_in_a_forecast(planner: str, km: float) -> None:
-    """What it flew after the quick one's last leg was drawn out, as if there had been no time to fly it."""
-    last, spec = left_of_a_slow_and_a_quick_one(planner, km_per_vehicle=km)
     assert last.left_m <= 2 * least_way_m(spec)
     assert last.distance_m[1] > 150.0
 

@@ -166,15 +166,26 @@ async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float
     events: list[FleetEvent] = []
     link = SimFleetLink(SimulationSettings(current_mps=current), 50.0)
     await link.start(events.append)
-
+    goals = [(50, 60), (80, 60), (20, 60), (20, 20)]
     try:
         link.launch(launch(BatterySpec()))
         await link.engage(NAME)
-        for step, (east, north) in enumerate([(50, 60), (80, 60), (20, 60), (20, 20)]):
+        for step, (east, north) in enumerate(goals):
             await link.order(order(step, east, north))
             await until(partial(has_arrived, events, step), f"step {step} is reached")
     finally:
         await link.close()
+    told: dict[int, Position] = {}
+    here = Position(LAT, LON, 0.0)
+    for event in events:
+        if isinstance(event, VehicleReport):
+            here = event.position
+        elif isinstance(event, WaypointReport) and event.status is WaypointStatus.REACHED:
+            told[event.step] = here
+    assert list(told) == list(range(len(goals))), "each once, in order"
+    for step, goal in enumerate(goals):
+        at = FLOOR.frame.to_local(told[step].lat_deg, told[step].lon_deg)
+        assert np.hypot(*np.subtract(at, goal)) <= 4.0 + 0.1, "within the radius in which it has arrived"
 
 
 async def test_it_climbs_over_a_bank_and_goes_down_behind_it(tmp_path: Path) -> None:
