@@ -19,6 +19,7 @@ from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import DenserOrder, GoOrder, OrderState, RepeatOrder
 from app.missions.states import MissionState
+from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import WaypointRow
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step
@@ -39,6 +40,16 @@ async def flying(service: MissionService, spec: MissionSpec, step: int = 4) -> L
     await act(service, mission.id, "start")
     await until_step(service, mission.id, step)
     return await service.get(mission.id)
+
+
+async def until_told(*members: Member) -> None:
+    """Wait until vehicles have reported their position once more."""
+    before = [member.report for member in members]
+
+    def told() -> bool:
+        return all(member.report is not was for member, was in zip(members, before, strict=True))
+
+    await until(told, "they report again")
 
 
 async def until_over(live: LiveMission, order_id: int, state: OrderState = OrderState.DONE) -> None:
@@ -179,14 +190,19 @@ async def test_holding_everybody_is_a_pause(service: MissionService) -> None:
     live = await flying(service, survey("a", "b", steps=15), step=2)
     await hold(live, "a", "Ana")
     await hold(live, "b", "Ana")
-    a = live.team.members["a"]
-    await until(lambda: a.withdrawal is not None and a.withdrawal.led, "a is held")
-    legs = {member.name: member.legs for member in live.team}
-    await asyncio.sleep(0.3)
-    assert {member.name: member.legs for member in live.team} == legs
+    a, b = live.team.members["a"], live.team.members["b"]
+
+    def held() -> bool:
+        return all(m.withdrawal is not None and m.withdrawal.led and not m.ordered and not m.ahead for m in (a, b))
+
+    await until(held, "both have given up their legs")
+    # A leg that was being decided when they were held may still be counted; nobody flies it.
+    for _ in range(5):
+        await until_told(a, b)
+        assert held()
     assert live.header.state is MissionState.RUNNING
     await service.send_on(live, "b", "Ana")
-    await until(lambda: live.team.members["b"].legs == 15 and not live.team.members["b"].ordered, "b is done")
+    await until(lambda: b.legs == 15 and not b.ordered, "b is done")
     assert live.header.state is MissionState.RUNNING, "a still waits for a person"
     await service.send_on(live, "a", "Ana")
     await until_state(service, live.id, MissionState.FINISHED)
