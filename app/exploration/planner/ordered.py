@@ -28,6 +28,8 @@ PARTS = (1.0, 0.6, 0.3)
 MOST_TRIES = 3
 """So many legs in a row that come to nothing end an order."""
 
+STILL_M = 1e-3
+"""A shorter leg comes to nothing."""
 
 MOST_LOST = 6
 """So often legs of an order are given up before the order is."""
@@ -48,6 +50,11 @@ class OrderedWay:
     tries: int = 0
     passed_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     lost: int = 0
+
+    def pass_corner(self) -> None:
+        """Go on with the next corner."""
+        self.passed_m = np.vstack([self.passed_m, self.corners_m[:1]])
+        self.corners_m, self.tries = self.corners_m[1:], 0
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored."""
@@ -141,6 +148,12 @@ class OrderedPlanner:
         if way.lost > MOST_LOST:
             self._refuse(vehicle, way, "its legs there came to nothing again and again")
 
+    def reach(self, vehicle: str, place_m: FloatArray) -> None:
+        """Take note that a vehicle has been where a leg ended, (2,), however near it came to that."""
+        way = self.ways.get(vehicle)
+        if way is not None and len(way.corners_m) and np.hypot(*(way.corners_m[0] - place_m)) <= NEAR_M:
+            way.pass_corner()
+
     def go_round(self, vehicle: str, ends_m: FloatArray) -> None:
         """Lead a vehicle to where its planned legs were to end, (n, 2), round what barred them from where it was.
 
@@ -204,8 +217,7 @@ class OrderedPlanner:
         if way is None:
             return False
         while len(way.corners_m) and np.hypot(*(way.corners_m[0] - place_m[:2])) <= NEAR_M:
-            way.passed_m = np.vstack([way.passed_m, way.corners_m[:1]])
-            way.corners_m, way.tries = way.corners_m[1:], 0
+            way.pass_corner()
         if way.tries >= MOST_TRIES:
             self._refuse(vehicle, way, self.refused.get(vehicle, (0, "no leg there is allowed"))[1])
             return False
@@ -235,6 +247,10 @@ class OrderedPlanner:
             tries[k, row, :2] = here_m + part * whole_m / max(away_m, 1e-12) * (corner_m - here_m)
         tries = at_depth(constraints, bottom, origin, tries[..., :2], positions[:, 2])
         allowed = np.flatnonzero(constraints.feasible(origin, tries, bottom))
+        if whole_m <= STILL_M:
+            way.tries += 1
+            self.refused[situation.vehicles[row]] = (way.order, "nobody may go nearer to where it was ordered")
+            return np.asarray(origin[row])
         if len(allowed):
             way.tries = 0
             return np.asarray(tries[allowed[0], row])

@@ -20,6 +20,7 @@ from app.exploration.lines.flown_lines import flown_lines, length_m, line_now
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.clock import now
 from app.missions.errors import ConflictError
+from app.missions.fleet.interface import WaypointStatus
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.live.mission import LiveMission
@@ -330,6 +331,9 @@ class OrderBook:
         if refused is not None and refused[0] == order.id and member.name not in planner.ways:
             await self._over(member, order, OrderState.FAILED, refused[1])
             return
+        if member.status is WaypointStatus.REACHED and member.target_m is not None:
+            # Who needs its next leg only then is planned for from where it is, which may be an arrival radius away.
+            planner.reach(member.name, member.target_m)
         way = planner.ways.get(member.name)
         if way is not None and (way.order != order.id or len(way.corners_m)):
             return

@@ -76,6 +76,31 @@ def test_a_place_nobody_may_be_at_ends_the_order_and_not_the_survey() -> None:
     assert np.hypot(*(places[-1][0] - places[-3][0])[:2]) > 5.0, "it goes on with its lines"
 
 
+def test_a_place_outside_ends_the_order_where_nobody_can_come_nearer() -> None:
+    constraints = Constraints(SQUARE, max_step_m=10.0, max_depth_m=20.0)
+    planner, situation = planner_of("lawnmower"), make_situation(constraints=constraints, steps=200, vehicles=("a",))
+    here = fly(planner, situation, 2)[-1]
+    planner.lead("a", 4, np.array([[50.0, -4.0]]), np.zeros((0, 2)), here[0, :2])
+    places = fly(planner, replace(situation, positions=here), 30)
+    assert planner.refused["a"] == (4, "nobody may go nearer to where it was ordered")
+    assert np.hypot(*(places[-1][0] - places[-3][0])[:2]) > 5.0, "it goes on with its lines"
+
+
+def test_a_leg_that_was_flown_has_passed_its_corner_however_near_its_vehicle_came() -> None:
+    planner, situation = planner_of("lawnmower"), make_situation(steps=200, vehicles=("a",))
+    here = fly(planner, situation, 2)[-1]
+    corner, then = here[0, :2] + np.array([6.0, 0.0]), here[0, :2] + np.array([6.0, 20.0])
+    planner.lead("a", 1, np.array([corner, then]), np.zeros((0, 2)), here[0, :2])
+    short = here.copy()
+    short[0, :2] = corner - np.array([2.5, 0.0])
+    planner.reach("a", then)
+    assert len(planner.ways["a"].corners_m) == 2, "it was not there yet"
+    planner.reach("a", corner)
+    legs = fly(planner, replace(situation, positions=short), 3)
+    assert np.allclose(legs[1][0, :2] - short[0, :2], 10.0 * (then - short[0, :2]) / np.hypot(*(then - short[0, :2])))
+    assert np.allclose(planner.ways["a"].passed_m, [corner, then])
+
+
 @pytest.mark.parametrize("name", ["lawnmower", "cao"])
 def test_a_memory_taken_up_goes_on_as_if_nothing_had_happened(name: str) -> None:
     whole, situation = planner_of(name), make_situation()
