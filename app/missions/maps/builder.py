@@ -226,6 +226,8 @@ class MapBuilder:
             if self.live is not None and (generation != self._generation or self.live.outgrown(len(self._soundings))):
                 self.live.begin_anew(self._soundings, upto)
             beams = self.swath.beams
+            if thorough and self._newest is not None and self._newest.thorough and not came[0] and not beams:
+                return self._newest  # who asked for it at the same time has made it
             if not len(self._soundings) and self._prior is None and not beams:
                 self._newest = None
                 return None

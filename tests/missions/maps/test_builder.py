@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.mapping.gaussian_process import surveys
 from app.mapping.swath.pings import Footprints, Pings
 from app.missions.maps import builder as builder_module
 from app.missions.maps.builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
@@ -75,6 +76,33 @@ def test_no_decision_waits_for_a_map_that_is_made_elsewhere(monkeypatch: pytest.
     after = builder.build()
     assert after is not None
     assert after.soundings == 65
+
+
+def test_all_who_ask_for_a_thorough_map_at_the_same_time_get_one_that_is_made_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judgements = []
+
+    def judged(*arguments: Any) -> Any:
+        judgements.append(arguments)
+        return surveys.judged(*arguments)
+
+    monkeypatch.setattr(builder_module, "judged", judged)
+    builder = built_of(soundings(60))
+    before = builder.newest
+    with ThreadPoolExecutor(3) as pool:
+        made = [asked.result() for asked in [pool.submit(builder.build, thorough=True) for _ in range(3)]]
+    assert len(judgements) == 1
+    assert made[0] is made[1] is made[2] is builder.newest is not before
+    # What comes, or is replaced, is in the next one.
+    builder.add(soundings(5, seed=7))
+    more = builder.build(thorough=True)
+    builder.arrivals.replace(soundings(40, seed=9), np.zeros((0, 4)))
+    fewer = builder.build(thorough=True)
+    assert more is not None
+    assert fewer is not None
+    assert (more.soundings, fewer.soundings) == (65, 40)
+    assert len(judgements) == 3
 
 
 def test_the_same_soundings_give_the_same_digest() -> None:
