@@ -4,7 +4,8 @@ A mission of the service with its simulated vehicles, in process or, with ``--ki
 processes of their own. Of the tracks as they were stored is told, by vehicle and in all: ``flown_m``; ``on_plan_pct``,
 the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
 ``waiting_pct``, the part of the time spent in them; ``loops_under_way``, those until its last leg was reached, after
-which a vehicle waits for the others; ``survey_minutes``, how long each vehicle surveyed by its clock, of which a
+which a vehicle waits for the others; ``loops_giving_way``, those of them that it flew to let another one pass;
+``survey_minutes``, how long each vehicle surveyed by its clock, of which a
 mission has so many; and how many legs were not reached. ``--slow-decisions 5`` makes each decision take that many
 seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a page.
 """
@@ -26,6 +27,7 @@ from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import decide
+from app.missions.operations.history import events_after
 from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
@@ -46,6 +48,8 @@ CLOSED_M = 6.0
 MOST_FLOWN = 0.9
 """A vehicle that flew less than this part of its legs is not at the end of the last one."""
 RESAMPLED_M = 1.0
+GIVING_WAY_S = (-15.0, 70.0)
+"""When a vehicle flies a circle to let another one pass, from when that was seen in the log on."""
 PORTS_APART = 10
 
 
@@ -123,8 +127,14 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         while crafts and sum(view.link == "ready" for view in await service.vehicles()) < flight.vehicles:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
         await service.act(await service.get(identity), Action.START, actor="benchmark")
-        while (view := mission_view(live := await service.get(identity))).state not in ENDED:  # noqa: ASYNC110
+        gives_way_s: dict[str, list[float]] = {name_of(number): [] for number in range(flight.vehicles)}
+        seen = 0
+        while (view := mission_view(live := await service.get(identity))).state not in ENDED:
             await asyncio.sleep(0.5)
+            for event in await events_after(live, seen):
+                seen, name = event.id, str(event.data.get("vehicle"))
+                if "gives_way_to" in event.data and (report := live.team.named(name).report) is not None:
+                    gives_way_s[name].append(report.time_s)
         surveyed_s = [member.flown.survey_s for member in live.team]
         async with database.reading() as session:
             tracks = await track_points(session, identity)
@@ -141,7 +151,7 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         lon, lat, _, seconds = np.array(points).T
         track = np.column_stack(frame.to_local(lat, lon))
         ends = np.array([[row.east_m, row.north_m] for row in waypoints if row.vehicle == name]).reshape(-1, 2)
-        by_vehicle[name], drawn[name] = judged(track, seconds, ends), (track, ends)
+        by_vehicle[name], drawn[name] = judged(track, seconds, ends, gives_way_s[name]), (track, ends)
     if picture is not None:
         draw(picture, drawn)
     flown = sum(found["flown_m"] for found in by_vehicle.values())
@@ -154,6 +164,7 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         "on_plan_pct": round(sum(f["on_plan_pct"] * f["flown_m"] for f in by_vehicle.values()) / max(flown, 1e-9), 1),
         "loops": sum(found["loops"] for found in by_vehicle.values()),
         "loops_under_way": sum(found["loops_under_way"] for found in by_vehicle.values()),
+        "loops_giving_way": sum(found["loops_giving_way"] for found in by_vehicle.values()),
         "waiting_pct": round(float(np.mean([found["waiting_pct"] for found in by_vehicle.values()])), 2),
         "missed": sum(row.status != "reached" for row in waypoints),
         "by_vehicle": by_vehicle,
@@ -193,8 +204,11 @@ def slow_down(seconds: float) -> None:
     setattr(deciding, "decide", slow)  # noqa: B010 - it is not the module's to export
 
 
-def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str, Any]:
-    """Return what a track (n, 2), flown at times (n,), has in common with its legs, whose ends are (k, 2)."""
+def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s: Sequence[float]) -> dict[str, Any]:
+    """Return what a track (n, 2), flown at times (n,), has in common with its legs, whose ends are (k, 2).
+
+    ``gives_way_s`` are the times at which its vehicle began to let others pass.
+    """
     pieces = np.hypot(*np.diff(track, axis=0).T)
     flown = float(pieces.sum())
     if len(ends) == 0 or flown == 0.0:
@@ -203,6 +217,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
             "on_plan_pct": 0.0,
             "loops": 0,
             "loops_under_way": 0,
+            "loops_giving_way": 0,
             "waiting_pct": 0.0,
             "hours": 0.0,
         }
@@ -231,7 +246,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
     window = int(LOOP_WITHIN_M / RESAMPLED_M)
     at_end = (np.hypot(*(path - ends[-1]).T) <= CLOSED_M) & (places_m >= MOST_FLOWN * float(legs_m.sum()))
     end_m = int(np.argmax(at_end)) if at_end.any() else len(path)
-    circling, loops, under_way, k = np.zeros(len(step), dtype=bool), 0, 0, 0
+    circling, loops, under_way, giving_way, k = np.zeros(len(step), dtype=bool), 0, 0, 0, 0
     while k < len(turned):
         ahead = np.abs(turned[k : k + window] - turned[k])
         back = np.hypot(*(path[k : k + len(ahead)] - path[k]).T) <= CLOSED_M
@@ -240,6 +255,9 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
             end = k + int(np.argmax(closed))
             circling[k:end] = True
             under_way += end <= end_m
+            begins_s, ends_s = times[k], times[min(end, len(times) - 1)]
+            lets_pass = any(at + GIVING_WAY_S[0] <= ends_s and begins_s <= at + GIVING_WAY_S[1] for at in gives_way_s)
+            giving_way += end <= end_m and lets_pass
             loops, k = loops + 1, end
         k += 1
     spent = np.diff(times)
@@ -249,6 +267,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray) -> dict[str
         "on_plan_pct": round(100.0 * float(on_plan.mean()), 1),
         "loops": loops,
         "loops_under_way": under_way,
+        "loops_giving_way": giving_way,
         "waiting_pct": round(100.0 * float(spent[circling].sum() / max(spent.sum(), 1e-9)), 2),
         "hours": round(float(spent.sum()) / 3600.0, 3),
     }

@@ -221,7 +221,7 @@ class GivingWay:
     async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
         if await self._asides.lead(member, place_m, Because.VEHICLE):
             words = f"{member.name} gives way to {other.name}"
-            await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name)
+            await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name, gives_way_to=other.name)
 
     async def _let_go_on(self, near: dict[str, _Imminent]) -> None:
         """Send vehicles on that would stay clear of the others now, or have waited long."""
