@@ -9,7 +9,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, Vehicles
-from app.exploration.lines.even_survey import Pattern, even_survey, fullest_surveys, orders_across, way_m
+from app.exploration.lines.even_survey import Pattern, even_survey, orders_across, way_m
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value
 
@@ -22,8 +22,6 @@ TO_END = 0.25
 PARTS = 8
 """Into how many parts vehicles may share a line."""
 IN_ORDER = (Pattern(), Pattern(TO_BORDER, 0.0), Pattern(TO_BORDER, TO_END, PARTS))
-FULLEST = (Pattern(parts=PARTS), Pattern(TO_BORDER, parts=PARTS))
-"""With ends wherever these leave the team the least way unused: a whole line more or less is a large part of few."""
 ADAPTS, MANY_LINES = 0.85, 11
 """How much better every other line first counts than all in order where every vehicle flies many lines: what it has met
 may be followed up. After fewer the map tells too little of where it is rough."""
@@ -85,11 +83,8 @@ def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objecti
     if many:
         value *= ADAPTS
     unknown = np.full(len(nodes.x), np.inf)
-    surveys = [even_survey(sweep, vehicles, objective.turns, pattern) for pattern in IN_ORDER]
-    turns = [objective.turns] * len(vehicles.en_m)
-    for sweep, pattern in itertools.product(sweeps, FULLEST):
-        surveys += fullest_surveys(sweep, vehicles, turns, pattern)
-    for survey in surveys:
+    for pattern in IN_ORDER:
+        survey = even_survey(sweep, vehicles, objective.turns, pattern)
         if survey is None:
             continue
         left = plan_value(unknown, nodes, objective, vehicles, *packed(survey.routes))
