@@ -8,13 +8,15 @@ from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.even_points import spread_points
 from app.exploration.core.routes import FreeSpace, Turns, flown_m
 
 NODES = 5000
 """In the rectangle around an area."""
 ENDS = 250
 """Of these nodes, so many are places where a leg may lead."""
+PLASTIC = 1.32471795724474602596
+"""The real root of x^3 = x + 1: nodes at multiples of its inverse and that squared are evenly spread, and stand in no
+rows that lines could lie along or between (Roberts, The unreasonable effectiveness of quasirandom sequences, 2018)."""
 APART = 0.25
 """Places along a way are taken so many distances of nodes apart."""
 
@@ -39,7 +41,8 @@ class Ground:
     def of(cls, constraints: Constraints) -> "Ground":
         """Return the ground that a mission's limits leave."""
         low, high = constraints.area.min(axis=0), constraints.area.max(axis=0)
-        nodes = spread_points(low, high, NODES)
+        k = np.arange(1, NODES + 1)
+        nodes = low + (high - low) * np.column_stack([(0.5 + k / PLASTIC) % 1.0, (0.5 + k / PLASTIC**2) % 1.0])
         inside = inside_area(constraints, nodes)
         apart_m = float(np.sqrt(np.prod(high - low) / NODES))
         return cls(nodes[inside], nodes[:ENDS][inside[:ENDS]], apart_m)

@@ -1,4 +1,3 @@
-import itertools
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -12,7 +11,6 @@ from scipy.spatial import cKDTree
 from app.arrays import FloatArray
 from app.estimation import SingleBeam
 from app.evaluation.survey.world import SurveyScenario, fly_planner
-from app.exploration.cao.regressors.survey import spread_nodes
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import CORNER_TOLERANCE, Turns, Vehicles, flown_m, next_waypoint, turn_m
 from app.exploration.planner.options import PlannerOptions
@@ -304,28 +302,3 @@ def most_across_m(left_m: float, legs: int) -> float:
 def test_lines_that_lie_closer_than_the_places_that_plans_are_judged_at_stay_even() -> None:
     assert most_across_m(left_m=1500.0, legs=90) < 0.5  # corners are cut
     assert most_across_m(left_m=300.0, legs=30) > 1.0
-
-
-@pytest.mark.parametrize("cells", [25, 51, 60, 70, 90])
-def test_nodes_tell_how_near_lines_are_to_the_ground_wherever_these_lie(cells: int) -> None:
-    # Where squares with one cell and with several counted the same, even lines seemed up to 15 % nearer or farther.
-    team = make_situation(belief=make_belief(cell=100.0 / cells))
-    nodes = spread_nodes(team, np.ones(cells**2)).en_m
-    ground = np.random.default_rng(0).uniform(0.0, 100.0, 200_000)
-
-    def away_m2(places: FloatArray, lines: Any) -> float:
-        return float((np.abs(places[:, None] - lines).min(axis=1) ** 2).mean())
-
-    for n, to_border in itertools.product(range(6, 14), (0.4, 0.5)):
-        lines = (np.arange(n) + to_border) * 100.0 / (n - 1 + 2 * to_border)
-        for across in (0, 1):
-            assert away_m2(nodes[:, across], lines) == pytest.approx(away_m2(ground, lines), rel=0.05)
-
-
-def test_nodes_are_as_rough_as_the_landmarks_around_them() -> None:
-    team = make_situation(belief=make_belief(cell=1.0))
-    rough = np.ones(10_000)
-    rough[np.hypot(*(team.belief.xy_m - [30.0, 60.0]).T).argmin()] = 31.0
-    nodes = spread_nodes(team, rough)
-    assert np.hypot(*(nodes.en_m[nodes.weight.argmax()] - [30.0, 60.0])) < 3.0
-    assert (nodes.weight - 1.0).sum() == pytest.approx(30.0 / 4.0, rel=0.5)  # four landmarks a node

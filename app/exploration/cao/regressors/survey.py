@@ -22,7 +22,6 @@ from shapely import Polygon, unary_union
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.even_points import spread_points
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.core.routes import (
     CORNER_TOLERANCE,
@@ -67,6 +66,7 @@ COARSE = 0.75
 bend lines to pass over nodes."""
 SILENT_WITHIN, SILENT = 0.5, 0.05
 """Within so many spacings of a place that gave no echo ground counts only this part: there is nothing to be heard."""
+JITTER = 0.7
 SKIPPED_M = 5.0
 """Ground along a line that is left out is marked at places so far apart."""
 MOST_GIVEN = 24
@@ -166,7 +166,7 @@ class SurveyRegressors:
         if len(self._silent):
             heard_of = np.asarray(cKDTree(self._silent).query(team.belief.xy_m)[0]) <= SILENT_WITHIN * self._spacing
             roughness = np.where(heard_of & (distance > SILENT_WITHIN * self._spacing), SILENT, 1.0) * roughness
-        self._nodes = spread_nodes(team, roughness)
+        self._nodes = thin_nodes(team, roughness)
         self._scale = max(team.belief.correlation_length_m, self._spacing)
         turns = Turns(self._options.turn_radius_m, CORNER_LOSS * constraints.max_step_m if team.left_m is None else 0.0)
         self._noise = noise_part(team.belief, distance, self._scale) * len(self._nodes.x)
@@ -517,27 +517,26 @@ def _unless_straight(start_m: FloatArray, via_m: FloatArray, next_m: FloatArray)
     return np.zeros((0, 2)) if straight else via_m[None]
 
 
-def spread_nodes(team: Situation, variability: FloatArray) -> Nodes:
-    """Return at most about ``MAX_NODES`` nodes of the area, evenly spread, no more than there are landmarks in it.
+def thin_nodes(team: Situation, variability: FloatArray) -> Nodes:
+    """Return at most about ``MAX_NODES`` nodes of the area; nodes of one square are merged, their weights averaged.
 
-    They stand in no rows: a plan would gain by lying along these, or between them. Each has the mean ``variability``
-    (n,) of the landmarks that it is the nearest to, else that of the landmark nearest to it.
+    They are moved about a little: on a regular grid a plan would gain by lying on its lines.
     """
     belief: Belief = team.belief
     inside = inside_area(team.constraints, belief.xy_m)
     xy, weight = belief.xy_m[inside], variability[inside]
-    if len(xy) == 0:
-        return make_nodes(xy, weight)
-    low, high = team.constraints.area.min(axis=0), team.constraints.area.max(axis=0)
-    full = float(np.prod(high - low)) / _free_area(team.constraints)
-    nodes = spread_points(low, high, round(full * min(len(xy), MAX_NODES)))
-    nodes = nodes[inside_area(team.constraints, nodes)]
-    if len(nodes) == 0:
-        return make_nodes(xy, weight)
-    mine = np.asarray(cKDTree(nodes).query(xy)[1])
-    count, total = (np.bincount(mine, values, len(nodes)) for values in (None, weight))
-    nearest = weight[np.asarray(cKDTree(xy).query(nodes)[1])]
-    return make_nodes(nodes, np.where(count > 0, total / np.maximum(count, 1), nearest))
+    if len(xy) > MAX_NODES:
+        low, size = xy.min(axis=0), np.ptp(xy, axis=0)
+        side = float(np.sqrt(max(size[0], 1e-9) * max(size[1], 1e-9) / MAX_NODES))
+        bins = np.floor((xy - low) / side + 1e-9).astype(np.int64)
+        _, which = np.unique(bins[:, 0] * 1_000_003 + bins[:, 1], return_inverse=True)
+        count = np.bincount(which)
+        xy = np.column_stack([np.bincount(which, xy[:, k]) / count for k in (0, 1)])
+        weight = np.bincount(which, weight) / count
+    if len(xy) > 1:
+        k = np.arange(len(xy))[:, None]
+        xy = xy + JITTER * _cell(xy) * ((k * np.array([0.7548776662, 0.5698402910])) % 1.0 - 0.5)
+    return make_nodes(xy, weight)
 
 
 def _free_area(constraints: Constraints) -> float:
