@@ -123,14 +123,10 @@ def fly_over(
     builder.arrivals.replace(so_far.soundings, so_far.prior)
     builder.build()
     steps = max(spec.steps - so_far.first_step + 1, 0)
-    distance, seconds, left_m, flown, mapped, maps = np.zeros(len(members)), 0.0, 0.0, 0, so_far.first_step - 1, 0
-    for leg in fly(spec, members, starts_m, builder, floor.terrain, so_far):
+    distance, seconds, left_m, flown = np.zeros(len(members)), 0.0, 0.0, 0
+    legs = fly(spec, members, starts_m, builder, floor.terrain, so_far)
+    for leg in with_maps(legs, builder, so_far.first_step):
         distance, seconds, left_m, flown = leg.distance_m, leg.seconds, leg.left_m, flown + 1
-        if leg.step >= MORE * mapped:
-            builder.build()
-            mapped, maps = leg.step, maps + 1
-            if maps % LEARN_EVERY == 0:
-                builder.learn(always=True)
         if stop() or time.thread_time() > until:
             break
     builder.learn(always=True)
@@ -147,6 +143,18 @@ def fly_over(
     )
 
 
+def with_maps(legs: Iterator[StepFlown], builder: MapBuilder, first_step: int = 1) -> Iterator[StepFlown]:
+    """Make maps of what is sounded while steps are flown, as often as a forecast does: planners plan by them."""
+    mapped, maps = first_step - 1, 0
+    for leg in legs:
+        if leg.step >= MORE * mapped:
+            builder.build()
+            mapped, maps = leg.step, maps + 1
+            if maps % LEARN_EVERY == 0:
+                builder.learn(always=True)
+        yield leg
+
+
 def fly(
     spec: MissionSpec,
     members: list[Member],
@@ -158,6 +166,8 @@ def fly(
     spacing_m: float | None = None,
 ) -> Iterator[StepFlown]:
     """Fly a mission's steps by its own planner and decisions; soundings go to ``builder``, whose maps are the caller's.
+
+    Without maps on the way (:func:`with_maps`) planners that adapt to what was found have nothing to adapt to.
 
     ``spacing_m`` is the way between soundings; None: as sonars sound, or closer than the terrain's cells are.
     """
