@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import structlog
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 from tests.support.compute.numba_cache import share
 from tests.support.paths import CAPTURES, TERRAINS
@@ -17,6 +18,9 @@ share()
 settings.register_profile("project", deadline=None, derandomize=True, max_examples=50)
 settings.register_profile("search", deadline=None, max_examples=300)
 settings.load_profile("project")
+# Numbers that stand in the program would be tried, too, but only those of modules that other tests had loaded by then.
+if hasattr(providers, "is_local_module_file"):
+    setattr(providers, "is_local_module_file", lambda _: False)  # noqa: B010 - it is not ours
 # As the service has it. Frames drawn with their variables would take longer than what fails.
 structlog.get_config()["processors"][-1].exception_formatter = structlog.dev.plain_traceback
 
