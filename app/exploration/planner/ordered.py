@@ -14,7 +14,7 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
-from app.exploration.core.routes import FreeSpace
+from app.exploration.core.routes import SAME_M, FreeSpace
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.base import PlannerBase, at_depth
 
@@ -27,9 +27,6 @@ PARTS = (1.0, 0.6, 0.3)
 
 MOST_TRIES = 3
 """So many legs in a row that come to nothing end an order."""
-
-STILL_M = 1e-3
-"""A shorter leg comes to nothing."""
 
 MOST_LOST = 6
 """So often legs of an order are given up before the order is."""
@@ -149,7 +146,10 @@ class OrderedPlanner:
             self._refuse(vehicle, way, "its legs there came to nothing again and again")
 
     def reach(self, vehicle: str, place_m: FloatArray) -> None:
-        """Take note that a vehicle has been where a leg ended, (2,), however near it came to that."""
+        """Take note that a vehicle has flown all its legs, the last of which ended at ``place_m`` (2,).
+
+        It may be an arrival radius away from there.
+        """
         way = self.ways.get(vehicle)
         if way is not None and len(way.corners_m) and np.hypot(*(way.corners_m[0] - place_m)) <= NEAR_M:
             way.pass_corner()
@@ -241,16 +241,16 @@ class OrderedPlanner:
             space = self._free(constraints)
         corner_m = space.way(here_m, space.nearest(way.corners_m[0]))[0]
         away_m = float(np.hypot(*(corner_m - here_m)))
+        if away_m <= SAME_M:
+            way.tries += 1
+            self.refused[situation.vehicles[row]] = (way.order, "nobody may go nearer to where it was ordered")
+            return np.asarray(origin[row])
         whole_m = min(away_m, constraints.max_step_m * (1.0 - 1e-9))
         tries = np.repeat(positions[None], len(PARTS), axis=0)
         for k, part in enumerate(PARTS):
             tries[k, row, :2] = here_m + part * whole_m / max(away_m, 1e-12) * (corner_m - here_m)
         tries = at_depth(constraints, bottom, origin, tries[..., :2], positions[:, 2])
         allowed = np.flatnonzero(constraints.feasible(origin, tries, bottom))
-        if whole_m <= STILL_M:
-            way.tries += 1
-            self.refused[situation.vehicles[row]] = (way.order, "nobody may go nearer to where it was ordered")
-            return np.asarray(origin[row])
         if len(allowed):
             way.tries = 0
             return np.asarray(tries[allowed[0], row])

@@ -331,7 +331,7 @@ class OrderBook:
         if refused is not None and refused[0] == order.id and member.name not in planner.ways:
             await self._over(member, order, OrderState.FAILED, refused[1])
             return
-        if member.status is WaypointStatus.REACHED and member.target_m is not None:
+        if member.status is WaypointStatus.REACHED and not member.ahead and member.target_m is not None:
             # Who needs its next leg only then is planned for from where it is, which may be an arrival radius away.
             planner.reach(member.name, member.target_m)
         way = planner.ways.get(member.name)
