@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, expect_state, show, violations
+from tests.support.dashboard.steps import by_id, expect_state, need_axe, show, violations
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -36,6 +36,7 @@ def surveyed(service: Service) -> str:
 @pytest.fixture(scope="module")
 def shared(browser: Browser, service: Service, surveyed: str) -> Iterator[Page]:
     """One page for several tests: to open one takes longer than most of what they do."""
+    need_axe()
     # Colours that fade over would be judged half way.
     how: dict[str, Any] = {"locale": "pt-PT", "reduced_motion": "reduce", "viewport": {"width": 1280, "height": 800}}
     context = browser.new_context(base_url=service.url, **how)

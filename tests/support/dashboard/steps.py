@@ -74,10 +74,15 @@ def picture(page: Page, name: str) -> None:
         page.screenshot(path=Path(folder) / f"{name}.png")
 
 
-def violations(page: Page) -> list[str]:
-    """What axe finds wrong with the page as it is."""
+def need_axe() -> None:
+    """Skip where pages cannot be judged: tests that share a page do so before they leave anything open on it."""
     if not AXE.is_file():
         pytest.skip("axe-core is missing: npm ci in app/dashboard/web")
+
+
+def violations(page: Page) -> list[str]:
+    """What axe finds wrong with the page as it is."""
+    need_axe()
     page.evaluate(AXE.read_text())
     found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
     return [f"{one['id']}: {[node['target'] for node in one['nodes']]}" for one in found["violations"]]
