@@ -6,19 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray, IntArray
-from app.estimation import Cell
 from app.exploration.site_search.base import Scene, SearchPlanner, hold
 from app.exploration.site_search.gains import Gains, take
+from app.exploration.site_search.goal_parts import GoalPart, goal_left, parts_left
 from app.exploration.site_search.ground import UNREACHED, Ground
 
-ELSEWHERE = 0.15
+ELSEWHERE = 0.02
 """Worth of a cell outside the goal area while something in it is left to see; within it 1."""
 LATTICE = 2
 """Cells between the views that are weighed."""
 NEAR = 0.5
 """Added to every distance, as a part of the scanner's reach, so that very small gains next door attract no vehicle."""
-FARTHEST = 2.0
-"""How far the goal area counts as being, in diagonals of the site, where no way is hoped for."""
 KEEP = 2.0
 """How much a view is favoured that a vehicle is under way to."""
 LEAST = 1.0
@@ -89,13 +87,7 @@ class FrontierSearch(SearchPlanner):
         The vehicle with the best view takes it first; what is seen from there counts nothing for the others.
         """
         task = scene.task
-        left = (task.states == Cell.UNEXPLORED) & task.in_goal
-        goal_left = bool(left.any())
-        if goal_left:
-            # What is worth going to lies beyond a view: the nearest that is unexplored of the goal area.
-            beyond = scene.ground.metres(scene.ground.hoped(left)[places[:, 0], places[:, 1]])
-            far = far + np.where(np.isfinite(beyond), beyond, FARTHEST * task.grid.cell_m * np.hypot(*left.shape))
-        worth = np.where(task.in_goal, 1.0, ELSEWHERE if goal_left else 1.0)
+        worth = np.where(task.in_goal, 1.0, ELSEWHERE if goal_left(scene).any() else 1.0)
         chosen: list[int | None] = [None] * len(far)
         if len(places) == 0:
             return chosen
@@ -104,18 +96,25 @@ class FrontierSearch(SearchPlanner):
             if name in self._views:
                 under_way[i, (places == np.array(self._views[name])).all(axis=1)] = KEEP
         near = NEAR * task.scanner.reach_m
+        parts = parts_left(scene)
         waiting = set(range(len(far)))
         while waiting:
             seen = self._gains.of(task, worth, places)
             seen = np.where(seen >= LEAST * worth.max(initial=0.0) * ELSEWHERE, seen, 0.0)
-            value = np.where(in_time, under_way * seen / (far + near), 0.0)
-            value[[i for i in range(len(far)) if i not in waiting]] = 0.0
-            who, which = np.unravel_index(int(np.argmax(value)), value.shape)
-            if value[who, which] <= 0.0:
+            # By what is seen from there, or on the way to a part of the goal area by that as well.
+            values = [under_way * seen / (far + near)]
+            values += [_on_the_way(part, seen, far, part.way_m[tuple(places.T)], task.left_m, near) for part in parts]
+            values = [np.where(in_time, value, 0.0) for value in values]
+            for value in values:
+                value[[i for i in range(len(far)) if i not in waiting]] = 0.0
+            why, who, which = np.unravel_index(int(np.argmax(values)), (len(values), *far.shape))
+            if values[why][who, which] <= 0.0:
                 break
             chosen[int(who)] = int(which)
             waiting.remove(int(who))
             take(task, worth, places[which])
+            if why > 0:
+                parts[why - 1] = parts[why - 1].halved()
         return chosen
 
     def _remember(self) -> dict[str, Any]:
@@ -124,3 +123,16 @@ class FrontierSearch(SearchPlanner):
     def _recall(self, state: dict[str, Any]) -> None:
         self._views = {str(name): (int(row), int(col)) for name, (row, col) in state["views"].items()}
         self._spent = [(int(row), int(col)) for row, col in state["spent"]]
+
+
+def _on_the_way(
+    part: GoalPart, seen: FloatArray, far_m: FloatArray, beyond_m: FloatArray, left_m: float, near_m: float
+) -> FloatArray:
+    """Return what views are worth as a beginning of the way to a part of the goal area, per metre.
+
+    ``seen`` (n,) is what they show, ``far_m`` (vehicles, n) how far they are, ``beyond_m`` (n,) how far the part may be
+    from there. Worth nothing is what shows nothing new, and what is too far to be home in ``left_m``.
+    """
+    way_m = far_m + beyond_m
+    value = (seen + part.cells) / (near_m + way_m + part.sweep_m)
+    return np.where((seen > 0.0) & (way_m + part.home_m <= left_m), value, 0.0)

@@ -1,7 +1,7 @@
 """Where a vehicle may go: explored cells away from everything else, straight legs over them, ways and distances."""
 
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numba import njit
@@ -104,9 +104,12 @@ class Ground:
 
         In fifths of a cell, as in :meth:`distances`.
         """
-        solid = self.task.states >= Cell.KNOWN
-        open_ = _away_from(solid, _within(_margin(self.task)))
-        return _distances(open_, np.argwhere(places), np.zeros((0, 2), dtype=np.int64))
+        return _distances(self._hoped_open, np.argwhere(places), np.zeros((0, 2), dtype=np.int64))
+
+    @cached_property
+    def _hoped_open(self) -> BoolArray:
+        """Cells whose centre keeps the safety distance from every known obstacle."""
+        return _away_from(self.task.states >= Cell.KNOWN, _within(_margin(self.task)))
 
     def way_m(self, origin_m: FloatArray, distance: NDArray[np.int32]) -> float:
         """Return how far it is from a position (2,) to where ``distance`` is 0; inf where there is no way."""
