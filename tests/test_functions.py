@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -15,12 +16,29 @@ REASON = "One function because"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-def functions() -> Iterator[tuple[Path, Function]]:
+@dataclass(frozen=True)
+class Facts:
+    """What is held against a function."""
+
+    name: str
+    parameters: int
+    lines: int
+    reasoned: bool
+
+
+def functions() -> Iterator[Facts]:
+    """Facts only: with the trees of all modules at hand, looking for garbage would take most of the time."""
     for package in ("app", "imc_bridge", "simulator"):
         for path in sorted((PROJECT / package).rglob("*.py")):
             if "node_modules" not in path.parts:
                 found = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, Function))
-                yield from ((path, node) for node in found)
+                yield from (facts(path, node) for node in found if not is_command(node))
+
+
+def facts(path: Path, function: Function) -> Facts:
+    said = " ".join((ast.get_docstring(function) or "").split())
+    name = f"{path.relative_to(PROJECT)}:{function.lineno} {function.name}"
+    return Facts(name, parameters(function), lines(function), REASON in said)
 
 
 def is_command(function: Function) -> bool:
@@ -43,19 +61,14 @@ def lines(function: Function) -> int:
 
 
 @pytest.fixture(scope="module")
-def ours() -> list[tuple[Path, Function]]:
-    return [(path, function) for path, function in functions() if not is_command(function)]
+def ours() -> list[Facts]:
+    return list(functions())
 
 
-def named(found: list[tuple[Path, Function]]) -> list[str]:
-    return [f"{path.relative_to(PROJECT)}:{one.lineno} {one.name}" for path, one in found]
-
-
-def test_no_function_has_more_parameters_than_can_be_remembered(ours: list[tuple[Path, Function]]) -> None:
+def test_no_function_has_more_parameters_than_can_be_remembered(ours: list[Facts]) -> None:
     assert len(ours) > 3000
-    assert named([(path, one) for path, one in ours if parameters(one) > MOST_PARAMETERS]) == []
+    assert [one.name for one in ours if one.parameters > MOST_PARAMETERS] == []
 
 
-def test_a_function_that_is_longer_than_a_screen_says_why(ours: list[tuple[Path, Function]]) -> None:
-    long = [(path, one) for path, one in ours if lines(one) > MOST_LINES]
-    assert named([found for found in long if REASON not in " ".join((ast.get_docstring(found[1]) or "").split())]) == []
+def test_a_function_that_is_longer_than_a_screen_says_why(ours: list[Facts]) -> None:
+    assert [one.name for one in ours if one.lines > MOST_LINES and not one.reasoned] == []

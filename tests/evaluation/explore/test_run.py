@@ -118,7 +118,7 @@ def test_a_lost_vehicle_does_not_stall_the_others(smooth: Terrain, planner: str)
 def test_who_has_a_plan_finishes_whatever_happens_and_hardly_breaks_a_limit(
     smooth: Terrain, planner: str, happens: dict[str, Any]
 ) -> None:
-    scenario = ExploreScenario(smooth, landmarks=300, steps=280, **happens)
+    scenario = ExploreScenario(smooth, landmarks=300, steps=240, **happens)
     result = run_explore(scenario, planner, PlannerOptions(rollouts=100))
     assert result.t99 is not None
     assert result.broken_constraints <= 0.04 * scenario.robots * scenario.steps
@@ -138,7 +138,7 @@ def test_what_is_claimed_of_done_landmarks_holds_beside_walls_too() -> None:
 def test_rollouts_finish_before_the_lawnmower_on_average() -> None:
     """Single runs differ by a tenth and more by chance."""
     floors = [generate("smooth", seed, width_m=80.0, height_m=60.0) for seed in (2, 4, 6)]
-    first = {name: [run(floor, name, steps=250).t99 for floor in floors] for name in ("rollout", "lawnmower")}
+    first = {name: [run(floor, name, steps=200).t99 for floor in floors] for name in ("rollout", "lawnmower")}
     finished = {name: [t99 for t99 in steps if t99 is not None] for name, steps in first.items()}
     assert {name: len(steps) for name, steps in finished.items()} == {"rollout": 3, "lawnmower": 3}
     assert sum(finished["rollout"]) < sum(finished["lawnmower"])

@@ -32,7 +32,7 @@ NONE = np.zeros((0, 4))
 
 
 def lines(**changes: Any) -> MissionSpec:
-    return sim_spec(steps=8, planner={"name": "lawnmower"}, **changes)
+    return sim_spec(**({"steps": 8, "planner": {"name": "lawnmower"}} | changes))
 
 
 async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
@@ -41,9 +41,9 @@ async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
     # On a slow machine, too, all steps are simulated over all floors.
     monkeypatch.setattr(request, "BUDGET_S", 600.0)
     monkeypatch.setattr(request, "PATIENCE_S", 600.0)
-    spec = lines()
+    spec = lines(steps=4)
     before = await service.forecaster.of_description(spec)
-    assert before.steps == before.steps_simulated == before.steps_flown == 8
+    assert before.steps == before.steps_simulated == before.steps_flown == 4
     assert before.floors > 3
     assert before.coverage_pct_range.low <= before.coverage_pct <= before.coverage_pct_range.high
     mission = (await service.create(spec)).id

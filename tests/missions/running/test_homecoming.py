@@ -263,10 +263,10 @@ async def test_a_paused_mission_is_finished_at_home_too(service: MissionService)
 
 
 async def test_vehicles_turn_back_in_time(harbour_closed: Harbour) -> None:
-    """Seven minutes of energy: it is home long before its steps are done, with some of it left."""
+    """Five minutes of energy: it is home long before its steps are done, with some of it left."""
     # Its reserve is a minute: a machine that is busy for a second may not use that up.
     service = await harbour_closed.open(time_scale=12.0)
-    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 7.0}]
+    vehicles = [{"name": "a", "kind": "sim", "endurance_min": 5.0}]
     spec = recovered(point=OUTSIDE, vehicles=vehicles, steps=1000)
     mission = await service.create(spec)
     await act(service, mission.id, "start")
