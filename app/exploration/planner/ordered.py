@@ -145,6 +145,24 @@ class OrderedPlanner:
         if way.lost > MOST_LOST:
             self._refuse(vehicle, way, "its legs there came to nothing again and again")
 
+    def put_back(self, vehicle: str, ends_m: FloatArray) -> None:
+        """Learn that a vehicle was not given the last legs decided for it, which were to end at ``ends_m`` (n, 2)."""
+        own = min(self._since.get(vehicle, len(ends_m)), len(ends_m))
+        led, planned = np.split(ends_m, [len(ends_m) - own])
+        if len(planned):
+            self.planner.put_back(vehicle, planned, None)
+            if vehicle in self._since:
+                self._since[vehicle] -= own
+        if not len(led):
+            return
+        # A way round is forgotten at its end.
+        way = self.ways.setdefault(vehicle, OrderedWay(NO_ORDER, np.zeros((0, 2)), passed_m=led))
+        kept = len(way.passed_m)
+        while kept and np.hypot(*(led - way.passed_m[kept - 1]).T).min() <= NEAR_M:
+            kept -= 1
+        way.corners_m = np.vstack([way.passed_m[kept:], way.corners_m])
+        way.passed_m = way.passed_m[:kept]
+
     def reach(self, vehicle: str, place_m: FloatArray) -> None:
         """Take note that a vehicle has flown all its legs, the last of which ended at ``place_m`` (2,).
 

@@ -6,6 +6,7 @@ are, long before the vehicle is there. So nobody waits for a decision, for a slo
 
 import asyncio
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -191,6 +192,7 @@ class OwnLegs:
         all_flown = not any((m.ordered or m.ahead) and not m.misses for m in live.team.present)
         planner = self._decider.planner
         memory, committed = planner.snapshot(), False
+        not_given: dict[str, list[FloatArray]] = {}
         self._decider.attempt = max(self._refusals.get(name, 0) for name in names)
         decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once(getting))
         self._taking_part |= names
@@ -208,17 +210,33 @@ class OwnLegs:
         for later, decision in enumerate(decisions):
             starts = {place.vehicle: place.en_m for place in places}
             places = moved_on(places, decision)
-            committed |= await self._commit(
-                decision, starts, {name: number + later for name, number in numbers.items()}
-            )
+            given = await self._commit(decision, starts, {name: number + later for name, number in numbers.items()})
+            committed |= bool(given)
+            for leg in self._not_given(decision, given, numbers):
+                not_given.setdefault(leg.vehicle, []).append(leg.target_m[:2])
             # Who did not get this leg gets none that goes on from it.
             numbers = {name: number for name, number in numbers.items() if self._has_leg(name, number + later)}
+        # What it plans is still to be flown.
         if not committed:
-            planner.restore(memory)  # what it plans is still to be flown
+            planner.restore(memory)
+        else:
+            for name, ends in not_given.items():
+                planner.put_back(name, np.array(ends))
         self._maps.begin()
 
-    async def _commit(self, decision: Decision, starts_m: dict[str, FloatArray], numbers: dict[str, int]) -> bool:
-        """Commit the legs of a decision that can be flown from where they were to begin; whether there were any."""
+    def _not_given(self, decision: Decision, given_m: dict[str, FloatArray], numbers: dict[str, int]) -> Iterable[Leg]:
+        """Return the planned legs of a decision that no vehicle got, and that nobody is led to in another way."""
+        for leg in decision.legs:
+            end_m = given_m.get(leg.vehicle)
+            gets_it = end_m is not None and np.array_equal(end_m, leg.target_m)
+            is_led_round = leg.vehicle in numbers and leg.vehicle in self._dispatch.dropped
+            if not leg.comes_in and not leg.refusal and not gets_it and not is_led_round:
+                yield leg
+
+    async def _commit(
+        self, decision: Decision, starts_m: dict[str, FloatArray], numbers: dict[str, int]
+    ) -> dict[str, FloatArray]:
+        """Commit the legs of a decision that can be flown from where they were to begin; returns their ends, (3,)."""
         live = self._live
         begun = [
             leg
@@ -245,7 +263,7 @@ class OwnLegs:
         elif any(self._refusals.get(leg.vehicle) == 1 for leg in decision.legs):
             for note in decision.notes:
                 await live.journal.log(Level.WARNING, "safety", note)
-        return bool(legs)
+        return {leg.vehicle: leg.target_m for leg in legs}
 
     def _comes_home_after(self, member: Member, leg: Leg) -> bool:
         """Whether a vehicle's energy lasts for a leg and its way home after it; where not, it goes home."""

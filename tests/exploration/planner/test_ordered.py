@@ -245,3 +245,23 @@ def test_a_vehicle_gets_where_it_is_ordered_nearer_to_a_zone_than_plans_go() -> 
         if not len(planner.ways["a"].corners_m):
             break
     assert min(np.hypot(*(place[0, :2] - goal)) for place in places) <= 0.5
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+@pytest.mark.parametrize("ordered", [False, True])
+@pytest.mark.parametrize("kept", [0, 1, 4, 6])
+def test_legs_that_a_vehicle_was_not_given_are_still_to_be_flown(name: str, ordered: bool, kept: int) -> None:
+    # Some legs of one vehicle were decided at once; those after the first ones were not given to it.
+    planner, situation = planner_of(name), make_situation(belief=make_belief(known=False))
+    here = fly(planner, situation, 6)[-1]
+    goal = here[0, :2] + np.where(here[0, :2] < 50.0, 25.0, -25.0)
+    if ordered:
+        planner.lead("a", 1, np.array([here[0, :2] + [0.0, 5.0], goal]), np.zeros((0, 2)), here[0, :2])
+    alone = replace(situation, moving=np.array([True, False]))
+    decided = fly(planner, replace(alone, positions=here), 8)
+    assert not planner.is_ordered("a") or not len(planner.ways["a"].corners_m), "its order is over by then"
+    planner.put_back("a", np.array([place[0, :2] for place in decided[1 + kept :]]))
+    # Later on plans may be renewed at other places.
+    again = fly(planner, replace(alone, positions=decided[kept]), min(8 - kept, 3))
+    expected = decided[kept : kept + len(again)]
+    np.testing.assert_allclose([place[0, :2] for place in again], [place[0, :2] for place in expected], atol=1e-6)

@@ -9,6 +9,9 @@ from shapely import Polygon
 from sqlalchemy import select
 
 from app.missions.errors import ConflictError, InvalidRequestError, VehicleNotFoundError
+from app.missions.flight import own_legs
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.separation import too_close
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
@@ -101,6 +104,30 @@ async def test_a_vehicle_goes_where_it_is_sent_and_then_goes_on(service: Mission
     assert any("ordered by Ana {1}" in words for words in told)
     assert any("goes on with its part" in words for words in told)
     assert not [line for line in await events_after(live, 0, 1000) if line.kind == "boundary"]
+
+
+async def test_an_order_whose_legs_wait_for_another_vehicle_is_carried_out(
+    service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # All its legs are decided at once, with some of another vehicle's, and the first one has to wait.
+    live = await flying(service, survey("a", "b"))
+    barred = 0
+
+    def close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[str, str]:
+        nonlocal barred
+        found = too_close(decision, live, spec)
+        both = {leg.vehicle for leg in decision.legs if not leg.refusal} == {"a", "b"}
+        if live.team.members["a"].asked is None or barred == 3 or not both:
+            return found
+        barred += 1
+        return {"a": "b passes"} | found
+
+    monkeypatch.setattr(own_legs, "too_close", close)
+    monkeypatch.setattr(own_legs.OwnLegs, "_legs_at_once", lambda *_: 12)
+    order = await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(70.0, 70.0)), "Ana")
+    await until_over(live, order.id)
+    assert barred > 0
+    assert any(np.hypot(east - 70.0, north - 70.0) < 0.5 for _, east, north, _ in await legs_of(database, live, "a"))
 
 
 async def test_what_cannot_be_flown_is_refused_with_what_would_be_right(service: MissionService) -> None:

@@ -274,8 +274,9 @@ class SurveyRegressors:
             self._begin_with(vehicle, ends_m.reshape(-1, 2))
         if resume_at_m is not None:
             self._begin_with(vehicle, resume_at_m[None])
-        # What came before was flown elsewhere: it cannot be taken back any more.
-        self._given[vehicle] = []
+        if not known or resume_at_m is not None:
+            # What came before was flown elsewhere: it cannot be taken back any more.
+            self._given[vehicle] = []
 
     def _begin_with(self, vehicle: str, vias: FloatArray) -> None:
         for routes in (self._plan, self._backbone):

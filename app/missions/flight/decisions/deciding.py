@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.problem import Planner
+from app.exploration.planner.ordered import OrderedPlanner
 from app.exploration.planners import COVERERS
 from app.exploration.site_search import SearchTask
 from app.missions import metrics
@@ -46,7 +46,7 @@ class Decider:
     """
 
     def __init__(
-        self, live: LiveMission, constraints: Constraints, planner: Planner, maps: StepMaps, executor: Executor
+        self, live: LiveMission, constraints: Constraints, planner: OrderedPlanner, maps: StepMaps, executor: Executor
     ) -> None:
         self._live = live
         self._constraints = constraints

@@ -11,6 +11,7 @@ import pytest
 from sqlalchemy import select
 
 from app.arrays import FloatArray
+from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointStatus
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.deciding import Decider, moved_on, place_ahead
@@ -44,7 +45,7 @@ class Flight:
         self.live = live
         spec = live.spec
         constraints = make_constraints(spec)
-        self.planner = make_planner(spec)
+        self.planner = OrderedPlanner(make_planner(spec))
         self.committing = LegCommit(live, constraints, leads=False)
         maps = StepMaps(live, executor, TIME_SCALE, 0.2, _at_once)
         self.decider = Decider(live, constraints, self.planner, maps, executor)
