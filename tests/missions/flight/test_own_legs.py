@@ -161,12 +161,13 @@ async def test_a_vehicle_that_does_not_move_keeps_nobody(service: MissionService
 async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionService, database: Database) -> None:
     limits = {"max_step_m": 8.0, "min_separation_m": 6.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
     vehicles = [{"name": name, "kind": "sim", "depth_m": 2.0} for name in "abc"]
-    spec = sim_spec(steps=8, side_m=30.0, vehicles=vehicles, limits=limits, planner={"name": "random"})
+    spec = sim_spec(steps=16, side_m=30.0, vehicles=vehicles, limits=limits, planner={"name": "random"})
     mission = (await service.create(spec)).id
     await act(service, mission, "start")
     view = await until_state(service, mission, MissionState.FINISHED)
-    assert view.progress.step == 8
+    assert view.progress.step == 16
     told = [line.message for line in await events_after(await service.get(mission)) if line.kind == "safety"]
+    # On a busy machine legs are decided at other times, and of few it may be none.
     assert any("its next leg passes" in message for message in told)
 
 
