@@ -23,9 +23,9 @@ class GoalPart(NamedTuple):
     sweep_m : float
         How far a vehicle travels to see them, its scanner seeing a strip as wide as it reaches.
     way_m : (rows, cols)
-        How far they may be from every cell, where nothing unexplored is in the way.
+        How far they may be from every cell, unexplored ones taken as free.
     home_m : float
-        How far the entry may be from them.
+        How far the entry may be from the nearest of them, in the same way.
     """
 
     cells: float
@@ -50,9 +50,11 @@ def parts_left(scene: Scene) -> list[GoalPart]:
     sizes = np.bincount(marks.ravel())
     sizes[0] = 0
     largest = [mark for mark in np.argsort(-sizes, kind="stable")[:MOST_PARTS] if sizes[mark] >= LEAST_CELLS]
+    if not largest:
+        return []
     entry = np.zeros(marks.shape, dtype=np.bool_)
     entry[tuple(ground.places(task.entry_m[None])[0])] = True
-    home_m = ground.metres(ground.hoped(entry)) if largest else np.zeros(marks.shape)
+    home_m = ground.metres(ground.hoped(entry))
     parts = []
     for mark in largest:
         part = marks == mark

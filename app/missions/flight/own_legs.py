@@ -212,7 +212,7 @@ class OwnLegs:
             places = moved_on(places, decision)
             given = await self._commit(decision, starts, {name: number + later for name, number in numbers.items()})
             committed |= bool(given)
-            for leg in self._not_given(decision, given, numbers):
+            for leg in self._not_given(decision, given):
                 not_given.setdefault(leg.vehicle, []).append(leg.target_m[:2])
             # Who did not get this leg gets none that goes on from it.
             numbers = {name: number for name, number in numbers.items() if self._has_leg(name, number + later)}
@@ -224,12 +224,13 @@ class OwnLegs:
                 planner.put_back(name, np.array(ends))
         self._maps.begin()
 
-    def _not_given(self, decision: Decision, given_m: dict[str, FloatArray], numbers: dict[str, int]) -> Iterable[Leg]:
+    def _not_given(self, decision: Decision, given_m: dict[str, FloatArray]) -> Iterable[Leg]:
         """Return the planned legs of a decision that no vehicle got, and that nobody is led to in another way."""
         for leg in decision.legs:
             end_m = given_m.get(leg.vehicle)
             gets_it = end_m is not None and np.array_equal(end_m, leg.target_m)
-            is_led_round = leg.vehicle in numbers and leg.vehicle in self._dispatch.dropped
+            led_to = self._dispatch.dropped.get(leg.vehicle, [])
+            is_led_round = any(np.array_equal(end, leg.target_m[:2]) for end in led_to)
             if not leg.comes_in and not leg.refusal and not gets_it and not is_led_round:
                 yield leg
 
