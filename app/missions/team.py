@@ -180,6 +180,8 @@ class Member:
     """When it was given its order, the event loop's time."""
     leg_allowed_s: float = 0.0
     """How long it may take for it, by the vehicles' clock."""
+    lets_pass: bool = False
+    """Whether it was led aside from its leg to let another vehicle pass: the time for its leg stands still."""
 
     @property
     def name(self) -> str:
@@ -223,7 +225,7 @@ class Member:
 
     def set_order(self, order: WaypointOrder | None, target_m: NDArray[np.float64] | None = None) -> None:
         """Give it an order and where that leads, or take its order away."""
-        self.order, self.target_m, self.waits_m = order, target_m, None
+        self.order, self.target_m, self.waits_m, self.lets_pass = order, target_m, None, False
 
     def last_end_m(self, frame: LocalFrame) -> NDArray[np.float64]:
         """Return where its last committed leg ends, (2,), or where it is when it has none to fly."""

@@ -86,6 +86,19 @@ async def test_waypoint_close_by_counts_as_reached_where_the_vehicle_circles() -
         assert "as near as the vehicle comes" in arrival.reason
 
 
+@pytest.mark.parametrize("away_m", [15.5, 16.5, 17.5])
+async def test_a_waypoint_at_the_surface_is_flown_to_unless_the_vehicle_would_drift_there(away_m: float) -> None:
+    async with open_sea() as sea:
+        (name,) = await sea.ready()
+        await sea.bridge.engage(name)
+        here = sea.fleet.nodes[0].vehicle.position
+        east_m, north_m = here.east_m, here.north_m + away_m
+        sea.bridge.goto(name, sea.waypoint(0, east_m, north_m, 0.0, arrival_radius_m=3.0))
+        await sea.reached(name, 0)
+        now = sea.fleet.nodes[0].vehicle.position
+        assert now.horizontal_distance_m(east_m, north_m) < away_m - 5.0, "it flew there"
+
+
 @pytest.mark.parametrize("family", ["slope", "smooth"])
 async def test_guard_keeps_the_vehicle_off_the_bottom(family: str) -> None:
     async with open_sea(family=family) as sea:

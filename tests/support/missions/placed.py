@@ -30,7 +30,7 @@ class PlacedVehicles:
         self.ordered: list[WaypointOrder] = []
         constraints = make_constraints(live.spec)
         committing = LegCommit(live, constraints, leads=False)
-        dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
+        self.dispatch = dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
         zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
         self.asides = asides = Asides(live, committing, dispatch)
         self.giving_way = GivingWay(live, constraints, committing, zones, asides, 1.0)

@@ -71,6 +71,7 @@ class Asides:
         await self._dispatch.stay(member, order)
         if member.waits_m is None:
             self._led.pop(member.name, None)  # it refused
+        member.lets_pass = because is Because.VEHICLE and member.waits_m is not None
         return begins and member.waits_m is not None
 
     async def lead_on(self, member: Member) -> None:
@@ -79,7 +80,7 @@ class Asides:
         if aside is None:
             return
         del self._led[member.name]
-        member.waits_m = None
+        member.waits_m, member.lets_pass = None, False
         member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
         await self._dispatch.send(member)
 

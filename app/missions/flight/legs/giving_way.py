@@ -227,9 +227,12 @@ class GivingWay:
         """Send vehicles on that would stay clear of the others now, or have waited long."""
         now_s = asyncio.get_running_loop().time()
         for name, giving in self._asides.of(Because.VEHICLE).items():
-            if name not in near or not near[name].member.present:
+            member = self._live.team.get(name)
+            if member is None or not member.present:
                 continue
-            member = near[name].member
+            if name not in near:
+                await self._asides.lead_on(member)
+                continue
             waited_s = now_s - giving.since_s
             on = self._going_on(member)
             least_m = CLEAR * self._live.spec.limits.min_separation_m

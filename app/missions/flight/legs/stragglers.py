@@ -4,6 +4,7 @@ A vehicle on its own legs goes on with the next one (:mod:`app.missions.flight.l
 without it (:mod:`app.missions.flight.team_steps`).
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,7 +41,12 @@ def step_allowed_s(live: LiveMission) -> float:
 
 
 def late_at_s(member: Member, time_scale: float) -> float:
-    """Return the event loop's time from which on a vehicle that is still on its leg is a straggler."""
+    """Return the event loop's time from which on a vehicle that is still on its leg is a straggler.
+
+    inf while it lets another one pass.
+    """
+    if member.lets_pass:
+        return math.inf
     return member.leg_began_s + member.leg_allowed_s / time_scale
 
 

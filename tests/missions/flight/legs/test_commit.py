@@ -6,6 +6,7 @@ import pytest
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Belief
 from app.exploration.planners import create_planner
+from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.water.tides import TideTable
 from app.missions.clock import now, told_by
 from app.missions.fleet.interface import Position, VehicleReport, WaypointStatus
@@ -16,6 +17,7 @@ from app.missions.soundings.corrections import Corrections
 from app.missions.spec.failsafes import Response
 from app.missions.team import Withdrawal
 from tests.support.missions.harbour import sim_spec
+from tests.support.missions.specs import LAT, LON
 
 DATUM_DEPTH_M = 10.0
 
@@ -157,3 +159,26 @@ async def test_who_comes_up_at_home_stays_there(service: MissionService) -> None
         assert member.order is not None
         leads.append(member.order.lead is not None)
     assert leads == [True, False, False], "it is led through the corner, and to its place"
+
+
+async def test_a_vehicle_that_drifted_towards_the_area_still_goes_round_the_zone_before_it(
+    service: MissionService,
+) -> None:
+    frame = LocalFrame(LAT, LON)
+    corners = [(10.0, -14.0), (20.0, -14.0), (20.0, -8.0), (10.0, -8.0), (10.0, -14.0)]
+    ring = [[float(x) for x in reversed(frame.to_geographic(np.array(e), np.array(n)))] for e, n in corners]
+    live = await service.get(
+        (await service.create(sim_spec("a", keep_out=[{"type": "Polygon", "coordinates": [ring]}]))).id
+    )
+    committing = LegCommit(live, make_constraints(live.spec), leads=False)
+    member = live.team.join(live.spec.vehicles[0], 0)
+
+    def barred(here_m: tuple[float, float], end_m: tuple[float, float]) -> str:
+        lat, lon = live.frame.to_geographic(*np.array(here_m))
+        member.report = VehicleReport("a", 0.0, Position(float(lat), float(lon), 0.0))
+        committing.lead_home(member, [(np.array(end_m), 0.0)])
+        return committing.barred(member)
+
+    assert barred((15.0, -19.5), (26.0, -20.0)) == "", "the corner is 0.5 m farther out than the vehicle"
+    assert "keep-out" in barred((15.0, -19.5), (15.0, -4.0))
+    assert "outside the area" in barred((15.0, 5.0), (26.0, -20.0)), "who is inside never leaves"

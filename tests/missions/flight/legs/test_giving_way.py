@@ -97,6 +97,27 @@ async def test_who_waits_waits_no_longer_than_a_minute(scene: PlacedVehicles) ->
     assert second.leg_began_s == pytest.approx(began_s + PATIENCE_S, abs=5.0)
 
 
+async def test_while_a_vehicle_gives_way_it_is_not_late_for_its_leg(scene: PlacedVehicles) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    second = scene.put("b", THERE, (1.0, 30.0, 3.0))
+    await scene.giving_way.look()
+    second.leg_allowed_s = 0.0
+    assert second not in await scene.dispatch.settle_late([second])
+    assert second.ordered
+    await scene.asides.lead_on(second)
+    assert await scene.dispatch.settle_late([second]) == [second]
+
+
+async def test_who_gave_way_to_a_vehicle_that_is_home_goes_on(scene: PlacedVehicles) -> None:
+    first = scene.put("a", HERE, (50.0, 30.0, 3.0))
+    second = scene.put("b", THERE, (1.0, 30.0, 3.0))
+    await scene.giving_way.look()
+    first.withdrawal = Withdrawal(Response.RETURN, "its energy", over=True)
+    await scene.giving_way.look()
+    assert second.waits_m is None
+    assert scene.ordered[1] is second.order
+
+
 def test_vehicles_whose_lines_lead_past_each_other_pass_and_survey(monkeypatch: pytest.MonkeyPatch) -> None:
     routes = lawnmower.shared_lines
     # Each has the other's strip, at one depth: neither could set out while the other stood in its way.
