@@ -1,12 +1,15 @@
 """Keeps vehicles that fly on their own time apart: whole planned motions are held against each other, in time."""
 
+import math
+
 import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.motion.timeline import Approach, Timeline, closest_approach, speed_over_ground_mps
-from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.decision import Decision, turn_radius_m
+from app.missions.flight.steering import steered_motion
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.energy import ASCENT_MPS
 from app.missions.safety import free_space
@@ -24,7 +27,7 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
 
     A vehicle is taken to fly its committed legs at its speed, in the current, and to stay where the last one ends. Of
     those with a new leg the one that is too close to most others does without it, then the next, until nobody is too
-    close.
+    close. One that sets out turns before it is on its leg: from those that move it keeps apart on that way, too.
     """
     limits = spec.limits
     if limits.min_separation_m <= 0.0:
@@ -32,15 +35,20 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
     before = {m.name: planned_motion(m, live) for m in live.team if m.present}
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
     speeds, current_mps = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}, live.team.current_mps
+    setting_out = {m.name: _steered(m, new[m.name], live) for m in live.team if m.name in new and _sets_out(m)}
     refused: dict[str, str] = {}
     while True:
         moving = {name: _continued(before[name], end, speeds[name], current_mps) for name, end in new.items()}
+        turning = {name: setting_out.get(name, motion) for name, motion in moving.items()}
+        under_way = {name: motion for name, motion in (before | turning).items() if len(motion.time_s) > 1}
+        begins_s = {name: float(before[name].time_s[-1]) for name in new}
         close = [
             (name, other, approach)
-            for name in sorted(moving)
-            for other, motion in (before | moving).items()
+            for motions, others in ((moving, before | moving), (setting_out, under_way))
+            for name in sorted(motions.keys() & new.keys())
+            for other, motion in others.items()
             if other != name
-            if (approach := _approach(moving[name], float(before[name].time_s[-1]), motion, limits)) is not None
+            if (approach := _approach(motions[name], begins_s[name], motion, limits)) is not None
         ]
         if not close:
             return refused
@@ -132,6 +140,24 @@ def motion_along(places: list[FloatArray], speed_mps: float, current_mps: tuple[
     for place in places[1:]:
         motion = _continued(motion, place, speed_mps, current_mps)
     return motion
+
+
+def _sets_out(member: Member) -> bool:
+    """Whether a vehicle flies nothing, and has no leg to fly."""
+    return not member.ordered and not member.ahead
+
+
+def _steered(member: Member, target_m: FloatArray, live: LiveMission) -> Timeline:
+    """Return the motion of a vehicle to the end of a leg (3,) that it sets out on from where it is and heads."""
+    heading_rad = None if member.report is None else member.report.heading_rad
+    return steered_motion(
+        [*planned_places(member, live)[:1], target_m],
+        math.nan if heading_rad is None else heading_rad,
+        live.spec.speed_of(member.spec),
+        turn_radius_m(live.spec, member.spec),
+        live.team.current_mps,
+        math.inf,
+    )
 
 
 def _continued(
