@@ -57,7 +57,11 @@ class Order:
             return order
         order.start = (report.lat_deg, report.lon_deg)
         lead = order.lead
-        order.leading = lead is not None and distance_m(order.start, lead) > FLOWN_STRAIGHT_M
+        order.leading = (
+            lead is not None
+            and distance_m(order.start, lead) > FLOWN_STRAIGHT_M
+            and _ahead(order.start, order.place, lead)
+        )
         if not order.leading and distance_m(order.start, order.place) <= FLOWN_STRAIGHT_M:
             order.radius_m = CLOSE_RADIUS_M
         return order
@@ -132,3 +136,13 @@ class Order:
         self.leading = False
         distance = distance_m((report.lat_deg, report.lon_deg), self.place)
         self.radius_m = CLOSE_RADIUS_M if distance <= FLOWN_STRAIGHT_M else 0.0
+
+
+def _ahead(start: Place, place: Place, beyond: Place) -> bool:
+    """Whether who goes from a start to what lies beyond a place passes the place on the way.
+
+    One that was led aside, and sent on, may be past it already.
+    """
+    to_north, to_east = offset_m(start, place)
+    on_north, on_east = offset_m(place, beyond)
+    return to_north * on_north + to_east * on_east > 0.0
