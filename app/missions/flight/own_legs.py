@@ -222,6 +222,9 @@ class OwnLegs:
         else:
             for name, ends in not_given.items():
                 planner.put_back(name, np.array(ends))
+            if not_given:
+                # What was stored with the legs has these as flown, and a restart would go on from that.
+                await self._committing.remember(planner.snapshot())
         self._maps.begin()
 
     def _not_given(self, decision: Decision, given_m: dict[str, FloatArray]) -> Iterable[Leg]:

@@ -25,6 +25,7 @@ from app.missions.states import MissionState
 from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import WaypointRow
+from app.storage.queries import missions as mission_queries
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step
 from tests.support.missions.specs import FRAME, lon_lat, rectangle
 from tests.support.waiting import until
@@ -122,11 +123,25 @@ async def test_an_order_whose_legs_wait_for_another_vehicle_is_carried_out(
         barred += 1
         return {"a": "b passes"} | found
 
+    decide, stored = own_legs.OwnLegs._decide, []
+
+    async def decide_and_look(legs: own_legs.OwnLegs, getting: list[Member]) -> None:
+        before = barred
+        await decide(legs, getting)
+        if barred > before:
+            async with database.reading() as session:
+                step = await mission_queries.last_step(session, live.id)
+            assert step is not None
+            stored.append(step.memory == legs._decider.planner.snapshot())
+
     monkeypatch.setattr(own_legs, "too_close", close)
+    monkeypatch.setattr(own_legs.OwnLegs, "_decide", decide_and_look)
     monkeypatch.setattr(own_legs.OwnLegs, "_legs_at_once", lambda *_: 12)
     order = await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(70.0, 70.0)), "Ana")
     await until_over(live, order.id)
     assert barred > 0
+    assert stored
+    assert all(stored), "so that a restart goes on from what is known now"
     assert any(np.hypot(east - 70.0, north - 70.0) < 0.5 for _, east, north, _ in await legs_of(database, live, "a"))
 
 

@@ -142,19 +142,25 @@ class LegCommit:
 
         ``legs`` are by vehicle; ``decision`` is the last one of those that they come from.
         """
-        live = self._live
         rows = [self._row(ahead.number, leg) for of_one in legs.values() for ahead, leg in of_one]
+        await self._store_memory(decision.memory, rows)
+        self.take_bottom(decision.bottom)
+
+    async def remember(self, memory: bytes) -> None:
+        """Make durable what the planner remembers, in place of what was stored with the last step."""
+        await self._store_memory(memory, [])
+
+    async def _store_memory(self, memory: bytes, rows: Sequence[WaypointRow]) -> None:
+        """Write what the planner remembers, and waypoints in place of those of the same numbers."""
+        live = self._live
 
         async def store() -> None:
             async with live.database.writing() as session:
                 for row in rows:
                     await session.merge(row)
-                await mission_queries.remember(
-                    session, live.id, live.header.step, decision.memory, live.ranges.memory()
-                )
+                await mission_queries.remember(session, live.id, live.header.step, memory, live.ranges.memory())
 
         await live.journal.storage.done(lambda: to_the_end(store()))
-        self.take_bottom(decision.bottom)
 
     def lead_home(self, member: Member, corners: list[tuple[FloatArray, float]]) -> None:
         """Give a vehicle legs that survey nothing: along corners (2,) at depths, metres.
