@@ -181,7 +181,9 @@ class Member:
     leg_allowed_s: float = 0.0
     """How long it may take for it, by the vehicles' clock."""
     lets_pass: bool = False
-    """Whether it was led aside from its leg to let another vehicle pass: the time for its leg stands still."""
+    """Whether it was led aside from its leg to let another vehicle pass, and the time for its leg stands still."""
+    asides: int = 0
+    """How often it was led aside from its leg to let another vehicle pass."""
 
     @property
     def name(self) -> str:
@@ -225,7 +227,8 @@ class Member:
 
     def set_order(self, order: WaypointOrder | None, target_m: NDArray[np.float64] | None = None) -> None:
         """Give it an order and where that leads, or take its order away."""
-        self.order, self.target_m, self.waits_m, self.lets_pass = order, target_m, None, False
+        self.order, self.target_m, self.waits_m = order, target_m, None
+        self.lets_pass, self.asides = False, 0
 
     def last_end_m(self, frame: LocalFrame) -> NDArray[np.float64]:
         """Return where its last committed leg ends, (2,), or where it is when it has none to fly."""

@@ -18,6 +18,8 @@ from app.missions.team import Member
 
 HORIZON_S = 20.0
 """How far ahead vehicles' ways are looked at, seconds of their time."""
+MOST_ASIDES = 3
+"""So often a vehicle lets others pass without losing time for its leg: one that stays in its way never passes."""
 
 
 class Because(StrEnum):
@@ -71,7 +73,9 @@ class Asides:
         await self._dispatch.stay(member, order)
         if member.waits_m is None:
             self._led.pop(member.name, None)  # it refused
-        member.lets_pass = because is Because.VEHICLE and member.waits_m is not None
+        elif begins and because is Because.VEHICLE:
+            member.asides += 1
+            member.lets_pass = member.asides <= MOST_ASIDES
         return begins and member.waits_m is not None
 
     async def lead_on(self, member: Member) -> None:
@@ -80,8 +84,9 @@ class Asides:
         if aside is None:
             return
         del self._led[member.name]
+        if aside.because is not Because.VEHICLE or member.lets_pass:
+            member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
         member.waits_m, member.lets_pass = None, False
-        member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
         await self._dispatch.send(member)
 
     def _now(self, name: str) -> Aside | None:

@@ -7,7 +7,7 @@ from app.commands.home import fly_mission
 from app.exploration.lines import lawnmower
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import LinkState
-from app.missions.flight.legs.asides import Because
+from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
 from app.missions.service import MissionService
@@ -105,6 +105,19 @@ async def test_while_a_vehicle_gives_way_it_is_not_late_for_its_leg(scene: Place
     assert second not in await scene.dispatch.settle_late([second])
     assert second.ordered
     await scene.asides.lead_on(second)
+    assert await scene.dispatch.settle_late([second]) == [second]
+
+
+async def test_who_gives_way_again_and_again_is_late_for_its_leg_in_the_end(scene: PlacedVehicles) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    second = scene.put("b", THERE, (1.0, 30.0, 3.0))
+    for _ in range(MOST_ASIDES):
+        await scene.giving_way.look()
+        assert second.lets_pass
+        await scene.asides.lead_on(second)
+    await scene.giving_way.look()
+    assert second.waits_m is not None
+    second.leg_allowed_s = 0.0
     assert await scene.dispatch.settle_late([second]) == [second]
 
 
