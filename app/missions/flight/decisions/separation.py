@@ -27,7 +27,8 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
 
     A vehicle is taken to fly its committed legs at its speed, in the current, and to stay where the last one ends. Of
     those with a new leg the one that is too close to most others does without it, then the next, until nobody is too
-    close. One that sets out turns before it is on its leg: from those that move it keeps apart on that way, too.
+    close. One that sets out turns before it is on its leg: from those that move it keeps apart on that way, too. One
+    that was led aside for another to pass stays there: who waits for it would have it wait for good.
     """
     limits = spec.limits
     if limits.min_separation_m <= 0.0:
@@ -36,15 +37,16 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
     speeds, current_mps = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}, live.team.current_mps
     setting_out = {m.name: _steered(m, new[m.name], live) for m in live.team if m.name in new and _sets_out(m)}
+    aside = {m.name: _stays_aside(m, live) for m in live.team if m.name in before and m.lets_pass}
     refused: dict[str, str] = {}
     while True:
         moving = {name: _continued(before[name], end, speeds[name], current_mps) for name, end in new.items()}
         turning = {name: setting_out.get(name, motion) for name, motion in moving.items()}
-        under_way = {name: motion for name, motion in (before | turning).items() if len(motion.time_s) > 1}
+        under_way = {name: motion for name, motion in (before | turning | aside).items() if len(motion.time_s) > 1}
         begins_s = {name: float(before[name].time_s[-1]) for name in new}
         close = [
             (name, other, approach)
-            for motions, others in ((moving, before | moving), (setting_out, under_way))
+            for motions, others in ((moving, before | moving | aside), (setting_out, under_way))
             for name in sorted(motions.keys() & new.keys())
             for other, motion in others.items()
             if other != name
@@ -132,6 +134,13 @@ def planned_places(member: Member, live: LiveMission) -> list[FloatArray]:
     if member.link not in OUT_OF_REACH:
         places += [np.append(leg.target_m, leg.position.depth_m) for leg in member.ahead]
     return places
+
+
+def _stays_aside(member: Member, live: LiveMission) -> Timeline:
+    """Return the motion of a vehicle to where it lets others pass."""
+    here = planned_places(member, live)[0]
+    there = here if member.waits_m is None else np.append(member.waits_m, here[2])
+    return motion_along([here, there], live.spec.speed_of(member.spec), live.team.current_mps)
 
 
 def motion_along(places: list[FloatArray], speed_mps: float, current_mps: tuple[float, float]) -> Timeline:
