@@ -180,6 +180,11 @@ def link(scene: Scene, vehicle: str) -> str:
     return str(state)
 
 
+def failsafes(scene: Scene, vehicle: str) -> set[str]:
+    [active] = [v["failsafes"] for v in view(scene, scene.mission)["vehicles"] if v["name"] == vehicle]
+    return {str(one["failsafe"]) for one in active}
+
+
 def depth_m(scene: Scene, vehicle: str) -> float:
     [depth] = [v["depth_m"] for v in view(scene, scene.mission)["vehicles"] if v["name"] == vehicle]
     return float(depth)
@@ -202,15 +207,19 @@ def a_ship_comes(scene: Scene) -> None:
 
 
 def somebody_else_aborts(scene: Scene) -> None:
-    # Nothing is taken from us while it does not follow: on a busy machine it may have to be engaged anew.
-    scene.wait(lambda: link(scene, "other_console") == "engaged", "it follows")
     abort = imcpy.Abort()
 
     def send(node: Any) -> None:
         abort.src, abort.dst, abort.timestamp = 0x4001, node.imc_id, 1.7e9
         scene.console.sock.sendto(imcpy.Packet.serialize(abort), node.address)
 
-    scene.dunes.do("other_console", send)
+    def taken() -> bool:
+        # Nothing is taken from us while it does not follow: on a busy machine it may have to be engaged anew.
+        if link(scene, "other_console") == "engaged":
+            scene.dunes.do("other_console", send)
+        return "other_console" in failsafes(scene, "other_console")
+
+    scene.wait(taken, "it was taken from us")
 
 
 def restart(scene: Scene) -> None:
