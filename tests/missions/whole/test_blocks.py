@@ -18,7 +18,7 @@ from tests.support.waiting import until
 SPEED = 5.0
 WEST, EAST = ((5, 5), (30, 5), (30, 95), (5, 95)), ((70, 5), (95, 5), (95, 95), (70, 95))
 ZONE = ((45, 40), (55, 40), (55, 60), (45, 60))
-APART_M = 5.0
+APART_M = 8.0
 HEARD_WITHIN_S = 1.0
 """By the vehicles' clocks: on a busy machine seconds of a track may be missing."""
 
