@@ -259,7 +259,7 @@ class Follower(Control):
         if order.limited and order.sent and 0.0 <= depth - order.sent[-1].depth_m < GUARD_STEP_M:
             depth = order.sent[-1].depth_m
         lat_deg, lon_deg = order.way[-1]
-        # At the surface no vehicle circles. DUNE drifts within so much more than its tolerance as the radius is.
+        # At the surface DUNE drifts, motor off, from where it is within its tolerance and the radius on: no circles.
         radius_m = order.radius_m if depth > 0.0 else 0.0
         return SentReference(math.radians(lat_deg), math.radians(lon_deg), depth, waypoint.speed_mps, radius_m)
 

@@ -191,6 +191,8 @@ async def test_vehicle_that_follows_an_earlier_run_of_ours_is_engaged_anew() -> 
         await sea.bridge.engage(name)
         sea.bridge.goto(name, sea.waypoint(1, 50, 40, 1.0))
         await sea.reached(name, 1)
+        assert sea.statuses(name, 0) == [], "nobody asked this bridge for that"
+        assert sea.statuses(name, 1) == [S, A, R]
 
 
 class Console(Peer):
@@ -256,6 +258,8 @@ async def test_closing_stops_every_vehicle_and_restores_its_rates() -> None:
         former = [node._rate_text for node in sea.fleet.nodes]
         await asyncio.gather(*(sea.bridge.engage(name) for name in names))
         await until(lambda: all("Distance:5" in node._rate_text for node in sea.fleet.nodes), "the rates were set")
+        assert all(node.plan.maneuver is not None for node in sea.fleet.nodes)
+        assert not any("Distance:5" in text for text in former)
         await sea.bridge.close()
         await until(lambda: all(node.plan.maneuver is None for node in sea.fleet.nodes), "none follows any more")
         await until(lambda: [node._rate_text for node in sea.fleet.nodes] == former, "the rates are as before")
@@ -269,7 +273,9 @@ async def test_rates_are_restored_though_packets_are_lost() -> None:
         restored = {node._rate_text, DUNE_DEFAULTS}
         await sea.bridge.engage(name)
         await until(lambda: "Distance:5" in node._rate_text, "the rates were set")
-        await sea.bridge.stop(name, timeout_s=20.0)
+        result = await sea.bridge.stop(name, timeout_s=20.0)
+        assert result.acknowledged, result
+        assert not any("Distance:5" in text for text in restored)
         await until(lambda: node._rate_text in restored, "the rates are as before")
 
 
@@ -376,3 +382,5 @@ async def test_waypoints_are_reached_in_a_current_of_half_the_speed(guidance: Gu
         for step, (east, north) in enumerate([(30, 60), (70, 60), (30, 30)]):
             sea.bridge.goto(name, sea.waypoint(step, east, north, 1.0, speed_mps=1.0))
             await sea.reached(name, step)
+            assert sea.statuses(name, step) == [S, A, R]
+            assert sea.fleet.nodes[0].vehicle.position.horizontal_distance_m(east, north) < 15.0

@@ -12,7 +12,7 @@ from simulator.geodesy import LocalFrame
 
 FRAME = LocalFrame(41.185, -8.704)
 METRES = st.floats(-60.0, 60.0)
-SURFACE_TOLERANCE_M = 1.0
+DEPTH_TOLERANCE_M = 1.0
 
 
 def report(place: Place) -> StateReport:
@@ -31,6 +31,5 @@ def test_who_is_led_beyond_a_waypoint_has_passed_it_when_it_is_there(
     order = Order.made(waypoint, report(start))
     order.sent.append(SentReference(0.0, 0.0, 0.0, 1.0))
     there = report(lead)
-    if order.leading:
-        arrived = order.arrival(there, SURFACE_TOLERANCE_M, 0.0) is not None
-        assert arrived or order.missed(there, SURFACE_TOLERANCE_M)
+    arrived = order.arrival(there, DEPTH_TOLERANCE_M, 0.0) is not None
+    assert not order.leading or arrived or order.missed(there, DEPTH_TOLERANCE_M)

@@ -11,7 +11,8 @@ from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, VehicleReport, WaypointOrder
 from app.missions.fleet.interface import WaypointStatus as Status
 from app.missions.flight.decisions.decision import make_constraints
-from app.missions.flight.legs.asides import Asides, steered_ahead
+from app.missions.flight.decisions.separation import steered_ahead
+from app.missions.flight.legs.asides import Asides
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.giving_way import GivingWay

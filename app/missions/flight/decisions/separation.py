@@ -27,8 +27,9 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
 
     A vehicle is taken to fly its committed legs at its speed, in the current, and to stay where the last one ends. Of
     those with a new leg the one that is too close to most others does without it, then the next, until nobody is too
-    close. One that sets out turns before it is on its leg: from those that move it keeps apart on that way, too. One
-    that was led aside for another to pass stays there: who waits for it would have it wait for good.
+    close. One that sets out turns before it is on its leg, and keeps apart on that way, too, from those that move or
+    stand aside. One that was led aside for another to pass stands there: were it taken to fly on, the other one would
+    wait for it, too.
     """
     limits = spec.limits
     if limits.min_separation_m <= 0.0:
@@ -36,7 +37,11 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
     before = {m.name: planned_motion(m, live) for m in live.team if m.present}
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
     speeds, current_mps = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}, live.team.current_mps
-    setting_out = {m.name: _steered(m, new[m.name], live) for m in live.team if m.name in new and _sets_out(m)}
+    setting_out = {
+        m.name: steered_ahead(live, m, [*planned_places(m, live)[:1], new[m.name]], math.inf)
+        for m in live.team
+        if m.name in new and not m.ordered and not m.ahead
+    }
     aside = {m.name: _stays_aside(m, live) for m in live.team if m.name in before and m.lets_pass}
     refused: dict[str, str] = {}
     while True:
@@ -151,21 +156,16 @@ def motion_along(places: list[FloatArray], speed_mps: float, current_mps: tuple[
     return motion
 
 
-def _sets_out(member: Member) -> bool:
-    """Whether a vehicle flies nothing, and has no leg to fly."""
-    return not member.ordered and not member.ahead
-
-
-def _steered(member: Member, target_m: FloatArray, live: LiveMission) -> Timeline:
-    """Return the motion of a vehicle to the end of a leg (3,) that it sets out on from where it is and heads."""
+def steered_ahead(live: LiveMission, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
+    """Return how a vehicle will steer for one place (3,) after the other in the current, from where it heads now."""
     heading_rad = None if member.report is None else member.report.heading_rad
     return steered_motion(
-        [*planned_places(member, live)[:1], target_m],
+        places,
         math.nan if heading_rad is None else heading_rad,
         live.spec.speed_of(member.spec),
         turn_radius_m(live.spec, member.spec),
         live.team.current_mps,
-        math.inf,
+        until_s,
     )
 
 

@@ -1,17 +1,13 @@
 """Leads vehicles aside from their legs for a while, and on again."""
 
 import asyncio
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 
 from app.arrays import FloatArray
-from app.exploration.motion.timeline import Timeline
 from app.missions.fleet.interface import WaypointOrder
-from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
-from app.missions.flight.steering import steered_motion
 from app.missions.live.mission import LiveMission
 from app.missions.spec.vehicle import Guidance
 from app.missions.team import Member
@@ -88,6 +84,7 @@ class Asides:
             member.leg_began_s += asyncio.get_running_loop().time() - aside.since_s
         member.waits_m, member.lets_pass = None, False
         await self._dispatch.send(member)
+        self._live.changed.set()  # its time for the leg goes on
 
     def _now(self, name: str) -> Aside | None:
         """Return what a vehicle is led aside from now: it may have got another order while others were looked at."""
@@ -97,19 +94,6 @@ class Asides:
     def _lasts(self, name: str, aside: Aside) -> bool:
         member = self._live.team.get(name)
         return member is not None and member.ordered and member.order is aside.order and member.waits_m is not None
-
-
-def steered_ahead(live: LiveMission, member: Member, places: list[FloatArray], until_s: float) -> Timeline:
-    """Return how a vehicle will steer for one place (3,) after the other in the current, from where it heads now."""
-    heading_rad = None if member.report is None else member.report.heading_rad
-    return steered_motion(
-        places,
-        math.nan if heading_rad is None else heading_rad,
-        live.spec.speed_of(member.spec),
-        turn_radius_m(live.spec, member.spec),
-        live.team.current_mps,
-        until_s,
-    )
 
 
 def depth_now_m(member: Member) -> float:

@@ -196,10 +196,10 @@ class LegCommit:
         constraints = self._constraints
         if member.withdrawal is not None and (home_m := home_of(member.spec, member.slot, self._live.spec)) is not None:
             constraints = homeward_ground(constraints, home_m)
-        # Who comes in round a zone may have drifted, and be a little nearer to the area than the corner it goes round.
+        # The corner of a way in round a zone may lie farther outside than its vehicle does.
         area = Polygon(constraints.area)
-        rounds = all(free_space.distance_outside_m(area, place_m[0, :2]) > 0.0 for place_m in (here, there))
-        limits = [limit for limit in WHERE if not (rounds and limit is Limit.AREA)]
+        goes_round = all(free_space.distance_outside_m(area, place_m[0, :2]) > 0.0 for place_m in (here, there))
+        limits = [limit for limit in WHERE if not (goes_round and limit is Limit.AREA)]
         broken = constraints.violations((member.name,), here, there)
         return next((violation.reason for violation in broken if violation.limit in limits), "")
 

@@ -18,8 +18,8 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.motion.timeline import Timeline, closest_approach
 from app.missions.flight.decisions.decision import turn_radius_m
-from app.missions.flight.decisions.separation import planned_places, ways_aside
-from app.missions.flight.legs.asides import HORIZON_S, Asides, Because, depth_now_m, steered_ahead
+from app.missions.flight.decisions.separation import planned_places, steered_ahead, ways_aside
+from app.missions.flight.legs.asides import HORIZON_S, Asides, Because, depth_now_m
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.keeping_off import KeepOutZones
 from app.missions.flight.observation.waiting import until_next_look
