@@ -265,18 +265,25 @@ def _check(service: Service, sea: Sea, mission_id: str) -> None:
 def _check_destinations(sea: Sea, *services: Service) -> None:
     """No vehicle is sent back to where an earlier order led, unless a later step leads there, too.
 
-    Where no step leads, vehicles wait or go aside, again where they did before, and inside the area.
+    Where no step leads, vehicles wait or go aside, again where they did before, and inside the area; then they go on.
     """
     area = Polygon([(0, 0), (SIDE_M, 0), (SIDE_M, SIDE_M), (0, SIDE_M)]).buffer(0.01)
     query = "select east_m, north_m from waypoints where vehicle = ?"
     for name in NAMES:
         planned = [place for service in services for place in service.rows(query, name)]
-        places = sea.destinations(name)
-        for place in places:
-            sent = sum(math.dist(place, other) < SAME_M for other in places)
-            steps = sum(math.dist(place, other) < SAME_M for other in planned)
-            assert sent <= steps or not steps, f"{name} was sent to {place} {sent} times by {steps} steps"
-            assert steps or area.contains(Point(place)), f"{name} was sent to {place}, outside of the area"
+        sent: list[tuple[float, float]] = []
+        for place in sea.destinations(name):
+            if not any(_same(place, step) for step in planned):
+                assert area.contains(Point(place)), f"{name} was sent to {place}, outside of the area"
+            elif not sent or not _same(place, sent[-1]):
+                sent.append(place)
+        for place in sent:
+            times, steps = (sum(_same(place, other) for other in places) for places in (sent, planned))
+            assert times <= steps, f"{name} was sent to {place} {times} times by {steps} steps: {sent}"
+
+
+def _same(place: tuple[float, float], other: tuple[float, float]) -> bool:
+    return math.dist(place, other) < SAME_M
 
 
 def _figures(service: Service, mission_id: str) -> dict[str, Any]:
