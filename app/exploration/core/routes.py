@@ -293,6 +293,16 @@ class FreeSpace:
             return np.asarray(goal, dtype=np.float64)[None]
         return self._round(start, goal)
 
+    def corner(self, start: FloatArray, goal: FloatArray, still_m: float) -> FloatArray:
+        """Return where a shortest way leads first, (2,), but no corner within ``still_m`` of its start: it is there.
+
+        Who is a little too near to a zone would be sent so far away from it, and no farther. The goal, where that is
+        as near.
+        """
+        way = self.way(start, goal)
+        far = np.hypot(*(way - start).T) > still_m
+        return np.asarray(way[int(np.argmax(far)) if far.any() else -1])
+
     def _round(self, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return such a way where no straight leg leads to the goal."""
         start_inside, goal_inside = self.nearest(start), self.nearest(goal)

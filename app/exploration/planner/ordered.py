@@ -257,7 +257,7 @@ class OrderedPlanner:
             # It was ordered nearer to a zone than plans go, and may be there.
             constraints = constraints.for_checks
             space = self._free(constraints)
-        corner_m = space.way(here_m, space.nearest(way.corners_m[0]))[0]
+        corner_m = space.corner(here_m, space.nearest(way.corners_m[0]), SAME_M)
         away_m = float(np.hypot(*(corner_m - here_m)))
         if away_m <= SAME_M:
             way.tries += 1

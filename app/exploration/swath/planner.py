@@ -14,7 +14,7 @@ from app.exploration.lines.lattice import longer_axis_rad
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
-from app.exploration.swath.survey import SwathSurvey
+from app.exploration.swath.survey import STILL_M, SwathSurvey
 
 LEG_WIDTHS = 1.0
 """Longest leg along a line, in half widths of the swath."""
@@ -22,8 +22,8 @@ LEG_WIDTHS = 1.0
 SHORTEST_LEG = 0.5
 """Legs along a line are at least this part of the longest that a vehicle may be given."""
 
-STILL_M, MOST_BARRED = 0.05, 5
-"""Shorter legs lead nowhere; after so many lines that begin with one there is none for now."""
+MOST_BARRED = 5
+"""After so many lines in a row that begin with a leg of no length there is none for now."""
 
 GUESSED_ALTITUDE_M = 5.0
 """How high above the bottom vehicles are taken to be as long as no depth is known."""
@@ -93,9 +93,9 @@ class SwathPlanner(PlannerBase):
             end = survey.next_leg(name, poses[name], flying, coverage, poses, leg_m, team.constraints.max_step_m)
             if end is None:
                 return None
-            way = space.way(here, space.nearest(end))[0]
-            if np.hypot(*(way - here)) > STILL_M:
-                return np.asarray(way)
+            corner = space.corner(here, space.nearest(end), STILL_M)
+            if np.hypot(*(corner - here)) > STILL_M:
+                return corner
             # It would stay where it is for ever: it gets another line.
             survey.skip_line(name, here)
         return None

@@ -26,6 +26,8 @@ from app.exploration.swath.sent import expected, forget_flown, sent_along
 from app.exploration.swath.shares import NEAR_M, better_by_another, between, free_at, part_of_others, share_out
 from app.exploration.swath.tries import MOST_TRIES, Tries, without
 
+STILL_M = 0.05
+"""Shorter legs lead nowhere."""
 MOST_REFUSED = 3
 """Who was so often in a row not sent along its line gets another one."""
 
@@ -239,7 +241,7 @@ class SwathSurvey:
         """Return the end of the next leg along a vehicle's line, and take it off the line."""
         here = asked.pose[:2]
         if not course.begun:
-            corner = course.path[0] if self._space is None else self._space.way(here, course.path[0])[0]
+            corner = course.path[0] if self._space is None else self._space.corner(here, course.path[0], STILL_M)
             away = corner - here
             away_m = float(np.hypot(*away))
             if away_m > reach_m:

@@ -48,6 +48,17 @@ def test_a_way_is_free_and_as_short_as_any(start: tuple[float, float], goal: tup
     assert abs(length_m(a, way) - shortest_m(a, b)) < 1e-5
 
 
+@given(PLACES, PLACES, st.floats(0.0, 0.5))
+def test_a_corner_that_a_way_leads_to_first_is_not_where_it_begins(
+    start: tuple[float, float], goal: tuple[float, float], still_m: float
+) -> None:
+    a, b = np.array(start), SPACE.nearest(np.array(goal))
+    corner, way = SPACE.corner(a, b, still_m), SPACE.way(a, b)
+    first = next(k for k, place in enumerate(way) if np.array_equal(place, corner))
+    assert np.hypot(*(corner - a)) > still_m or first == len(way) - 1
+    assert (np.hypot(*(way[:first] - a).T) <= still_m).all()
+
+
 def test_legs_are_the_ways_from_stop_to_stop() -> None:
     stops = np.array([[5.0, 30.0], [55.0, 30.0], [90.0, 30.0], [5.0, 5.0]])
     legs = SPACE.legs(stops)
