@@ -77,7 +77,9 @@ class SwathSurvey:
         space: FreeSpace | None = None,
     ) -> None:
         self._crosslines = crosslines
+        self._ground = space
         self._space = None if space is None or space.is_open else space
+        """Where a straight way may lead through what vehicles may not enter; None: nowhere."""
         self._across: list[FloatArray] | None = None
         """Crosslines that nobody has begun; None: they are not laid yet."""
         self._direction_rad = preferred_rad
@@ -190,8 +192,8 @@ class SwathSurvey:
         if course is not None and course.begun and course.sent_from is not None:
             sent_m = float(np.hypot(*(pose[:2] - course.sent_from)))
             course.sent_from = None
-            # A place beside the beginning, where it may be, is as good.
-            if not len(course.path) or np.hypot(*(pose[:2] - course.path[0])) <= max(NEAR_M, sent_m):
+            # A place beside the beginning is as good.
+            if not len(course.path) or np.hypot(*(pose[:2] - self._beginning(course))) <= max(NEAR_M, sent_m):
                 return
             sweep.refused += 1
             if sweep.refused >= MOST_REFUSED:
@@ -241,18 +243,19 @@ class SwathSurvey:
         """Return the end of the next leg along a vehicle's line, and take it off the line."""
         here = asked.pose[:2]
         if not course.begun:
-            corner = course.path[0] if self._space is None else self._space.corner(here, course.path[0], STILL_M)
+            begin = self._beginning(course)
+            corner = begin if self._space is None else self._space.corner(here, begin, STILL_M)
             away = corner - here
             away_m = float(np.hypot(*away))
             if away_m > reach_m:
                 return np.asarray(here + reach_m / away_m * away)
-            if float(np.hypot(*(course.path[0] - corner))) > NEAR_M:
+            if float(np.hypot(*(begin - corner))) > NEAR_M:
                 return np.asarray(corner)
             course.begun = True
             self._begin(sweep, course, asked)
             if away_m > NEAR_M:
                 course.sent_from = (float(here[0]), float(here[1]))
-                return np.asarray(course.path[0])
+                return begin
         vertices = course.path if np.allclose(course.path[0], here) else np.vstack([here, course.path])
         ahead_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(vertices, axis=0).T))])
         goes_m = min(leg_m, float(ahead_m[-1]))
@@ -264,6 +267,10 @@ class SwathSurvey:
         rest = vertices[ahead_m > goes_m + 1e-6]
         course.path = np.vstack([end, rest]) if len(rest) else np.zeros((0, 2))
         return end
+
+    def _beginning(self, course: FlownLine) -> FloatArray:
+        """Return where a line begins, (2,); beyond the border: the nearest place to that where vehicles may be."""
+        return course.path[0] if self._ground is None else self._ground.nearest(course.path[0])
 
     def _take_line(self, asked: Question) -> bool:
         """Give a vehicle its next line; return whether there is one."""

@@ -437,6 +437,32 @@ def test_who_begins_a_little_too_near_to_a_zone_sees_all_the_same(inside_m: floa
     assert fly_round_the_zone(np.array([[75.0, 40.0 + inside_m]])) > 0.97
 
 
+@pytest.mark.parametrize(
+    ("depth_m", "radius_m", "hole", "at"),
+    [
+        (11.9, 2.26, np.s_[:22, 38:40], (38.148, 0.0)),
+        (12.63, 4.91, np.s_[:24, 36:38], (37.81, 0.0)),
+        (9.35, 3.16, np.s_[5:7, :7], (0.0, 4.765)),
+    ],
+)
+def test_who_is_at_the_border_passes_over_a_hole_there(
+    depth_m: float, radius_m: float, hole: tuple[slice, slice], at: tuple[float, float]
+) -> None:
+    # The nearest place to where the pass begins, outside, is where the vehicle is.
+    square = Constraints(np.array([[0.0, 0.0], [50.0, 0.0], [50.0, 50.0], [0.0, 50.0]]), max_step_m=25.0)
+    sea, here = Sea(np.full((50, 50), depth_m)), np.array([at])
+    sea.seen[:] = True
+    sea.seen[hole] = False
+    planner = create_planner("swath", PlannerOptions(turn_radius_m=radius_m))
+    for _ in range(60):
+        proposal = planner.propose(situation(sea.coverage(), square, here), np.random.default_rng(0))
+        if proposal.done:
+            break
+        sea.fly(here[0], proposal.positions[0, :2])
+        here = proposal.positions[:, :2]
+    assert sea.seen.all()
+
+
 def test_without_anything_to_ensonify_all_are_done() -> None:
     coverage = Coverage(0.0, 0.0, 1.0, np.ones((20, 20), bool), np.ones((20, 20), bool), np.full((20, 20), 8.0))
     square = Constraints(np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]]))
