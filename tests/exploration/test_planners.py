@@ -321,3 +321,14 @@ def test_who_gets_no_leg_stays_and_loses_nothing_of_its_plan(name: str, regresso
             along = leg.min(axis=1) < 3.0
             assert along[int(np.argmax(along)) :].all(), "from where it begins its first line on"
             assert along.sum() > 10
+
+
+def test_who_waits_where_it_may_not_be_keeps_nobody_from_going_on() -> None:
+    zone = np.array([[40.0, 40.0], [60.0, 40.0], [60.0, 60.0], [40.0, 60.0]])
+    limits = Constraints(SQUARE, (zone,), max_step_m=10.0, max_depth_m=20.0)
+    both = make_situation(positions=np.array([[50.0, 40.02, 2.0], [20.0, 20.0, 2.0]]), constraints=limits)
+    asked = replace(both, moving=np.array([False, True]))
+    planner = create_planner("random", PlannerOptions(cruise_depth_m=2.0))
+    positions = planner.propose(asked, np.random.default_rng(0)).positions
+    assert np.array_equal(positions[0], asked.positions[0])
+    assert np.hypot(*(positions[1] - asked.positions[1])[:2]) > 1.0

@@ -23,6 +23,8 @@ SAME_CORNER = 0.03
 """Vertices that are no farther apart than this fraction of a step are one corner."""
 SAME_M = 1e-3
 """Places no farther apart are the same."""
+CLEAR_M = 1.0
+"""Who is too near to a zone goes so far away from where that begins."""
 SWING = 3.94
 """Radii per radian by which two turns to the same side, taken as one, exceed a right angle: right for a reversal."""
 SHARP_RAD = 0.5
@@ -296,12 +298,19 @@ class FreeSpace:
     def corner(self, start: FloatArray, goal: FloatArray, still_m: float) -> FloatArray:
         """Return where a shortest way leads first, (2,), but no corner within ``still_m`` of its start: it is there.
 
-        Who is a little too near to a zone would be sent so far away from it, and no farther. The goal, where that is
-        as near.
+        Who is a little too near to a zone goes straight away from it, farther than it takes: it would not be sent
+        farther, and from where it is a leg along the zone leads through it. The goal, where that is as near.
         """
         way = self.way(start, goal)
-        far = np.hypot(*(way - start).T) > still_m
-        return np.asarray(way[int(np.argmax(far)) if far.any() else -1])
+        away_m = np.hypot(*(way - start).T)
+        far = away_m > still_m
+        if far[0] or not far.any():
+            return np.asarray(way[0] if far[0] else way[-1])
+        if away_m[0] > 0.0 and not self.holds(start):
+            clear = start + (1.0 + CLEAR_M / away_m[0]) * (way[0] - start)
+            if self.holds(clear):
+                return np.asarray(clear)
+        return np.asarray(way[int(np.argmax(far))])
 
     def _round(self, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return such a way where no straight leg leads to the goal."""

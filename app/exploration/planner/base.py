@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
@@ -114,7 +114,7 @@ class PlannerBase(ABC):
         proposal = self._decide(team.of(np.flatnonzero(moves)), bottom, seed)
         wish = team.positions.copy()
         wish[moves] = proposal.positions
-        return replace(proposal, positions=settle(team, bottom, wish[None])[0])
+        return replace(proposal, positions=settle_going(team, bottom, wish, moves))
 
     @abstractmethod
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -252,3 +252,20 @@ def settle(team: Situation, bottom: Bottom, wishes: FloatArray) -> tuple[FloatAr
     pool = np.concatenate(tries)
     ok = constraints.feasible(origin, pool, bottom)
     return (pool[int(np.argmax(ok))], 0) if ok.any() else (origin.copy(), 0)
+
+
+def settle_going(team: Situation, bottom: Bottom, wish: FloatArray, going: BoolArray) -> FloatArray:
+    """Return a feasible version of a team configuration (n_vehicles, 3) in which only some go, (n_vehicles,).
+
+    Who gets no leg may be where a limit is broken already, and staying does not lessen that: it bars nobody else.
+    """
+    constraints, origin = team.constraints, team.positions
+    rows = np.flatnonzero(going)
+    if not len(rows) or constraints.feasible(origin, wish[None], bottom)[0]:
+        return wish
+    positions = origin.copy()
+    positions[rows] = settle(team.of(rows), bottom, wish[None, rows])[0]
+    broken = {violation.vehicle for violation in constraints.violations(team.vehicles, origin, positions, bottom)}
+    if broken.isdisjoint(team.vehicles[i] for i in rows):
+        return positions
+    return settle(team, bottom, wish[None])[0]

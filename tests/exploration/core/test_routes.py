@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
@@ -48,15 +49,20 @@ def test_a_way_is_free_and_as_short_as_any(start: tuple[float, float], goal: tup
     assert abs(length_m(a, way) - shortest_m(a, b)) < 1e-5
 
 
-@given(PLACES, PLACES, st.floats(0.0, 0.5))
+@given(PLACES, PLACES, st.floats(1e-3, 0.5))
 def test_a_corner_that_a_way_leads_to_first_is_not_where_it_begins(
     start: tuple[float, float], goal: tuple[float, float], still_m: float
 ) -> None:
     a, b = np.array(start), SPACE.nearest(np.array(goal))
-    corner, way = SPACE.corner(a, b, still_m), SPACE.way(a, b)
-    first = next(k for k, place in enumerate(way) if np.array_equal(place, corner))
-    assert np.hypot(*(corner - a)) > still_m or first == len(way) - 1
-    assert (np.hypot(*(way[:first] - a).T) <= still_m).all()
+    corner = SPACE.corner(a, b, still_m)
+    assert SPACE.holds(corner)
+    assert np.hypot(*(corner - a)) > still_m or np.array_equal(corner, b)
+
+
+@pytest.mark.parametrize("inside_m", [0.001, 0.04])
+def test_who_is_a_little_too_near_to_a_zone_goes_straight_away_from_it(inside_m: float) -> None:
+    corner = SPACE.corner(np.array([49.0, 45.0 - inside_m]), np.array([55.0, 30.0]), 0.05)
+    np.testing.assert_allclose(corner, [49.0, 46.0], atol=1e-6)
 
 
 def test_legs_are_the_ways_from_stop_to_stop() -> None:

@@ -437,6 +437,20 @@ def test_who_begins_a_little_too_near_to_a_zone_sees_all_the_same(inside_m: floa
     assert fly_round_the_zone(np.array([[75.0, 40.0 + inside_m]])) > 0.97
 
 
+def test_who_waits_a_little_too_near_to_a_zone_keeps_nobody_from_going_on() -> None:
+    constraints = Constraints(AREA, (ZONE,), max_step_m=25.0, min_separation_m=0.0)
+    sea = Sea(np.full((120, 150), 10.0))
+    sea.seen[:] = True
+    sea.seen[20:30, 20:60] = False
+    waits, flies = (88.4, 79.98), (97.0, 33.0)
+    planner = create_planner("swath", PlannerOptions(turn_radius_m=4.0))
+    asked = situation(sea.coverage(), constraints, np.array([waits, flies]))
+    proposal = planner.propose(asked, np.random.default_rng(0))
+    assert proposal.done == {"v0"}
+    assert np.allclose(proposal.positions[0, :2], waits)
+    assert np.hypot(*(proposal.positions[1, :2] - flies)) == pytest.approx(25.0, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("depth_m", "radius_m", "hole", "at"),
     [
