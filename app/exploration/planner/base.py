@@ -8,16 +8,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from app.arrays import BoolArray, FloatArray
+from app.arrays import FloatArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.constraints import Constraints
+from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.core.errands import Errand, Errands, errand_move
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.options import PlannerOptions
 
 PASSES = 2
+OF_TWO = (Limit.COM_RANGE, Limit.SEPARATION)
+"""Limits that others' places decide about, too."""
 FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.1)
 
 
@@ -114,7 +116,7 @@ class PlannerBase(ABC):
         proposal = self._decide(team.of(np.flatnonzero(moves)), bottom, seed)
         wish = team.positions.copy()
         wish[moves] = proposal.positions
-        return replace(proposal, positions=settle_going(team, bottom, wish, moves))
+        return replace(proposal, positions=settle(team, bottom, wish[None])[0])
 
     @abstractmethod
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
@@ -221,9 +223,10 @@ def at_depth(
 def settle(team: Situation, bottom: Bottom, wishes: FloatArray) -> tuple[FloatArray, int]:
     """Return the first feasible of some team configurations, or of gentler versions of them, and the wish it came from.
 
-    Tries, in this order: the wishes (k, n_vehicles, 3) as they are; each shortened for the whole team; each for all
-    vehicles but some that hold; hold; straight back towards the middle of the area. When nothing is feasible the answer
-    is to hold, which the safety check then refuses with the reason.
+    Tries, in this order: the wishes (k, n_vehicles, 3) as they are; for those that the first one moves, where others
+    are to stay and may not be where they are; each shortened for the whole team; each for all vehicles but some that
+    hold; hold; straight back towards the middle of the area. When nothing is feasible the answer is to hold, which the
+    safety check then refuses with the reason.
     """
     constraints, origin = team.constraints, team.positions
     n = len(origin)
@@ -231,6 +234,15 @@ def settle(team: Situation, bottom: Bottom, wishes: FloatArray) -> tuple[FloatAr
     if ok.any():
         first = int(np.argmax(ok))
         return wishes[first], first
+    going = (wishes[0, :, :2] != origin[:, :2]).any(axis=1)
+    if going.any() and not going.all():
+        rows = np.flatnonzero(going)
+        some = origin.copy()
+        some[rows], first = settle(team.of(rows), bottom, wishes[:, rows])
+        broken = constraints.violations(team.vehicles, origin, some, bottom)
+        # What a vehicle breaks by staying, and by that alone, is nobody else's.
+        if not any(going[team.vehicles.index(one.vehicle)] or one.limit in OF_TWO for one in broken):
+            return some, first
     best = wishes[: min(len(wishes), 8)]
     tries = [origin + f * (best - origin) for f in FRACTIONS]
     for i in range(n):
@@ -252,20 +264,3 @@ def settle(team: Situation, bottom: Bottom, wishes: FloatArray) -> tuple[FloatAr
     pool = np.concatenate(tries)
     ok = constraints.feasible(origin, pool, bottom)
     return (pool[int(np.argmax(ok))], 0) if ok.any() else (origin.copy(), 0)
-
-
-def settle_going(team: Situation, bottom: Bottom, wish: FloatArray, going: BoolArray) -> FloatArray:
-    """Return a feasible version of a team configuration (n_vehicles, 3) in which only some go, (n_vehicles,).
-
-    Who gets no leg may be where a limit is broken already, and staying does not lessen that: it bars nobody else.
-    """
-    constraints, origin = team.constraints, team.positions
-    rows = np.flatnonzero(going)
-    if not len(rows) or constraints.feasible(origin, wish[None], bottom)[0]:
-        return wish
-    positions = origin.copy()
-    positions[rows] = settle(team.of(rows), bottom, wish[None, rows])[0]
-    broken = {violation.vehicle for violation in constraints.violations(team.vehicles, origin, positions, bottom)}
-    if broken.isdisjoint(team.vehicles[i] for i in rows):
-        return positions
-    return settle(team, bottom, wish[None])[0]

@@ -11,7 +11,7 @@ from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import FreeSpace
 from app.exploration.lines.lattice import longer_axis_rad
-from app.exploration.planner.base import PlannerBase, settle_going
+from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import STILL_M, SwathSurvey
@@ -72,8 +72,7 @@ class SwathPlanner(PlannerBase):
                 done.add(name)
                 continue
             wish[i] = end
-        going = team.moves & ~np.isin(team.vehicles, list(done))
-        positions = settle_going(team, bottom, self._at_cruise(team, bottom, wish), going)
+        positions, _ = settle(team, bottom, self._at_cruise(team, bottom, wish)[None])
         left_pct = 100.0 * float(task.coverage.left.sum()) / max(int(task.coverage.wanted.sum()), 1)
         return Proposal(positions, 0.0, {"left_pct": left_pct}, done=frozenset(done))
 

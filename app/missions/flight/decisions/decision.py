@@ -21,7 +21,7 @@ from app.exploration.core.problem import Belief, Planner, Situation
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
-from app.missions.flight.decisions.zone_clearance import room_around
+from app.missions.flight.decisions.zone_clearance import clear_of_zones, room_around
 from app.missions.safety import free_space, travel_depth, waypoint_check
 from app.missions.safety.tide_and_bottom import BottomNow
 from app.missions.search.course import hold_before_hazards
@@ -344,7 +344,8 @@ def _planned_for(
 ) -> tuple[list[Place], list[Leg], list[str]]:
     """Return whom the planner plans for, the legs of those that come in from far outside, and what is to be said.
 
-    Who is a little outside is planned for from the border. Nobody is sent over what a search does not know.
+    Who is a little outside is planned for from the border, and who waits too near to a zone is taken to wait beside it.
+    Nobody is sent over what a search does not know.
     """
     polygon = Polygon(constraints.area)
     notes: list[str] = []
@@ -371,11 +372,10 @@ def _planned_for(
             what = leg.refusal or ("it is sent to the border" if inside else "it is sent round a keep-out zone")
             notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
             legs.append(leg)
-        elif outside_m > 0:
-            border = free_space.nearest_inside(polygon, place.en_m)
-            team.append(replace(place, en_m=border))
         else:
-            team.append(place)
+            here_m = free_space.nearest_inside(polygon, place.en_m) if outside_m > 0 else place.en_m
+            # Nobody may stay where a limit is broken: who gets no leg there would keep all others from theirs.
+            team.append(replace(place, en_m=here_m if place.moving else clear_of_zones(constraints, here_m)))
     return team, legs, notes
 
 

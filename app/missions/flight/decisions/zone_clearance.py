@@ -9,10 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.ops import nearest_points
 
 from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
 from app.missions.safety import free_space
 
 SMALLER = (1.0, 0.5, 0.25)
@@ -49,6 +51,19 @@ def room_around(area: FloatArray, zones: Sequence[FloatArray], room_m: float) ->
                 left = tried
                 break
     return tuple(around)
+
+
+def clear_of_zones(constraints: Constraints, place_m: FloatArray) -> FloatArray:
+    """Return the nearest place to one, (2,), where plans may leave a vehicle: in no zone, nor its margin, nor room."""
+    zones = [Polygon(zone) for zone in constraints.for_plans.keep_out]
+    here = Point(place_m)
+    if not any(zone.contains(here) for zone in zones):
+        return place_m
+    ground = Polygon(constraints.area).difference(shapely.union_all(zones))
+    if ground.is_empty:
+        return place_m
+    nearest, _ = nearest_points(ground, here)
+    return np.array([nearest.x, nearest.y])
 
 
 def _hold_together(parts: list[Polygon], left: BaseGeometry) -> bool:

@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,14 @@ from shapely.geometry import LineString, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.core.routes import FreeSpace
-from app.missions.flight.decisions.decision import Knowledge, Place, decide, make_constraints, make_planner
+from app.missions.flight.decisions.decision import (
+    Knowledge,
+    Place,
+    decide,
+    limits_of_decisions,
+    make_constraints,
+    make_planner,
+)
 from app.missions.flight.decisions.zone_clearance import room_around
 from app.missions.spec.mission import MissionSpec
 from tests.support.missions.decisions import belief_of, decide_for, place
@@ -93,9 +101,10 @@ def test_what_plans_keep_to_is_worked_out_once_and_knows_what_is_checked() -> No
     assert constraints.for_plans.for_checks is constraints
 
 
-def zoned(planner: str) -> MissionSpec:
+def zoned(planner: str, **changes: Any) -> MissionSpec:
     return make_spec(
         SIDE_M,
+        **changes,
         keep_out=[rectangle(45, 45, 60, 60)],
         limits={"max_step_m": 12.0, "max_depth_m": 20.0, "keep_out_margin_m": 5.0},
         planner={"name": planner, "options": {"candidates": 20, "search": 100}},
@@ -137,6 +146,28 @@ def test_a_vehicle_that_is_in_the_room_or_in_the_margin_gets_a_leg() -> None:
         assert not leg.refusal
         np.testing.assert_allclose(leg.target_m[:2], [10.0, 30.0])
         assert len(wishes.asked[0].constraints.keep_out) == 3
+
+
+@pytest.mark.parametrize("planner", ["cao", "lawnmower", "random"])
+@pytest.mark.parametrize("east_m", [38.0, 41.0, 46.0], ids=["room", "margin", "zone"])
+@pytest.mark.parametrize("has_flown_all", [False, True])
+def test_who_waits_too_near_to_a_zone_keeps_nobody_from_its_leg(
+    planner: str, east_m: float, has_flown_all: bool
+) -> None:
+    vehicles = [{"name": name, "kind": "sim"} for name in "ab"]
+    spec = zoned(planner, vehicles=vehicles)
+    chooser = make_planner(spec)
+    constraints = limits_of_decisions(make_constraints(spec), chooser)
+    flies, waits = np.array([5.0, 5.0]), np.array([east_m, 50.0])
+    team = [
+        Place("a", flies, math.nan, 2.0, left_m=400.0),
+        Place("b", waits, math.nan, 4.0, left_m=1e-3 if has_flown_all else 400.0, moving=has_flown_all),
+    ]
+    decision = decide(1, spec, constraints, chooser, team, Knowledge(belief_of(), np.zeros((0, 2))))
+    ends = {leg.vehicle: leg.target_m[:2] for leg in decision.legs if not leg.refusal}
+    assert np.hypot(*(ends["a"] - flies)) > 1.0
+    assert np.allclose(ends.get("b", waits), waits, atol=0.01)
+    assert np.array_equal(decision.origin_m["b"], waits)
 
 
 def test_what_is_proposed_within_the_room_is_flown() -> None:
