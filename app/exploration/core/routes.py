@@ -296,10 +296,10 @@ class FreeSpace:
         return self._round(start, goal)
 
     def corner(self, start: FloatArray, goal: FloatArray, still_m: float) -> FloatArray:
-        """Return where a shortest way leads first, (2,), but no corner within ``still_m`` of its start: it is there.
+        """Return the first corner of a shortest way, (2,), that is farther than ``still_m`` from where the way begins.
 
-        Who is a little too near to a zone goes straight away from it, farther than it takes: it would not be sent
-        farther, and from where it is a leg along the zone leads through it. The goal, where that is as near.
+        Where that is inside a zone, by no more than that, a place ``CLEAR_M`` outside, straight away from the zone:
+        a leg to the next corner would lead along its border, inside. The goal, where no corner is farther away.
         """
         way = self.way(start, goal)
         away_m = np.hypot(*(way - start).T)
