@@ -278,6 +278,41 @@ def test_both_ends_of_the_colour_range_are_kept_and_a_wrong_one_is_explained(pag
     by_id(page, "range-fit").click()
 
 
+LEAVES_THE_FIELD_AS_NEW_DATA_COME = """([low, high]) => {
+    const scale = document.querySelector(".range .scale");
+    low.focus();
+    low.value = "-8";
+    low.dispatchEvent(new InputEvent("input", { bubbles: true }));
+    return new Promise((done) => {
+        // Told as soon as the new range stands in the page, before anything is painted.
+        const watch = new MutationObserver(() => {
+            watch.disconnect();
+            low.blur();
+            Promise.resolve().then(() => { high.focus(); done(); });
+        });
+        watch.observe(scale, { attributeFilter: ["aria-label"] });
+    });
+}"""
+
+
+def test_what_is_typed_of_the_colour_range_outlasts_data_that_come_as_its_field_is_left(
+    page: Page, service: Service
+) -> None:
+    mission = service.create(name="Typed")
+    service.act(mission, "start")
+    show(page, mission)
+    low, high = by_id(page, "range-low"), by_id(page, "range-high")
+    expect(low).to_be_visible()
+    page.evaluate(LEAVES_THE_FIELD_AS_NEW_DATA_COME, [low.element_handle(), high.element_handle()])
+    expect(by_id(page, "range-fit")).to_be_visible()
+    high.fill("-9")
+    expect(by_id(page, "range-fault")).to_contain_text("The lower end, -8, must be below the upper one, -9")
+    by_id(page, "range-fit").click()
+    expect(by_id(page, "range-fault")).to_be_hidden()
+    expect(low).not_to_have_value("-8")
+    expect(high).not_to_have_value("-9")
+
+
 def test_a_replay_shows_the_figures_of_its_step(page: Page, service: Service) -> None:
     mission = service.create(name="Then", steps=6)
     service.act(mission, "start")

@@ -1,7 +1,6 @@
 import "./Legend.css";
 import { type Signal, useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef } from "preact/hooks";
 import type { LayerView } from "../../api/types";
 import { SITE_COLOURS, SITE_WORDS } from "../../map/marks/site";
 import { drawingOf, drawnBy, drawnShares } from "../../map/picture/drawings";
@@ -80,7 +79,7 @@ export function Legend() {
             id={shown.name}
           />
         ) : (
-          <Scale shown={shown} palette={palette} range={range} />
+          <Scale shown={shown} palette={palette} range={range} key={shown.name} />
         )
       ) : (
         <p class="empty">{map ? missing(map, shown) : say("legend.theSeaFloorAppearsWithThe")}</p>
@@ -115,14 +114,16 @@ function Scale({ shown, palette, range }: { shown: LayerView; palette: Palette; 
   const unit = symbolOf(shown);
   const map = seaFloor.value;
   const fixed = fixedRanges.value[shown.name] !== undefined;
+  const edited = useSignal<Ends | null>(null);
   const setRange = (next: Range | undefined) => {
+    edited.value = null;
     const { [shown.name]: _, ...others } = fixedRanges.value;
     fixedRanges.value = next ? { ...others, [shown.name]: next } : others;
   };
   return (
     <>
       <div class="range-row">
-        <RangeInputs range={range} onChange={setRange} key={shown.name}>
+        <RangeInputs range={range} edited={edited} onChange={setRange}>
           <div
             class="scale"
             role="img"
@@ -302,56 +303,61 @@ function Check({
   );
 }
 
+/** Both ends of a colour range as they stand in their fields. */
+interface Ends {
+  low: string;
+  high: string;
+  typed: boolean;
+}
+
 interface RangeProps {
   range: Range;
+  /** What stands in the fields while they are edited: no data change it, and both ends belong together. */
+  edited: Signal<Ends | null>;
   onChange: (range: Range) => void;
   /** What stands between the two ends. */
   children: ComponentChildren;
 }
 
-function RangeInputs({ range, onChange, children }: RangeProps) {
-  const low = useSignal(String(range.low));
-  const high = useSignal(String(range.high));
-  const form = useRef<HTMLFormElement>(null);
-  // The data may change the range, but not what is being typed: both ends belong together.
-  useEffect(() => {
-    if (form.current?.contains(document.activeElement)) return;
-    low.value = String(range.low);
-    high.value = String(range.high);
-  }, [range.low, range.high]);
-  const fault = rangeFault(low.value, high.value);
+function RangeInputs({ range, edited, onChange, children }: RangeProps) {
+  const ends = edited.value ?? { low: String(range.low), high: String(range.high), typed: false };
+  const fault = rangeFault(ends.low, ends.high);
   const commit = () => {
-    // Judged anew: Enter may come before what was typed last has been drawn.
-    if (rangeFault(low.value, high.value)) return;
-    const next = { low: Number(low.value), high: Number(high.value) };
-    if (next.low !== range.low || next.high !== range.high) onChange(next);
+    // Read anew: Enter may come before what was typed last has been drawn.
+    const { low, high, typed } = edited.value ?? ends;
+    if (rangeFault(low, high)) return;
+    edited.value = null;
+    if (typed) onChange({ low: Number(low), high: Number(high) });
   };
-  const end = (value: Signal<string>, label: string, name: string) => (
+  const end = (which: keyof Range, label: string) => (
     <input
       type="text"
       inputMode="decimal"
       aria-label={label}
       aria-invalid={fault ? "true" : "false"}
-      data-testid={name}
-      value={value.value}
+      data-testid={`range-${which}`}
+      value={ends[which]}
+      onFocus={() => {
+        edited.value ??= ends;
+      }}
       onInput={(event) => {
-        value.value = pointed(event.currentTarget.value);
+        const text = pointed(event.currentTarget.value);
+        edited.value = { ...(edited.value ?? ends), [which]: text, typed: true };
       }}
       onBlur={commit}
     />
   );
   return (
     <form
-      ref={form}
       class="range"
       onSubmit={(event) => {
         event.preventDefault();
         commit();
       }}
     >
-      {end(low, say("legend.lowerEndOfTheColourRange"), "range-low")}
+      {end("low", say("legend.lowerEndOfTheColourRange"))}
       {children}
-      {end(high, say("legend.upperEndOfTheColourRange"), "range-high")}
+      {end("high", say("legend.upperEndOfTheColourRange"))}
       {fault ? (
         <span class="fault range-fault" role="alert" data-testid="range-fault">
           ▲ {fault}
