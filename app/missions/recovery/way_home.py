@@ -1,6 +1,7 @@
 """The way home: from where a vehicle is, inside the area and the corridor to its recovery point, off zones and land."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -64,15 +65,24 @@ class WaysHome:
     home_m : (2,)
     bottom
         Pessimistic sea floor; where it is shallower than ``least_m`` counts as land.
+    apart
+        Places to go round, and how far from them.
     """
 
     def __init__(
-        self, constraints: Constraints, home_m: FloatArray, bottom: Bottom | None = None, least_m: float = 0.0
+        self,
+        constraints: Constraints,
+        home_m: FloatArray,
+        bottom: Bottom | None = None,
+        least_m: float = 0.0,
+        apart: tuple[Sequence[FloatArray], float] = ((), 0.0),
     ) -> None:
         ground = homeward_ground(constraints, home_m)
         free: BaseGeometry = Polygon(ground.area)
         blocked: list[BaseGeometry] = [Polygon(zone) for zone in ground.keep_out]
         blocked += [] if bottom is None else _land(bottom, least_m)
+        places_m, apart_m = apart
+        blocked += [Point(place_m).buffer(apart_m, quad_segs=2) for place_m in places_m]
         if blocked:
             free = free.difference(unary_union(blocked))
         self._home_m = home_m
@@ -144,6 +154,32 @@ def way_time_s(start_m: FloatArray, way_m: FloatArray, speed_mps: float, current
             return math.inf
         total_s += length_m / made_good
     return total_s
+
+
+def passed_over(
+    here_m: FloatArray,
+    way_m: FloatArray,
+    depths_m: Sequence[float],
+    place_m: FloatArray,
+    apart_m: float,
+    above_m: float,
+) -> bool:
+    """Whether a way leads nearer than ``apart_m`` to who waits at the surface, where it is no deeper than ``above_m``.
+
+    Parameters
+    ----------
+    here_m : (2,)
+        Where it begins. From within that distance it leads anywhere.
+    way_m : (n, 2)
+    depths_m
+        How deep the way is to each of its corners.
+    place_m : (2,)
+    """
+    if math.dist(here_m, place_m) < apart_m:
+        return False
+    place = Point(place_m)
+    pieces = zip(pairwise(np.vstack([here_m, way_m])), depths_m, strict=True)
+    return any(depth_m < above_m and LineString(piece).distance(place) < apart_m for piece, depth_m in pieces)
 
 
 def _land(bottom: Bottom, least_m: float) -> list[BaseGeometry]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -84,6 +85,17 @@ class EnergyRange:
         way_m = None if off_land is None else off_land.way(here_m)
         # Better over ground that looks too shallow, at the surface, than not at all.
         return anyhow.way(here_m) if way_m is None else way_m
+
+    def way_past(
+        self, here_m: FloatArray, home_m: FloatArray, places_m: Sequence[FloatArray], apart_m: float
+    ) -> FloatArray | None:
+        """Return a way home as :meth:`way_from` does, that goes round some places (2,) so far from them."""
+        self._look_for_land()
+        for bottom, least_m in ((self._committing.bottom, self._least_m), (None, 0.0)):
+            ways = WaysHome(self._constraints, home_m, bottom, least_m, (places_m, apart_m))
+            if (way_m := ways.way(here_m)) is not None:
+                return way_m
+        return None
 
     def _home_m(self, member: Member) -> FloatArray | None:
         return home_of(member.spec, member.slot, self._live.spec)

@@ -14,6 +14,7 @@ from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
+from app.missions.flight.way_home.past_berths import way_past_berths
 from app.missions.live.mission import LiveMission
 from app.missions.live.vehicle_reports import phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
@@ -202,14 +203,13 @@ class Withdrawals:
             return
         if near and member.name in self._rising_since_s:
             return
-        way_m = self._range.way_from(here_m, home_m)
-        if way_m is None:
+        way = way_past_berths(member, here_m, home_m, self._live, self._range)
+        if way is None:
             words = "no way leads home that keeps clear of zones: it comes up where it is"
             await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
-        depths_m = self._range.depths_m(member, here_m, way_m)
-        self._committing.lead_home(member, [*zip(way_m, depths_m, strict=True), (home_m, 0.0)])
+        self._committing.lead_home(member, [*way, (home_m, 0.0)])
         await self._dispatch.begin()
 
     def _waited_to_rise(self, member: Member) -> bool:
