@@ -122,7 +122,9 @@ class GivingWay:
         places, age_s = planned_places(member, self._live), self._age_s(member)
         motion = steered_ahead(self._live, member, places, WAITING_S + age_s)
         motion = Timeline(motion.time_s - age_s, motion.place_m)
-        depths_m = [float(place[2]) for place in places[:2]]
+        begins_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0)[:, :2].T))])[:-1]
+        reach_m = (HORIZON_S + age_s) * self._live.spec.speed_of(member.spec)
+        depths_m = [float(place[2]) for place in places[: 1 + int((begins_m < reach_m).sum())]]
         around_m = self._circle_m(member) if len(places) == 1 else 0.0
         return _Imminent(member, motion, min(depths_m), max(depths_m), around_m)
 

@@ -6,7 +6,7 @@ import pytest
 from app.commands.home import fly_mission
 from app.exploration.lines import lawnmower
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.fleet.interface import LinkState
+from app.missions.fleet.interface import LinkState, Position
 from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
@@ -14,7 +14,7 @@ from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
-from app.missions.team import Withdrawal
+from app.missions.team import CommittedLeg, Withdrawal
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import Place, PlacedVehicles
 from tests.support.missions.specs import LAT, LON
@@ -69,6 +69,19 @@ async def test_a_vehicle_that_climbs_through_anothers_depth_meets_it(scene: Plac
     scene.put("b", (50.0, 30.0, 6.0), (1.0, 30.0, 0.0))
     await scene.giving_way.look()
     assert [order.step for order in scene.ordered] == [NO_LEG]
+
+
+@pytest.mark.parametrize(("far_m", "meets"), [(10.0, True), (28.0, False)], ids=["in a moment", "later"])
+async def test_a_vehicle_that_climbs_on_its_next_leg_meets_who_is_there(
+    scene: PlacedVehicles, far_m: float, meets: bool
+) -> None:
+    """Seen over a shoal: one rose beside another one as its next leg led over less water."""
+    scene.put("a", (5.0, 30.0, 3.0), (55.0, 30.0, 3.0))
+    climbs = scene.put("b", (58.0, 30.0, 6.0), (58.0 - far_m, 30.0, 6.0))
+    lat, lon = LocalFrame(LAT, LON).to_geographic(1.0, 30.0)
+    climbs.ahead.append(CommittedLeg(2, Position(float(lat), float(lon), 3.0), np.array([1.0, 30.0])))
+    await scene.giving_way.look()
+    assert [order.step for order in scene.ordered] == [NO_LEG] * meets
 
 
 async def test_who_surveys_gives_way_to_who_goes_home(scene: PlacedVehicles) -> None:
