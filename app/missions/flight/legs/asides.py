@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from app.arrays import FloatArray
-from app.missions.fleet.interface import WaypointOrder
+from app.missions.fleet.interface import WaypointOrder, WaypointStatus
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.live.mission import LiveMission
@@ -52,11 +52,23 @@ class Asides:
 
     def may_lead(self, member: Member, because: Because) -> bool:
         """Whether a vehicle that has a leg can be led aside by orders that it gets at once."""
-        waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
-        # Orders by sound, and plans, take longer than there is.
-        follows = waits and member.spec.guidance is Guidance.FOLLOW and member.present and member.busy
         led = self._now(member.name)
-        return follows and (led is None or led.because is because)
+        return _follows(member) and member.busy and (led is None or led.because is because)
+
+    def may_stand_elsewhere(self, member: Member) -> bool:
+        """Whether a vehicle has flown what it was given and only waits, for others or for its next leg."""
+        waits = member.order is not None and member.status is WaypointStatus.REACHED and not member.ahead
+        wanted = member.withdrawal is not None or member.asked is not None or member.pursuing is not None
+        return _follows(member) and waits and not wanted and not member.surfacing
+
+    async def stand(self, member: Member, place_m: FloatArray) -> bool:
+        """Send a vehicle that only waits to another place (2,), and have it wait there; whether it takes the order."""
+        order = self._committing.waiting_at(member, place_m)
+        if order is None:
+            return False
+        before_m = member.waits_m
+        await self._dispatch.stay(member, order)
+        return member.waits_m is not before_m
 
     async def lead(self, member: Member, place_m: FloatArray, because: Because) -> bool:
         """Lead a vehicle to a place (2,) where it stays; whether it flew its leg until now, and takes this order."""
@@ -94,6 +106,13 @@ class Asides:
     def _lasts(self, name: str, aside: Aside) -> bool:
         member = self._live.team.get(name)
         return member is not None and member.ordered and member.order is aside.order and member.waits_m is not None
+
+
+def _follows(member: Member) -> bool:
+    """Whether a vehicle can be led by orders that it gets at once."""
+    waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
+    # Orders by sound, and plans, take longer than there is.
+    return waits and member.spec.guidance is Guidance.FOLLOW and member.present
 
 
 def depth_now_m(member: Member) -> float:

@@ -176,7 +176,7 @@ class LegCommit:
     def begin_next(self, member: Member) -> None:
         """Make a vehicle's next leg its order."""
         leg = member.ahead.pop(0)
-        if member.target_m is not None and member.status is WaypointStatus.REACHED:
+        if member.target_m is not None and member.status is WaypointStatus.REACHED and member.waits_m is None:
             member.leg_start_m = member.target_m
         elif member.report is not None:
             member.leg_start_m = member.place_m(self._live.frame)

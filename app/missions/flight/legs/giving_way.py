@@ -175,12 +175,17 @@ class GivingWay:
         return nearest_m - one.around_m - other.around_m
 
     async def _keep_apart(self, one: _Imminent, other: _Imminent, near: dict[str, _Imminent]) -> None:
-        """Have one of two give way: rather who surveys than who goes home, the last by name."""
-        pair = sorted((one, other), key=lambda it: (it.member.withdrawal is None, it.member.name), reverse=True)
+        """Have one of two give way: who only waits, else rather who surveys than who goes home, the last by name."""
+        stands = self._asides.may_stand_elsewhere
+        pair = sorted(
+            (one, other),
+            key=lambda it: (stands(it.member), it.member.withdrawal is None, it.member.name),
+            reverse=True,
+        )
         best_m, best = self._nearest_m(one, other) + CLOSING_M, None
         enough_m = CLEAR * self._live.spec.limits.min_separation_m
         for it in pair:
-            if not self._asides.may_lead(it.member, Because.VEHICLE):
+            if not (self._asides.may_lead(it.member, Because.VEHICLE) or stands(it.member)):
                 continue
             others = [that for name, that in near.items() if name != it.member.name]
             for place_m in self._places(it.member):
@@ -221,7 +226,9 @@ class GivingWay:
         return steered_ahead(self._live, member, [here, np.append(place_m, here[2])], WAITING_S)
 
     async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
-        if await self._asides.lead(member, place_m, Because.VEHICLE):
+        stands = self._asides.may_stand_elsewhere(member)
+        led = self._asides.stand(member, place_m) if stands else self._asides.lead(member, place_m, Because.VEHICLE)
+        if await led:
             words = f"{member.name} gives way to {other.name}"
             await self._live.journal.log(Level.INFO, "safety", words, vehicle=member.name, gives_way_to=other.name)
 

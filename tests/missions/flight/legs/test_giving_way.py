@@ -1,12 +1,14 @@
 """Vehicles that are about to meet: one gives way, and flies its leg when the other is past."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 
 from app.commands.home import fly_mission
 from app.exploration.lines import lawnmower
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.fleet.interface import LinkState, Position
+from app.missions.fleet.interface import LinkState, Position, WaypointStatus
 from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
@@ -14,7 +16,8 @@ from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
-from app.missions.team import CommittedLeg, Withdrawal
+from app.missions.spec.orders import OrderKind, OrderState
+from app.missions.team import CommittedLeg, OperatorOrder, Withdrawal
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import Place, PlacedVehicles
 from tests.support.missions.specs import LAT, LON
@@ -82,6 +85,37 @@ async def test_a_vehicle_that_climbs_on_its_next_leg_meets_who_is_there(
     climbs.ahead.append(CommittedLeg(2, Position(float(lat), float(lon), 3.0), np.array([1.0, 30.0])))
     await scene.giving_way.look()
     assert [order.step for order in scene.ordered] == [NO_LEG] * meets
+
+
+@pytest.mark.parametrize("waiting", ["a", "b"])
+async def test_who_has_flown_its_way_and_only_waits_makes_room(scene: PlacedVehicles, waiting: str) -> None:
+    """Seen at the end of missions: one gave way to a vehicle that waited for it, until its leg was given up."""
+    [flying] = {"a", "b"} - {waiting}
+    moves = scene.put(flying, HERE, (50.0, 30.0, 3.0))
+    waits = scene.put(waiting, (28.0, 30.0, 3.0), (27.0, 30.0, 3.0))
+    waits.status = WaypointStatus.REACHED
+    await scene.giving_way.look()
+    [order] = scene.ordered
+    assert (order.vehicle, order.step) == (waiting, NO_LEG)
+    assert moves.waits_m is None
+    assert abs(scene.where_m(order)[1] - 30.0) > scene.live.spec.limits.min_separation_m
+    assert not waits.ordered, "its leg stays flown"
+
+    # It stays where it was sent, and nobody is in anybody's way there.
+    scene.put(waiting, (*scene.where_m(order), 3.0), (27.0, 30.0, 3.0)).status = WaypointStatus.REACHED
+    await scene.giving_way.look()
+    assert scene.ordered == [order]
+
+
+async def test_a_vehicle_that_waits_where_it_was_ordered_to_be_stays_there(scene: PlacedVehicles) -> None:
+    scene.put("a", HERE, (50.0, 30.0, 3.0))
+    waits = scene.put("b", (28.0, 30.0, 3.0), (27.0, 30.0, 3.0))
+    waits.status = WaypointStatus.REACHED
+    waits.asked = OperatorOrder(
+        1, OrderKind.GO, OrderState.UNDER_WAY, np.array([[27.0, 30.0]]), "Ana", datetime.now(UTC)
+    )
+    await scene.giving_way.look()
+    assert {order.vehicle for order in scene.ordered} == {"a"}
 
 
 async def test_who_surveys_gives_way_to_who_goes_home(scene: PlacedVehicles) -> None:
