@@ -111,9 +111,8 @@ async def test_a_vehicle_that_waits_where_it_was_ordered_to_be_stays_there(scene
     scene.put("a", HERE, (50.0, 30.0, 3.0))
     waits = scene.put("b", (28.0, 30.0, 3.0), (27.0, 30.0, 3.0))
     waits.status = WaypointStatus.REACHED
-    waits.asked = OperatorOrder(
-        1, OrderKind.GO, OrderState.UNDER_WAY, np.array([[27.0, 30.0]]), "Ana", datetime.now(UTC)
-    )
+    way_m = np.array([[27.0, 30.0]])
+    waits.asked = OperatorOrder(1, OrderKind.GO, OrderState.FLYING, way_m, "Ana", datetime.now(UTC))
     await scene.giving_way.look()
     assert {order.vehicle for order in scene.ordered} == {"a"}
 
