@@ -278,6 +278,10 @@ class FreeSpace:
         """Whether a place (2,) lies in the free space."""
         return bool(self._loose.covers(Point(*en_m)))
 
+    def parts(self) -> list[Polygon]:
+        """Return the parts of it between which no way leads."""
+        return [part for part in getattr(self.region, "geoms", [self.region]) if isinstance(part, Polygon)]
+
     def nearest(self, en_m: FloatArray) -> FloatArray:
         """Return the point of the free space closest to ``en_m`` (2,)."""
         point = Point(*en_m)

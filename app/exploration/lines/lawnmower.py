@@ -5,7 +5,9 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 from shapely import LineString, Polygon
+from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
@@ -74,7 +76,8 @@ def shared_lines(
     """Return each vehicle's route (k, 2): neighbouring ones of the most even lines that the team can fly together.
 
     Lines lie along the longer axis, or across it where that brings the ground clearly nearer; vehicles may share one.
-    A team that cannot fly even one line begins those of :func:`lawnmower_routes`.
+    A team that cannot fly even one line begins those of :func:`lawnmower_routes`. Where keep-out zones cut the area
+    into parts between which no way leads, the vehicles in each part share the lines of that part.
 
     Parameters
     ----------
@@ -89,6 +92,32 @@ def shared_lines(
     corner_m
         What a corner takes of them besides.
     """
+    parts = [part for part in FreeSpace(constraints, BORDER_MARGIN_M).parts() if _has_room(part)]
+    if len(parts) < 2:
+        return _lines_of_one(constraints, starts, budgets_m, radii_m, corner_m)
+    away_m = np.array([shapely.distance(part, shapely.points(starts)) for part in parts])
+    within, area = np.argmin(away_m, axis=0), Polygon(constraints.area)
+    routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
+    for k in np.unique(within):
+        # With its zones: lines keep off them and off its borders as elsewhere.
+        whole = parts[k].buffer(BORDER_MARGIN_M, join_style="mitre").intersection(area)
+        ground = replace(constraints, area=np.asarray(orient(whole).exterior.coords)[:-1])
+        members = np.flatnonzero(within == k)
+        own = _lines_of_one(ground, starts[members], budgets_m[members], radii_m[members], corner_m)
+        for i, route in zip(members, own, strict=True):
+            routes[i] = route
+    return routes
+
+
+def _has_room(part: Polygon) -> bool:
+    """Whether a part of an area is wide enough for lines."""
+    return not part.buffer(-2.0 * BORDER_MARGIN_M, join_style="mitre").is_empty
+
+
+def _lines_of_one(
+    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray, corner_m: float
+) -> list[FloatArray]:
+    """Return :func:`shared_lines` of an area in one part."""
     free, axis = FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area)
     vehicles = Vehicles(np.ascontiguousarray(starts), np.full(len(starts), np.nan), np.asarray(budgets_m, dtype=float))
     ground, turns = Ground.of(constraints), [Turns(float(radius_m), corner_m) for radius_m in radii_m]
@@ -186,6 +215,7 @@ class LawnmowerPlanner(PlannerBase):
 
     def _decide(self, team: Situation, bottom: Bottom, seed: int) -> Proposal:
         self._adopt(team)
+        self._lead_round(team)
         done = self._go_on(team)
         self._lead_round(team)
         steps = np.minimum(team.constraints.max_step_m, metres_left(team)) * (1 - 1e-9)
@@ -251,16 +281,21 @@ class LawnmowerPlanner(PlannerBase):
         return None if end_m is None else end_m[None]
 
     def _lead_round(self, team: Situation) -> None:
-        """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere."""
+        """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere.
+
+        Stops to which no way leads are left out.
+        """
         zones = [Polygon(zone) for zone in team.constraints.keep_out]
         for i, name in enumerate(team.vehicles):
-            here, route = team.positions[i, :2], self._routes[name]
-            if not team.moves[i] or not len(route):
-                continue
-            leg = LineString([here, route[0]])
-            if any(zone.intersects(leg) for zone in zones):
-                free = FreeSpace(team.constraints, BORDER_MARGIN_M)
-                self._routes[name] = np.vstack([free.way(here, route[0]), route[1:]])
+            here = team.positions[i, :2]
+            while team.moves[i] and len(route := self._routes[name]):
+                leg = LineString([here, route[0]])
+                if not any(zone.intersects(leg) for zone in zones):
+                    break
+                way = FreeSpace(team.constraints, BORDER_MARGIN_M).way(here, route[0])
+                self._routes[name] = np.vstack([way[: len(way) if len(way) > 1 else 0], route[1:]])
+                if len(way) > 1:
+                    break
 
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""

@@ -182,6 +182,38 @@ def test_a_vehicle_whose_next_stop_is_behind_a_zone_gets_round_it() -> None:
     assert place == pytest.approx(behind[0], abs=1.0)
 
 
+BAR = np.array([[-10.0, 120.0], [WIDTH + 10.0, 120.0], [WIDTH + 10.0, 150.0], [-10.0, 150.0]])
+"""A zone that cuts the area in two."""
+
+
+@pytest.mark.parametrize("east_m", [5.0, 60.0, 115.0])
+def test_vehicles_on_both_sides_of_a_zone_that_cuts_the_area_fly_the_lines_of_their_side(east_m: float) -> None:
+    """Each got lines on both sides, and stayed where its way led through the zone."""
+    constraints, starts = Constraints(AREA, (BAR,)), np.array([[east_m, 20.0], [east_m, 110.0], [60.0, 280.0]])
+    budgets_m = np.array([500.0, 600.0, 1000.0])
+    routes = shared_lines(constraints, starts, budgets_m, np.full(3, 4.0))
+    for start, route, budget_m in zip(starts, routes, budgets_m, strict=True):
+        assert not LineString(np.vstack([start, route])).intersects(Polygon(BAR))
+        assert 0.6 * budget_m <= flown_length(start, route, 4.0) <= budget_m
+
+
+@pytest.mark.parametrize("place", [(60.0, 20.0), (60.0, 280.0)])
+def test_a_vehicle_whose_next_stop_cannot_be_reached_flies_what_comes_after_it(place: tuple[float, float]) -> None:
+    planner, rng, left_m = create_planner("lawnmower"), np.random.default_rng(0), 900.0
+    constraints = Constraints(AREA, (BAR,), max_step_m=20.0, max_depth_m=10.0)
+    planner.propose(replace(situation(left_m, place), constraints=constraints), rng)
+    planner.put_back("a", np.array([[30.0, 300.0 - place[1]], [70.0, 300.0 - place[1]]]), None)
+    for _ in range(90):
+        proposal = planner.propose(replace(situation(left_m, place), constraints=constraints), rng)
+        if proposal.done or left_m < LEAST_LEG_M:
+            break
+        [(east, north, _)] = proposal.positions
+        moved_m = float(np.hypot(east - place[0], north - place[1]))
+        assert moved_m > 0.5, "it always has somewhere to go"
+        left_m, place = left_m - moved_m, (float(east), float(north))
+    assert left_m < LEAST_LEG_M
+
+
 def test_lines_stay_side_by_side_where_a_step_is_as_long_as_a_line() -> None:
     planner, rng = create_planner("lawnmower"), np.random.default_rng(0)
     told, place, headings = situation(3000.0, (2.0, 2.0)), np.array([2.0, 2.0]), []
