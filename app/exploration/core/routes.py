@@ -230,6 +230,7 @@ class FreeSpace:
 
     def __init__(self, constraints: Constraints, margin_m: float) -> None:
         """Keep ``margin_m`` away from borders and zones, where that leaves anything."""
+        self.margin_m = margin_m
         whole = Polygon(constraints.area)
         inner = whole.buffer(-margin_m, join_style="mitre") if margin_m > 0 else whole
         # Sharp corners throughout: a rounded one is a dozen vertices a few centimetres apart.

@@ -5,9 +5,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-import shapely
 from shapely import LineString, Polygon
-from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
@@ -27,6 +25,7 @@ from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.ground import Ground
 from app.exploration.lines.handover import hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, flown_length, longer_axis_rad, route_length
+from app.exploration.lines.parts import is_cut_off, parts_of
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
@@ -92,26 +91,12 @@ def shared_lines(
     corner_m
         What a corner takes of them besides.
     """
-    parts = [part for part in FreeSpace(constraints, BORDER_MARGIN_M).parts() if _has_room(part)]
-    if len(parts) < 2:
-        return _lines_of_one(constraints, starts, budgets_m, radii_m, corner_m)
-    away_m = np.array([shapely.distance(part, shapely.points(starts)) for part in parts])
-    within, area = np.argmin(away_m, axis=0), Polygon(constraints.area)
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
-    for k in np.unique(within):
-        # With its zones: lines keep off them and off its borders as elsewhere.
-        whole = parts[k].buffer(BORDER_MARGIN_M, join_style="mitre").intersection(area)
-        ground = replace(constraints, area=np.asarray(orient(whole).exterior.coords)[:-1])
-        members = np.flatnonzero(within == k)
-        own = _lines_of_one(ground, starts[members], budgets_m[members], radii_m[members], corner_m)
+    for part, members in parts_of(constraints, FreeSpace(constraints, BORDER_MARGIN_M), starts):
+        own = _lines_of_one(part, starts[members], budgets_m[members], radii_m[members], corner_m)
         for i, route in zip(members, own, strict=True):
             routes[i] = route
     return routes
-
-
-def _has_room(part: Polygon) -> bool:
-    """Whether a part of an area is wide enough for lines."""
-    return not part.buffer(-2.0 * BORDER_MARGIN_M, join_style="mitre").is_empty
 
 
 def _lines_of_one(
@@ -288,14 +273,15 @@ class LawnmowerPlanner(PlannerBase):
         zones = [Polygon(zone) for zone in team.constraints.keep_out]
         for i, name in enumerate(team.vehicles):
             here = team.positions[i, :2]
-            while team.moves[i] and len(route := self._routes[name]):
-                leg = LineString([here, route[0]])
-                if not any(zone.intersects(leg) for zone in zones):
-                    break
-                way = FreeSpace(team.constraints, BORDER_MARGIN_M).way(here, route[0])
-                self._routes[name] = np.vstack([way[: len(way) if len(way) > 1 else 0], route[1:]])
-                if len(way) > 1:
-                    break
+            if not team.moves[i]:
+                continue
+            route = self._routes[name]
+            while len(route) and is_cut_off(team.constraints, BORDER_MARGIN_M, here, route[0]):
+                route = route[1:]
+            if len(route) and any(zone.intersects(LineString([here, route[0]])) for zone in zones):
+                free = FreeSpace(team.constraints, BORDER_MARGIN_M)
+                route = np.vstack([free.way(here, route[0]), route[1:]])
+            self._routes[name] = route
 
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""

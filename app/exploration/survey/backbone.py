@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from app.arrays import FloatArray
-from app.exploration.core.constraints import Constraints
+from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.routes import FreeSpace, Vehicles
 from app.exploration.lines.even_survey import Pattern, even_survey, orders_across, way_m
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
+from app.exploration.lines.parts import parts_of
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value
 
 MARGIN_M = 0.5
@@ -68,8 +69,25 @@ class Share:
 def backbone(constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objective: SurveyObjective) -> list[Share]:
     """Return every vehicle's share of the even survey that promises the best map for what each can fly.
 
-    Either there and back, or whole lines in order, whichever leaves less uncertainty.
+    Either there and back, or whole lines in order, whichever leaves less uncertainty. Where keep-out zones cut the area
+    into parts between which no way leads, the vehicles in each part share a survey of that part.
     """
+    shares = [Share(np.zeros((0, 2)), 0)] * len(vehicles.en_m)
+    for part, members in parts_of(constraints, FreeSpace(constraints, MARGIN_M), vehicles.en_m):
+        within = nodes
+        if part is not constraints:
+            inside = inside_area(part, nodes.en_m)
+            within = make_nodes(nodes.en_m[inside], nodes.weight[inside])
+        own = Vehicles(vehicles.en_m[members], vehicles.headings_rad[members], vehicles.left_m[members])
+        for i, share in zip(members, _backbone_of_one(part, own, within, objective), strict=True):
+            shares[i] = share
+    return shares
+
+
+def _backbone_of_one(
+    constraints: Constraints, vehicles: Vehicles, nodes: Nodes, objective: SurveyObjective
+) -> list[Share]:
+    """Return :func:`backbone` of an area in one part."""
     axis = longer_axis_rad(constraints.area)
     free = FreeSpace(constraints, MARGIN_M)
     sweeps = [Sweep(constraints, free, direction) for direction in (axis, axis + np.pi / 2)]

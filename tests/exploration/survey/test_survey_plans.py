@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
+from shapely import LineString, Polygon
 
 from app.arrays import FloatArray
 from app.estimation import SingleBeam
@@ -269,6 +270,18 @@ def test_the_backbone_is_as_long_as_each_vehicle_can_fly(left: tuple[float, floa
     )
     value = plan_value(far, nodes, objective, vehicles, vias, counts)
     assert value < plan_value(far, nodes, objective, vehicles, *packed([share.stops for share in other]))
+
+
+def test_where_a_zone_cuts_the_area_each_side_has_a_backbone_of_its_own() -> None:
+    """A vehicle got stops behind the zone, and stayed before it for the rest of the mission."""
+    bar = np.array([[-5.0, 50.0], [105.0, 50.0], [105.0, 60.0], [-5.0, 60.0]])
+    vehicles = Vehicles(np.array([[2.0, 2.0], [90.0, 40.0], [50.0, 90.0]]), np.full(3, np.nan), np.full(3, 300.0))
+    objective = SurveyObjective(20.0, 2.0, Turns(3.0, 0.0), 1e6)
+    shares = backbone(Constraints(SQUARE, (bar,), max_step_m=10.0), vehicles, nodes_of(2), objective)
+    for (x, y), share in zip(vehicles.en_m, shares, strict=True):
+        way = np.vstack([[x, y], share.stops])
+        assert not LineString(way).intersects(Polygon(bar))
+        assert flown_m(x, y, np.nan, share.stops, objective.turns) > 200.0
 
 
 def most_across_m(left_m: float, legs: int) -> float:

@@ -35,6 +35,7 @@ from app.exploration.core.routes import (
 )
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
+from app.exploration.lines.parts import is_cut_off
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.survey.backbone import MARGIN_M, backbone, packed
@@ -125,6 +126,7 @@ class SurveyRegressors:
         self._steps_m = np.minimum(team.constraints.max_step_m, self._left_m) * (1 - 1e-9)
         self._whole_m = max(self._flown_m + float(self._left_m.sum()), 1e-9)
         begins = not self._plan.keys() & set(team.vehicles)
+        self._leave_out_cut_off()
         changed = not begins and self._plan.keys() != set(team.vehicles)
         explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)
         renews = explores and self._flown_m - self._planned_m >= self._whole_m / REPLANS
@@ -362,6 +364,20 @@ class SurveyRegressors:
         known = np.isfinite(team.belief.depth_m) & np.isfinite(team.belief.sd_m)
         self._adapts = any(share.coarse > 0 for share in shares) or float(known.mean()) > KNOWN
         self._free, self._planned_m = False, self._flown_m
+
+    def _leave_out_cut_off(self) -> None:
+        """Leave out of both plans what comes next and no way leads to: a team's rest is handed over anywhere."""
+        team = self._team
+        for i, name in enumerate(team.vehicles if team.constraints.keep_out else ()):
+            for routes in (self._plan, self._backbone):
+                while (
+                    team.moves[i]
+                    and len(route := routes.get(name, np.zeros((0, 2))))
+                    and is_cut_off(team.constraints, MARGIN_M, self._en[i], route[0])
+                ):
+                    routes[name] = route[1:]
+                    if routes is self._plan:
+                        self._coarse[name] = max(0, self._coarse.get(name, 0) - 1)
 
     def _hand_over(self) -> None:
         """Give both plans to a team that has changed."""
