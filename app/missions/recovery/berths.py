@@ -10,9 +10,12 @@ from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.recovery import Recovery
-from app.missions.spec.vehicle import VehicleSpec
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 from imc_bridge.control.depth_layers import DepthLayer
 from imc_bridge.control.plans import HOME_RADIUS_M
+
+STOPS_WITHIN_M = 2.0
+"""A simulated vehicle that is stopped comes to rest this close to where it arrived."""
 
 
 def layer_of(name: str, cruise_m: dict[str, float], spacing_m: float) -> DepthLayer:
@@ -76,6 +79,8 @@ def berth_spacing_m(spec: MissionSpec) -> float:
 
 def room_of_m(vehicle: VehicleSpec, spec: MissionSpec) -> float:
     """Return how far from its place a vehicle may be while it waits there."""
+    if vehicle.kind is VehicleKind.SIM:
+        return spec.arrival_radius_m + STOPS_WITHIN_M
     return max(HOME_RADIUS_M, spec.arrival_radius_m, vehicle.turn_radius_m or 0.0)
 
 

@@ -19,4 +19,4 @@ async def test_it_says_when_vehicles_wait_farther_from_their_point_than_asked_fo
     assert ("recovery.room" in checks) is told
     if told:
         words = checks["recovery.room"].message
-        assert words == "3 vehicles wait up to 24 m from it, with 25 m between their places: recovery.radius_m is 12 m"
+        assert words == "3 vehicles wait up to 14 m from it, with 15 m between their places: recovery.radius_m is 12 m"

@@ -44,7 +44,7 @@ def test_vehicles_that_drift_about_their_berths_stay_a_separation_apart() -> Non
     assert berth_spacing_m(spec) - 2 * room_m == pytest.approx(separation_m)
 
 
-@pytest.mark.parametrize(("kinds", "within"), [(("imc",) * 3, True), (("sim",) * 3, True), (("imc",) * 4, False)])
+@pytest.mark.parametrize(("kinds", "within"), [(("imc",) * 3, True), (("sim",) * 6, True), (("imc",) * 4, False)])
 def test_as_many_as_there_is_room_for_wait_within_25_m(kinds: tuple[str, ...], within: bool) -> None:
     assert (farthest_m(spec_of(*kinds), range(len(kinds))) <= 25.0) is within
 
