@@ -15,7 +15,7 @@ from tests.support.imc.sea import Sea, open_sea
 from tests.support.missions.harbour import Harbour, act, until_state, view_of
 from tests.support.waiting import until
 
-SPEED = 5.0
+SPEED = 3.0
 WEST, EAST = ((5, 5), (30, 5), (30, 95), (5, 95)), ((70, 5), (95, 5), (95, 95), (70, 95))
 ZONE = ((45, 40), (55, 40), (55, 60), (45, 60))
 APART_M = 8.0

@@ -62,13 +62,16 @@ class Asides:
         return _follows(member) and waits and not wanted and not member.surfacing
 
     async def stand(self, member: Member, place_m: FloatArray) -> bool:
-        """Send a vehicle that only waits to another place (2,), and have it wait there; whether it takes the order."""
+        """Send a vehicle that only waits to another place (2,), and have it wait there; whether it takes this order.
+
+        No for one that was sent elsewhere already since it has flown its leg.
+        """
         order = self._committing.waiting_at(member, place_m)
         if order is None:
             return False
-        before_m = member.waits_m
+        begins = member.waits_m is None
         await self._dispatch.stay(member, order)
-        return member.waits_m is not before_m
+        return begins and member.waits_m is not None
 
     async def lead(self, member: Member, place_m: FloatArray, because: Because) -> bool:
         """Lead a vehicle to a place (2,) where it stays; whether it flew its leg until now, and takes this order."""
