@@ -281,7 +281,7 @@ class FreeSpace:
 
     def parts(self) -> list[Polygon]:
         """Return the parts of it between which no way leads."""
-        return [part for part in getattr(self.region, "geoms", [self.region]) if isinstance(part, Polygon)]
+        return _polygons(self.region)
 
     def nearest(self, en_m: FloatArray) -> FloatArray:
         """Return the point of the free space closest to ``en_m`` (2,)."""
@@ -368,10 +368,13 @@ class FreeSpace:
         ]
 
 
+def _polygons(region: BaseGeometry) -> list[Polygon]:
+    return [part for part in getattr(region, "geoms", [region]) if isinstance(part, Polygon)]
+
+
 def _corners(region: BaseGeometry) -> FloatArray:
     """Return the vertices of all rings of a region, those of its holes included."""
-    parts = [p for p in getattr(region, "geoms", [region]) if isinstance(p, Polygon)]
-    rings = [np.asarray(ring.coords)[:-1] for part in parts for ring in (part.exterior, *part.interiors)]
+    rings = [np.asarray(ring.coords)[:-1] for part in _polygons(region) for ring in (part.exterior, *part.interiors)]
     return np.vstack(rings) if rings else np.zeros((0, 2))
 
 
