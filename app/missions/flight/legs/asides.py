@@ -101,6 +101,11 @@ class Asides:
         await self._dispatch.send(member)
         self._live.changed.set()  # its time for the leg goes on
 
+    async def give_up(self, member: Member, why: str) -> None:
+        """End the leg of a vehicle that being led aside does not help."""
+        self._led.pop(member.name, None)
+        await self._dispatch.give_up_leg(member, why)
+
     def _now(self, name: str) -> Aside | None:
         """Return what a vehicle is led aside from now: it may have got another order while others were looked at."""
         aside = self._led.get(name)

@@ -85,11 +85,16 @@ class Dispatch:
         asked = self._live.team if of is None else of
         late = [member for member in asked if member.busy and late_at_s(member, self._time_scale) <= now_s]
         # All at once: while a line of the log is written, others may be sent on to their next legs.
-        numbers = [self._settle_late(member) for member in late]
+        numbers = [self._settle_missed(member, missed(member.leg_allowed_s)) for member in late]
         for member, number in zip(late, numbers, strict=True):
             message = f"{member.name} did not get to the end of its leg {number}: it goes on with the next"
             await tell_of(self._live, [member], message, number)
         return late
+
+    async def give_up_leg(self, member: Member, why: str) -> None:
+        """End the leg that a vehicle flies and cannot end; it goes on with the next."""
+        number = self._settle_missed(member, why)
+        await tell_of(self._live, [member], f"{member.name} gives its leg {number} up: {why}", number)
 
     @property
     def _waiting(self) -> bool:
@@ -215,10 +220,10 @@ class Dispatch:
         )
         self._live.changed.set()
 
-    def _settle_late(self, member: Member) -> int:
-        """End a vehicle's leg and return its number."""
+    def _settle_missed(self, member: Member, why: str) -> int:
+        """End a vehicle's leg as missed and return its number."""
         number = member.order.step if member.order is not None else member.legs
         if member.target_m is not None:
             self._note_given_up(member, [member.target_m])
-        self.settle(member, WaypointStatus.MISSED, missed(member.leg_allowed_s))
+        self.settle(member, WaypointStatus.MISSED, why)
         return number

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import shapely
 import structlog
 
 from app.arrays import FloatArray
@@ -26,6 +27,7 @@ from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
+from app.missions.safety.free_space import CIRCLE_M
 from app.missions.team import OUT_OF_REACH, Member
 from app.missions.views.mission import Level
 
@@ -216,7 +218,16 @@ class GivingWay:
         aside = ways_aside(
             np.append(here_m, depth_m), np.append(member.target_m, depth_m), constraints, self._committing.bottom
         )
-        return [here_m, *aside[:, :2]]
+        places_m = [here_m, *aside[:, :2]]
+        if not self._asides.may_stand_elsewhere(member):
+            return places_m
+        return [place_m for place_m in places_m if self._has_room(place_m)] or places_m
+
+    def _has_room(self, place_m: FloatArray) -> bool:
+        """Whether a vehicle may circle at a place (2,) for long: inside the area, and clear of zones."""
+        area = shapely.Polygon(self._constraints.area)
+        inside = area.contains(shapely.Point(place_m)) and area.exterior.distance(shapely.Point(place_m)) >= CIRCLE_M
+        return inside and not self._zones.near(place_m, CIRCLE_M)
 
     def _motion_to(self, member: Member, place_m: FloatArray) -> Timeline:
         """Return a vehicle's motion to a place where it waits."""

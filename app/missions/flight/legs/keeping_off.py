@@ -16,6 +16,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.missions.fleet.interface import WaypointOrder
 from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.decisions.separation import planned_places, steered_ahead
 from app.missions.flight.legs.asides import HORIZON_S, Asides, Because, depth_now_m
@@ -33,6 +34,9 @@ DIRECTIONS = 16
 REACHES = (2.0, 3.0, 5.0)
 """How many turning radii away a vehicle is led aside, and at least ``LEAST_REACH_M``."""
 LEAST_REACH_M = 3.0
+
+MOST_TRIES = 2
+"""So often a vehicle is led aside from the same leg: where its turns have no room at the end, they have none later."""
 
 log = structlog.get_logger(__name__)
 
@@ -75,6 +79,8 @@ class KeepingOff:
         self._zones = zones
         self._asides = asides
         self._time_scale = time_scale
+        self._tries: dict[str, tuple[WaypointOrder, int]] = {}
+        """From which leg each vehicle was led aside last, and how often."""
 
     async def keep(self) -> None:
         """Go on until cancelled."""
@@ -100,7 +106,7 @@ class KeepingOff:
             on_m = self._way_m(member, places)
             if member.name not in aside:
                 if self._zones.entered_by(on_m):
-                    await self._lead_aside(member, places)
+                    await self._keep_off(member, places)
             elif self._goes_on(on_m):
                 await self._asides.lead_on(member)
             elif self._is_there(member):
@@ -125,6 +131,17 @@ class KeepingOff:
             return True
         arrived_m = max(self._live.spec.arrival_radius_m, turn_radius_m(self._live.spec, member.spec))
         return math.dist(member.place_m(self._live.frame), member.waits_m) <= arrived_m
+
+    async def _keep_off(self, member: Member, places: list[FloatArray]) -> None:
+        """Lead a vehicle aside from its leg; one that surveys gives that up where this has not helped."""
+        if member.order is None:
+            return
+        last, tries = self._tries.get(member.name, (None, 0))
+        tries = tries if last is member.order else 0
+        self._tries[member.name] = (member.order, tries + 1)
+        await self._lead_aside(member, places)
+        if tries >= MOST_TRIES and member.surveys:
+            await self._asides.give_up(member, "its turns would lead it into a keep-out zone")
 
     async def _lead_aside(self, member: Member, places: list[FloatArray]) -> None:
         """Lead a vehicle to where its turns keep off zones: there, and best on from there, too."""

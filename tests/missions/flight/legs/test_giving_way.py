@@ -12,6 +12,7 @@ from app.missions.fleet.interface import LinkState, Position, WaypointStatus
 from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
+from app.missions.safety.free_space import CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.failsafes import Response
@@ -105,6 +106,17 @@ async def test_who_has_flown_its_way_and_only_waits_makes_room(scene: PlacedVehi
     scene.put(waiting, (*scene.where_m(order), 3.0), (27.0, 30.0, 3.0)).status = WaypointStatus.REACHED
     await scene.giving_way.look()
     assert scene.ordered == [order]
+
+
+async def test_who_makes_room_goes_where_its_circles_stay_inside_the_area(scene: PlacedVehicles) -> None:
+    scene.put("a", (5.0, 15.0, 3.0), (50.0, 15.0, 3.0))
+    waits = scene.put("b", (28.0, 14.0, 3.0), (27.0, 14.0, 3.0))
+    waits.status = WaypointStatus.REACHED
+    await scene.giving_way.look()
+    [order] = scene.ordered
+    place_m = np.array(scene.where_m(order))
+    assert order.vehicle == "b"
+    assert np.min([place_m, 60.0 - place_m]) >= CIRCLE_M - 0.01
 
 
 async def test_a_vehicle_that_waits_where_it_was_ordered_to_be_stays_there(scene: PlacedVehicles) -> None:

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 
+from app.missions.fleet.interface import WaypointStatus as Status
 from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.legs.asides import Because
 from app.missions.flight.legs.commit import NO_LEG
-from app.missions.flight.legs.keeping_off import KeepOutZones
+from app.missions.flight.legs.keeping_off import MOST_TRIES, KeepOutZones
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import PlacedVehicles
@@ -82,6 +83,28 @@ async def test_a_vehicle_that_got_another_order_meanwhile_keeps_that(
     assert await scene.asides.lead(vehicle, np.array([10.0, 30.0]), Because.VEHICLE)
     await scene.asides.lead_on(vehicle)
     assert scene.ordered[-1] is vehicle.order
+
+
+async def test_a_leg_that_has_no_room_for_its_turns_is_given_up(scene: PlacedVehicles) -> None:
+    beside, turned = (18.0, 30.0, 3.0), (14.0, 32.0, 3.0)
+    for _ in range(MOST_TRIES):
+        vehicle = scene.put("a", beside, (19.0, 5.0, 3.0), heading_rad=math.radians(25.0))
+        await scene.keeping_off.look()
+        assert vehicle.waits_m is not None
+        scene.put("a", turned, (19.0, 5.0, 3.0), heading_rad=math.radians(250.0))
+        await scene.keeping_off.look()
+        assert vehicle.waits_m is None
+        assert vehicle.ordered
+    scene.put("a", beside, (19.0, 5.0, 3.0), heading_rad=math.radians(25.0))
+    await scene.keeping_off.look()
+    assert vehicle.status is Status.MISSED
+    # Until it has another leg it flies aside, not on into the zone.
+    assert scene.ordered[-1].step == NO_LEG
+    # That says nothing of its next leg.
+    scene.put("a", beside, (19.0, 6.0, 3.0), heading_rad=math.radians(25.0), anew=True)
+    await scene.keeping_off.look()
+    assert vehicle.ordered
+    assert vehicle.waits_m is not None
 
 
 @given(
