@@ -1,5 +1,6 @@
 """Vehicles that are about to meet: one gives way, and flies its leg when the other is past."""
 
+import math
 from datetime import UTC, datetime
 
 import numpy as np
@@ -109,14 +110,19 @@ async def test_who_has_flown_its_way_and_only_waits_makes_room(scene: PlacedVehi
 
 
 async def test_who_makes_room_goes_where_its_circles_stay_inside_the_area(scene: PlacedVehicles) -> None:
-    scene.put("a", (5.0, 15.0, 3.0), (50.0, 15.0, 3.0))
-    waits = scene.put("b", (28.0, 14.0, 3.0), (27.0, 14.0, 3.0))
-    waits.status = WaypointStatus.REACHED
-    await scene.giving_way.look()
-    [order] = scene.ordered
-    place_m = np.array(scene.where_m(order))
-    assert order.vehicle == "b"
-    assert np.min([place_m, 60.0 - place_m]) >= CIRCLE_M - 0.01
+    makes_room = 0
+    for heading_deg in range(0, 360, 30):
+        scene.ordered.clear()
+        scene.put("a", (1.0, 15.0, 3.0), (50.0, 15.0, 3.0), anew=True)
+        waits = scene.put("b", (28.0, 14.0, 3.0), (27.0, 14.0, 3.0), heading_rad=math.radians(heading_deg), anew=True)
+        waits.status = WaypointStatus.REACHED
+        await scene.giving_way.look()
+        for order in scene.ordered:
+            if order.vehicle == "b":
+                makes_room += 1
+                place_m = np.array(scene.where_m(order))
+                assert np.min([place_m, 60.0 - place_m]) >= CIRCLE_M - 0.01, heading_deg
+    assert makes_room >= 3
 
 
 async def test_a_vehicle_that_waits_where_it_was_ordered_to_be_stays_there(scene: PlacedVehicles) -> None:
