@@ -115,6 +115,12 @@ SOURCES = {
 
 DOWN = [[0.0, 0.0, 1.0]]
 
+GLIDES_BESIDE_M = 2.0
+"""A vehicle that is to stop somewhere switches its motor off where it glides past that place at most so far away."""
+FLOATS_FROM_M = 5.0
+"""It floats up from there, unless it is deeper than this."""
+AT_REST_MPS = 0.05
+
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
@@ -209,6 +215,7 @@ class SimulatedVehicle:
         """Time and place of every contact with the bottom (one entry per contact, not per step)."""
         self._arrival_radius_m = 0.0
         self._pass_within_m = -1.0
+        self._stops = False
         self._set_out_m = (east, north)
         self._touching = False
         self._start_time_s = self.time_s
@@ -266,10 +273,16 @@ class SimulatedVehicle:
 
     @property
     def arrived(self) -> bool:
-        """Whether the last ``go_to`` has been reached (and the vehicle circles there), or passed as it allowed."""
+        """Whether the last ``go_to`` has been reached (and the vehicle stays there), or passed as it allowed."""
         if self.vehicle.target is None:
             return False
+        if self._stops and self.vehicle.guidance is Guidance.IDLE:
+            return self._off_m(self.vehicle.target) <= self._arrival_radius_m + GLIDES_BESIDE_M
         return self.vehicle.guidance is Guidance.LOITER or self._passed(self.vehicle.target)
+
+    def _off_m(self, target: SteeringTarget) -> float:
+        east, north = self.en_m
+        return math.hypot(east - target.east_m, north - target.north_m)
 
     def _passed(self, target: SteeringTarget) -> bool:
         """Whether it is beyond its target, as seen from where it set out, and not too far to the side."""
@@ -289,8 +302,9 @@ class SimulatedVehicle:
         pass_within_m: float | None = None,
         loiter_radius_m: float | None = None,
         by_altitude: bool = False,
+        stops: bool = False,
     ) -> None:
-        """Head for a place and circle there; replaces the present target.
+        """Head for a place and stay there; replaces the present target.
 
         Parameters
         ----------
@@ -304,12 +318,16 @@ class SimulatedVehicle:
             It counts as reached, too, once the vehicle is beyond it and no farther away than this; None: it does not.
         loiter_radius_m
             Circle flown after arrival; the vehicle's own when None.
+        stops
+            Whether its motor is off there, so that it floats up: it is switched off so early that the vehicle glides
+            there. One that comes from too deep to float up circles.
         """
         values = (east_m, north_m, depth_m, speed_mps, arrival_radius_m)
         if not all(math.isfinite(value) for value in values):
             raise ValueError(f"{self.name}: target {values} holds a value that is not finite")
         self._arrival_radius_m = arrival_radius_m
         self._pass_within_m = -1.0 if pass_within_m is None else pass_within_m
+        self._stops = stops
         self._set_out_m = self.en_m
         self.vehicle.loiter_radius_m = loiter_radius_m or self.vehicle.limits.loiter_radius_m
         self.vehicle.goto(SteeringTarget(east_m, north_m, depth_m, speed_mps, by_altitude))
@@ -370,15 +388,29 @@ class SimulatedVehicle:
         self._touching = hit
         self.navigation.step(m.depth_m, STEP_S)
         target = vehicle.target
-        if target is not None and vehicle.guidance is Guidance.GOTO and self._arrival_radius_m > 0.0:
-            east, north = self.en_m
-            if math.hypot(east - target.east_m, north - target.north_m) <= self._arrival_radius_m:
-                vehicle.loiter(vehicle.loiter_radius_m)
+        if target is not None and self._stops and m.depth_m <= FLOATS_FROM_M:
+            self._stop_in_time(target)
+        on_its_way = vehicle.guidance is Guidance.GOTO and self._arrival_radius_m > 0.0
+        if target is not None and on_its_way and self._off_m(target) <= self._arrival_radius_m:
+            vehicle.loiter(vehicle.loiter_radius_m)
         due = int((self._steps * STEP_S + 1e-9) / self.sonar.ping_period_s)
         if due > self._pings:
             self._pings = due
             return True
         return False
+
+    def _stop_in_time(self, target: SteeringTarget) -> None:
+        """Switch the motor off where the vehicle glides to its place, and on again where it did not get near that."""
+        vehicle, (east, north), off_m = self.vehicle, self.en_m, self._off_m(target)
+        speed_mps = vehicle.motion.surge_mps
+        if vehicle.guidance is Guidance.GOTO:
+            course_rad = math.atan2(target.east_m - east, target.north_m - north) - vehicle.motion.heading_rad
+            glides_m = speed_mps**2 / (2.0 * vehicle.limits.acceleration_mps2)
+            in_line = math.cos(course_rad) > 0.0 and off_m * abs(math.sin(course_rad)) <= GLIDES_BESIDE_M
+            if off_m <= self._arrival_radius_m or (in_line and off_m <= glides_m):
+                vehicle.idle()
+        elif vehicle.guidance is Guidance.IDLE and speed_mps < AT_REST_MPS and not self.arrived:
+            vehicle.goto(target)
 
     def measure_swath(self) -> SwathPing:
         """One ping of a swath sonar now."""

@@ -3,6 +3,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from simulator.equipment import Equipment
 from simulator.floors import seafloors
@@ -10,11 +12,12 @@ from simulator.floors.terrain import Terrain
 from simulator.sonars.sensors import SonarNoise
 from simulator.sonars.swath import SwathSonar
 from simulator.vehicles.navigation import LEAST_VARIANCE_M2, Navigation
-from simulator.vehicles.vehicle import Guidance
+from simulator.vehicles.vehicle import Guidance, VehicleLimits
 from simulator.world import SimulatedVehicle
 
 HARBOUR = seafloors.generate("harbour", 0)
 FLAT = seafloors.generate("flat", 0)
+DEEP = Terrain(np.full((101, 101), 20.0), 1.0)
 
 
 def vehicle(
@@ -41,6 +44,42 @@ def test_it_arrives_and_circles_there() -> None:
     assert v.position.depth_m == pytest.approx(2.0, abs=0.1)
     v.advance(60.0)
     assert v.position.horizontal_distance_m(70, 60) == pytest.approx(7.5, abs=0.5)
+
+
+@given(st.floats(0.8, 2.5), st.floats(0.0, math.tau), st.floats(0.0, 5.0), st.floats(0.0, math.tau))
+def test_it_is_at_rest_where_it_was_to_stop(
+    speed_mps: float, course_rad: float, depth_m: float, heading_rad: float
+) -> None:
+    place = (50.0 + 40.0 * math.sin(course_rad), 50.0 + 40.0 * math.cos(course_rad))
+    limits = VehicleLimits(max_speed_mps=2.5)
+    rng = np.random.default_rng(0)
+    v = SimulatedVehicle("one", DEEP, (50, 50, depth_m), rng, Equipment(limits=limits), heading_rad=heading_rad)
+    v.go_to(*place, 0.0, speed_mps, arrival_radius_m=3.0, stops=True)
+    v.advance(300.0)
+    assert v.arrived
+    assert v.state.speed_mps == 0.0
+    assert v.position.depth_m == 0.0
+    assert v.position.horizontal_distance_m(*place) <= 5.0
+
+
+def test_one_that_floats_away_is_brought_back_and_one_that_is_too_deep_circles_up() -> None:
+    v = vehicle(DEEP, (20, 20, 0))
+    v.go_to(60, 20, 0.0, arrival_radius_m=3.0, stops=True)
+    v.advance(120.0)
+    assert v.vehicle.guidance is Guidance.IDLE
+    v.vehicle.motion.north_m = 30.0
+    assert not v.arrived
+    v.advance(120.0)
+    assert v.arrived
+
+    v = vehicle(DEEP, (20, 20, 18))
+    v.go_to(30, 20, 0.0, arrival_radius_m=3.0, stops=True)
+    circled = False
+    for _ in range(300):
+        v.advance(1.0)
+        circled |= v.vehicle.guidance is Guidance.LOITER
+    assert circled
+    assert v.position.depth_m < 0.1
 
 
 def test_a_new_target_replaces_the_old_one() -> None:

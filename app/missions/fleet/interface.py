@@ -193,6 +193,8 @@ class WaypointOrder:
     by whole legs may descend before it goes there; the radius is :data:`imc_bridge.control.plans.CIRCLE_RADIUS_M`.
 
     ``bottom`` is what the map knows of the sea floor on that way, below the surface as it is now and on the safe side.
+
+    ``last`` tells that its vehicle is to stop there, for somebody to take it out of the water.
     """
 
     mission_id: str
@@ -205,6 +207,7 @@ class WaypointOrder:
     lead: Position | None = None
     circle: Position | None = None
     bottom: tuple[Position, ...] = ()
+    last: bool = False
 
 
 @dataclass(frozen=True, slots=True)

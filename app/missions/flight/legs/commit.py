@@ -215,9 +215,9 @@ class LegCommit:
             start = member.place_m(self._live.frame)
             depth_m = self._depth_m(member, place.depth_m, self._turning(member, start, target))
             place = replace(place, depth_m=depth_m)
-        # Who comes up at home, or is about to, stays there: beyond it others wait, or survey.
-        stays = member.withdrawal is not None and all(np.array_equal(one.target_m, target) for one in member.ahead)
-        if member.report is not None and self._leads and not stays:
+        # Who comes up at home, or is about to, stops there: beyond it others wait, or survey.
+        last = member.withdrawal is not None and all(np.array_equal(one.target_m, target) for one in member.ahead)
+        if member.report is not None and self._leads and not last:
             start = member.place_m(self._live.frame)
             beyond = free_space.lead_point(self._constraints, start, target, LEAD_M)
             on = target + np.linspace(0.0, 1.0, LEAD_SAMPLES)[:, None] * (beyond - target)
@@ -236,6 +236,7 @@ class LegCommit:
             min_altitude_m=spec.limits.min_altitude_m,
             lead=lead,
             circle=circle,
+            last=last,
             bottom=bottom,
         )
         member.set_order(order, target)
@@ -259,7 +260,7 @@ class LegCommit:
         if member.withdrawal is not None and member.withdrawal.below:
             wanted_m = self._depth_below_m(member, wanted_m)
         place = self._position(centre_m[0], centre_m[1], self._depth_m(member, wanted_m, ways))
-        return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None)
+        return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None, last=False)
 
     def waiting_below(self, member: Member) -> WaypointOrder | None:
         """Return an order that keeps a vehicle where it is, as deep as it is; None where it has no order to change."""
@@ -277,7 +278,7 @@ class LegCommit:
 
     def _waiting(self, order: WaypointOrder, place_m: FloatArray, depth_m: float) -> WaypointOrder:
         place = self._position(float(place_m[0]), float(place_m[1]), depth_m)
-        return replace(order, step=NO_LEG, position=place, lead=None, circle=None)
+        return replace(order, step=NO_LEG, position=place, lead=None, circle=None, last=False)
 
     def _depth_below_m(self, member: Member, depth_m: float) -> float:
         """Return a depth that is not shallower than where a vehicle is now."""

@@ -106,6 +106,7 @@ class DeployedVehicle:
             order.speed_mps,
             arrival_radius_m=order.arrival_radius_m,
             pass_within_m=None if order.lead is None else PASSED_WITHIN_M,
+            stops=order.last and not self.body.vehicle.limits.hovers,
         )
 
 
