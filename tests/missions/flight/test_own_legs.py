@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from shapely import Point, Polygon
 from sqlalchemy import select
 
+from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.flight import runner
@@ -32,6 +33,7 @@ from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow
 from app.storage.queries import missions as mission_queries
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_state
+from tests.support.missions.specs import LAT, LON
 from tests.support.waiting import until
 
 APART = {"limits": {"max_step_m": 5.0, "min_separation_m": 0.0}}
@@ -160,7 +162,10 @@ async def test_a_vehicle_that_does_not_move_keeps_nobody(service: MissionService
 
 async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionService, database: Database) -> None:
     limits = {"max_step_m": 8.0, "min_separation_m": 6.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
-    vehicles = [{"name": name, "kind": "sim", "depth_m": 2.0} for name in "abc"]
+    frame, vehicles = LocalFrame(LAT, LON), []
+    for name, east_m in (("a", 2.0), ("b", 8.0), ("c", 14.0)):
+        lat, lon = map(float, frame.to_geographic(east_m, 2.0))
+        vehicles.append({"name": name, "kind": "sim", "depth_m": 2.0, "start": [lon, lat]})
     spec = sim_spec(steps=16, side_m=30.0, vehicles=vehicles, limits=limits, planner={"name": "random"})
     mission = (await service.create(spec)).id
     await act(service, mission, "start")

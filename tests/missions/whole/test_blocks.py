@@ -6,6 +6,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from shapely.geometry import LineString, Polygon
 
+from app.missions.flight.legs.giving_way import VERTICAL_SHARE
 from app.missions.operations.history import events_after
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
@@ -96,5 +97,6 @@ def distances(one: tuple[np.ndarray, ...], other: tuple[np.ndarray, ...]) -> np.
     heard = np.abs(one[0][:, None] - other[0]).min(axis=1) < HEARD_WITHIN_S
     time, place, depth = (column[heard] for column in one)
     at = np.column_stack([np.interp(time, other[0], other[1][:, k]) for k in (0, 1)])
-    similar = np.abs(depth - np.interp(time, other[0], other[2])) < 1.0
+    # Vehicles a metre apart in depth pass above each other, and none keeps its depth exactly.
+    similar = np.abs(depth - np.interp(time, other[0], other[2])) < VERTICAL_SHARE
     return np.hypot(*(place - at)[similar].T)

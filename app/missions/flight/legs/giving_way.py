@@ -121,7 +121,7 @@ class GivingWay:
 
     def _going_on(self, member: Member) -> _Imminent:
         """Return where a vehicle will be on its way."""
-        places, age_s = planned_places(member, self._live), self._age_s(member)
+        places, age_s = [*planned_places(member, self._live), *self._beyond(member)], self._age_s(member)
         motion = steered_ahead(self._live, member, places, WAITING_S + age_s)
         motion = Timeline(motion.time_s - age_s, motion.place_m)
         begins_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0)[:, :2].T))])[:-1]
@@ -129,6 +129,16 @@ class GivingWay:
         depths_m = [float(place[2]) for place in places[: 1 + int((begins_m < reach_m).sum())]]
         around_m = self._circle_m(member) if len(places) == 1 else 0.0
         return _Imminent(member, motion, min(depths_m), max(depths_m), around_m)
+
+    def _beyond(self, member: Member) -> list[FloatArray]:
+        """Return where a vehicle flies on to that has flown its last leg, (3,): it is led beyond its end."""
+        lead = None if member.order is None else member.order.lead
+        if lead is None or member.ordered or member.ahead:
+            return []
+        east, north = map(float, self._live.frame.to_local(lead.lat_deg, lead.lon_deg))
+        away_m = math.dist((east, north), member.place_m(self._live.frame))
+        # Nearer than that it circles there already.
+        return [np.array([east, north, lead.depth_m])] if away_m > 2.0 * self._circle_m(member) else []
 
     def _circle_m(self, member: Member) -> float:
         """Return how wide the circles are in which a vehicle waits."""
@@ -219,9 +229,10 @@ class GivingWay:
             np.append(here_m, depth_m), np.append(member.target_m, depth_m), constraints, self._committing.bottom
         )
         places_m = [here_m, *aside[:, :2]]
-        if not self._asides.may_stand_elsewhere(member):
-            return places_m
-        return [place_m for place_m in places_m if self._has_room(place_m)] or places_m
+        if self._asides.may_stand_elsewhere(member):
+            # For long, maybe: rather where its circles stay inside, but first of all apart from others.
+            places_m.sort(key=lambda place_m: not self._has_room(place_m))
+        return places_m
 
     def _has_room(self, place_m: FloatArray) -> bool:
         """Whether a vehicle may circle at a place (2,) for long: inside the area, and clear of zones."""
