@@ -12,7 +12,13 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState, Position
-from app.missions.flight.decisions.decision import INSET_M, arrival_room_m, from_outside, make_constraints
+from app.missions.flight.decisions.decision import (
+    INSET_M,
+    arrival_room_m,
+    from_outside,
+    make_constraints,
+    turn_radius_m,
+)
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.recovery import recovery_checks
@@ -263,7 +269,16 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
             remedy="Make limits.max_step_m smaller",
         )
         return
-    yield CheckView(id="area", title="Area", status=OK, message=words)
+    yield CheckView(id="area", title="Area", status=OK, message=words + _turns(live))
+
+
+def _turns(live: LiveMission) -> str:
+    """Return how far outside the area turns at its border lead, as words; '' where they do not."""
+    widest_m = max((2.0 * turn_radius_m(live.spec, member.spec) for member in live.team), default=0.0)
+    outside_m = widest_m - live.spec.limits.border_margin_m
+    if live.search is not None or outside_m < 1.0:
+        return ""
+    return f"; turns at its border lead up to {outside_m:.0f} m outside, less by limits.border_margin_m"
 
 
 def _waiting(live: LiveMission) -> Iterator[CheckView]:
