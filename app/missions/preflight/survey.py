@@ -278,7 +278,7 @@ def _turns(live: LiveMission) -> str:
     outside_m = widest_m - live.spec.limits.border_margin_m
     if live.search is not None or outside_m < 1.0:
         return ""
-    return f"; turns at its border lead up to {outside_m:.0f} m outside, less by limits.border_margin_m"
+    return f"; turns at its border lead up to {outside_m:.0f} m outside (limits.border_margin_m can keep them in)"
 
 
 def _waiting(live: LiveMission) -> Iterator[CheckView]:

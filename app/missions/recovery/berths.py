@@ -15,7 +15,7 @@ from imc_bridge.control.depth_layers import DepthLayer
 from imc_bridge.control.plans import HOME_RADIUS_M
 
 STOPS_WITHIN_M = 2.0
-"""A simulated vehicle floats up this close to where it arrived."""
+"""A simulated vehicle that comes from no deeper than it floats up from is at rest this close to where it arrived."""
 
 
 def layer_of(name: str, cruise_m: dict[str, float], spacing_m: float) -> DepthLayer:

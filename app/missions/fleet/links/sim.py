@@ -57,6 +57,7 @@ REPORT_PERIOD_S = 0.5
 """Time between position reports on the vehicle's clock, as often as DUNE sends EstimatedState."""
 LAUNCH_MARGIN_M = 2.0
 LAUNCH_SPACING_M = 15.0
+"""Beside each other there is room for the circles of two vehicles, of 5 m each, and for the usual separation."""
 KEPT_TERRAINS = 32
 RAISED_BY_M, CLIMB = 0.05, 4.0
 """A vehicle over a rising bottom is raised by at least so much each time, and by so many times what it is too low more

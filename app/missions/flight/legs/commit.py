@@ -259,8 +259,7 @@ class LegCommit:
         wanted_m = member.order.position.depth_m
         if member.withdrawal is not None and member.withdrawal.below:
             wanted_m = self._depth_below_m(member, wanted_m)
-        place = self._position(centre_m[0], centre_m[1], self._depth_m(member, wanted_m, ways))
-        return replace(member.order, step=NO_LEG, position=place, lead=None, circle=None, last=False)
+        return self._waiting(member.order, centre_m, self._depth_m(member, wanted_m, ways))
 
     def waiting_below(self, member: Member) -> WaypointOrder | None:
         """Return an order that keeps a vehicle where it is, as deep as it is; None where it has no order to change."""

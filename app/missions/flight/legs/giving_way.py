@@ -236,8 +236,8 @@ class GivingWay:
 
     def _has_room(self, place_m: FloatArray) -> bool:
         """Whether a vehicle may circle at a place (2,) for long: inside the area, and clear of zones."""
-        area = shapely.Polygon(self._constraints.area)
-        inside = area.contains(shapely.Point(place_m)) and area.exterior.distance(shapely.Point(place_m)) >= CIRCLE_M
+        area, place = shapely.Polygon(self._constraints.area), shapely.Point(place_m)
+        inside = area.contains(place) and area.exterior.distance(place) >= CIRCLE_M
         return inside and not self._zones.near(place_m, CIRCLE_M)
 
     def _motion_to(self, member: Member, place_m: FloatArray) -> Timeline:

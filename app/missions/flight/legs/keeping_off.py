@@ -3,7 +3,7 @@
 Legs are planned past zones with room for turns. But a vehicle that nobody heard drifts, one that was held or gave way
 begins anew where it is, and no vehicle turns on the spot: sent on from beside a zone, it may turn into it. So what
 counts once more is how it will steer. Where that leads into a zone it goes somewhere else first, from where its way is
-free.
+free. A leg that this does not help is given up: there is no room for its turns.
 """
 
 import math

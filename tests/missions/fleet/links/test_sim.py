@@ -22,7 +22,7 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.sim import FORSAKEN_S, LAUNCH_SPACING_M, SimFleetLink
+from app.missions.fleet.links.sim import FORSAKEN_S, SimFleetLink
 from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
@@ -119,8 +119,8 @@ async def test_one_that_joins_others_under_way_is_put_to_sea_far_from_them() -> 
     finally:
         await link.close()
     first, second, third, late = places
-    assert second == pytest.approx(first + LAUNCH_SPACING_M, abs=0.1)
-    assert third == pytest.approx(second + LAUNCH_SPACING_M, abs=0.1)
+    assert second == pytest.approx(first + 15.0, abs=0.1)
+    assert third == pytest.approx(second + 15.0, abs=0.1)
     assert late > 80.0
 
 
