@@ -353,3 +353,8 @@ class Team:
     def surveying(self) -> list[Member]:
         """Those that take part in the survey, whether or not they can be reached now."""
         return [m for m in self.members.values() if m.withdrawal is None]
+
+    @property
+    def held(self) -> list[Member]:
+        """Those that wait where they are, for a person or for something to be over, and may survey again."""
+        return [m for m in self.members.values() if m.withdrawal is not None and m.withdrawal.response is Response.HOLD]

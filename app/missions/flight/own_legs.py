@@ -115,6 +115,8 @@ class OwnLegs:
         """Vehicles for which nothing was left to do when all that was flown had been looked at."""
         self._idle: set[str] = set()
         """Vehicles that had flown all their legs when there was nothing for them."""
+        self._sent_home: set[str] = set()
+        """Vehicles that were sent home with what was too little of their way for a further line."""
         self._left_pct = 0.0
         """Share of the area that was not ensonified when that was last looked at."""
 
@@ -143,6 +145,9 @@ class OwnLegs:
         left = any(self._wants_legs(member) for member in self._live.team.surveying)
         if left and self._done:
             return self._all_seen() if self._measured else "nobody can fly a further line"
+        team = self._live.team
+        if any(m.withdrawal is not None and m.name not in self._sent_home and self._has_way(m) for m in team):
+            return "nobody surveys any more"
         return "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
 
     def _all_seen(self) -> str:
@@ -288,6 +293,7 @@ class OwnLegs:
                 lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
                 words = "its energy lasts for its way home" if lasts else "what is left of its way is for going home"
                 self._live.withdraw(member, Response.RETURN, f"{words} and for no further line")
+                self._sent_home.add(member.name)
 
     def _has_leg(self, name: str, number: int) -> bool:
         member = self._live.team.get(name)
@@ -409,7 +415,10 @@ class OwnLegs:
         return member.way_ahead_m(self._live.frame) / speed_mps
 
     def _over(self) -> bool:
-        """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody."""
+        """Whether everybody has flown its way; who does not get on, or is out of reach for long, keeps nobody.
+
+        Who is held with some of its way left is waited for.
+        """
         team = self._live.team.surveying
         left = [
             m
@@ -417,7 +426,7 @@ class OwnLegs:
             if (self._wants_legs(m) and (m.name not in self._done or m.asked is not None)) or m.ordered or m.ahead
         ]
         if not left:
-            return bool(list(self._live.team)) and not self._held
+            return bool(list(self._live.team)) and not any(self._has_way(m) for m in self._live.team.held)
         somebody_is_done = any(m.present for m in team if m not in left)
         if any(m.present and not (somebody_is_done and m.misses) for m in left):
             return False
@@ -433,17 +442,6 @@ class OwnLegs:
             self._absent_since_s.pop(member.name, None)
             return 0.0
         return now_s - self._absent_since_s.setdefault(member.name, now_s)
-
-    @property
-    def _held(self) -> bool:
-        """Whether a person holds a vehicle that has some of its way left: nobody ends that but a person."""
-        return any(
-            member.withdrawal is not None
-            and member.withdrawal.asked
-            and member.withdrawal.response is Response.HOLD
-            and self._has_way(member)
-            for member in self._live.team
-        )
 
     def _wants_legs(self, member: Member) -> bool:
         return member.withdrawal is None and self._has_way(member)

@@ -6,8 +6,9 @@ crash between any two moments loses nothing and repeats nothing but the sending,
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Executor
+from functools import partial
 
 import numpy as np
 
@@ -110,9 +111,7 @@ class Runner:
         try:
             resumed = await self._recover()
             await self._orders.begin(self._ordered)
-            reason = await self._flight().fly(resumed=resumed)
-            self._call_home(reason)
-            await self._withdrawals.finished()
+            reason = await self._fly_home(resumed)
             await self._onboard.drop()
             return reason
         finally:
@@ -125,6 +124,24 @@ class Runner:
             live.stop_counting()
             await to_the_end(save_elapsed(live))
             live.flight_ends()
+
+    async def _fly_home(self, resumed: bool) -> str:
+        """Fly until nobody goes on, and everybody is home; returns why nobody goes on.
+
+        Who joins while others are on their way home, or is sent on, surveys for what it has left of its way.
+        """
+        flight = self._flight()
+        while True:
+            reason = await flight.fly(resumed=resumed)
+            self._call_home(reason)
+            staying = {member.name: member for member in self._live.team.surveying}
+            if await self._withdrawals.finished(partial(self._somebody_came, staying)):
+                return reason
+            resumed = False
+
+    def _somebody_came(self, staying: Mapping[str, Member]) -> bool:
+        """Whether somebody surveys who is none of those that stay where they are."""
+        return any(staying.get(member.name) is not member for member in self._live.team.surveying)
 
     def _flight(self) -> OwnLegs | TeamSteps:
         shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)

@@ -61,7 +61,10 @@ class TeamSteps:
             await self._dispatch.begin()
             await self._arrive(self._deadline_s())
         decision: Decision | None = None
-        while live.header.step < self._spec.steps and self._somebody_surveys:
+        while live.header.step < self._spec.steps and (self._somebody_surveys or live.team.held):
+            if not self._somebody_surveys:
+                await self._waiting.until(lambda: self._somebody_surveys or not live.team.held, None)
+                continue
             started_s = asyncio.get_running_loop().time()
             if decision is None:
                 await self._waiting.for_team(

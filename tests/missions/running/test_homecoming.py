@@ -16,7 +16,7 @@ from app.missions.recovery.berths import home_of
 from app.missions.running.homecoming import call_home, hold
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
-from app.missions.spec.vehicle import VehicleKind
+from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 from app.missions.states import Action, MissionState
 from app.missions.team import Withdrawal
 from app.missions.views.mission import MissionView, VehicleView
@@ -229,6 +229,69 @@ async def test_vehicles_that_fly_in_steps_of_the_whole_team_come_home_too(servic
     await act(service, mission.id, "finish")
     ended = await until_ended(service, mission.id)
     assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+
+
+@pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
+async def test_who_is_sent_on_while_nobody_else_surveys_goes_on(
+    service: MissionService, limits: dict[str, Any]
+) -> None:
+    far = lon_lat(15.0, -300.0)
+    mission = await service.create(recovered("a", point=far, steps=1000, **({"limits": limits} if limits else {})))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    await call_home(live, "a", "Ana")
+    a = live.team.members["a"]
+    await until(lambda: a.flown.phase is Phase.RETURNING and a.ordered, "a is on its way")
+    before = a.legs
+    await service.send_on(live, "a", "Ana")
+    await until(lambda: a.legs > before + 2, "a surveys again")
+    await call_home(live, "a", "Ana")
+    ended = await until_ended(service, mission.id)
+    assert (ended.state, ended.vehicles[0].phase) == (MissionState.FINISHED, Phase.HOME)
+    assert limits or ended.reason == "nobody surveys any more"
+
+
+async def test_who_joins_while_everybody_goes_home_surveys_and_comes_home_too(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=lon_lat(15.0, -300.0), steps=4))
+    await act(service, mission.id, "start")
+    live = await service.get(mission.id)
+    a = live.team.members["a"]
+    await until(lambda: a.withdrawal is not None and a.flown.phase is Phase.RETURNING, "a is on its way home")
+    b = VehicleSpec(name="b", kind=VehicleKind.SIM, start=lon_lat(15.0, 15.0))
+    await service.team_changes.join(live, b, "Ana")
+    ended = await until_ended(service, mission.id)
+    assert {vehicle.name: vehicle.phase for vehicle in ended.vehicles} == {"a": Phase.HOME, "b": Phase.HOME}
+
+
+async def test_nobody_joins_a_mission_that_is_ending(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=lon_lat(15.0, -300.0), steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    await act(service, mission.id, "finish")
+    live = await service.get(mission.id)
+    with pytest.raises(ConflictError, match="the mission is ending"):
+        await service.team_changes.join(live, VehicleSpec(name="b", kind=VehicleKind.SIM), "Ana")
+    await act(service, mission.id, "abort")
+
+
+@pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
+async def test_a_mission_waits_for_who_is_held_by_a_failsafe(service: MissionService, limits: dict[str, Any]) -> None:
+    spec = sim_spec("a", steps=1000, failsafes={"vehicle_error": "hold"}, **({"limits": limits} if limits else {}))
+    mission = await service.create(spec)
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    link = service.hub._links[VehicleKind.SIM]
+    assert isinstance(link, SimFleetLink)
+    link.fail("a", FaultKind.ERROR, "a fin is stuck")
+    a = live.team.members["a"]
+    await until(lambda: a.withdrawal is not None and a.withdrawal.led, "it is held")
+    before = a.legs
+    link.mend("a", FaultKind.ERROR)
+    await until(lambda: a.withdrawal is None, "the error is over")
+    await until(lambda: a.legs > before + 2, "a surveys again")
+    await act(service, mission.id, "abort")
 
 
 async def test_a_service_that_restarts_goes_on_bringing_everybody_home(harbour: Harbour) -> None:

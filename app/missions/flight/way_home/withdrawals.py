@@ -1,6 +1,7 @@
 """Leads vehicles that survey no more: home, up, or to a stop."""
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -84,10 +85,15 @@ class Withdrawals:
             await self._dispatch.settle_late([m for m in self._live.team if m.withdrawal is not None])
             await until_next_look(self._time_scale)
 
-    async def finished(self) -> None:
-        """Wait until every vehicle that was called home is there, or is out of reach for long."""
+    async def finished(self, leaves_off: Callable[[], bool]) -> bool:
+        """Wait until every vehicle that was called home is there, or is out of reach for long.
+
+        False as soon as ``leaves_off`` holds.
+        """
         silent_since_s: dict[str, float] = {}
         while True:
+            if leaves_off():
+                return False
             now_s = asyncio.get_running_loop().time()
             away = [m for m in self._live.team if m.withdrawal is not None and not self._is_done(m)]
             silent_since_s = {m.name: silent_since_s.get(m.name, now_s) for m in away if not m.present}
@@ -96,7 +102,7 @@ class Withdrawals:
                 for member in lost:
                     words = f"{member.name} did not come home: it cannot be reached"
                     await self._live.journal.alarm(AlarmKind.NOT_COME_HOME, words, vehicle=member.name)
-                return
+                return not leaves_off()
             await until_next_look(self._time_scale)
 
     def _is_done(self, member: Member) -> bool:
