@@ -117,6 +117,8 @@ class Member:
     swath: Swath | None = None
     """What its swath sonar saw last."""
     heard_s: float | None = None
+    stored_battery_pct: float | None = None
+    """What its battery held when another process heard it last."""
     """When that was, Unix seconds by the service's clock."""
     flown: Flown = field(default_factory=Flown)
     left_at: datetime | None = None
@@ -306,6 +308,7 @@ class Team:
         member = Member(spec, slot, self.capabilities_of(spec.kind), energy=self.energy_of(spec))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
+            member.stored_battery_pct = before.stored_battery_pct
             member.legs, member.committed_m, member.spared = before.legs, before.committed_m, before.spared
             member.flown, member.late_m = before.flown, before.late_m
             member.energy.used_s = before.energy.used_s

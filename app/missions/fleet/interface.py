@@ -341,7 +341,8 @@ class Deployment:
     """A vehicle as its mission takes it.
 
     ``berth`` returns latitude and longitude of a free place that the mission has for it to begin at, None where any
-    will do; ``world`` what stands there beside the sea floor, None where nothing does.
+    will do; ``world`` what stands there beside the sea floor, None where nothing does. ``last_heard`` is what was heard
+    last of one that is at sea for the mission already, with what its battery held.
     """
 
     vehicle: VehicleSpec
@@ -349,6 +350,7 @@ class Deployment:
     mission: MissionSpec
     berth: Callable[[], tuple[float, float] | None]
     world: Callable[[], ObstacleWorld | None]
+    last_heard: VehicleReport | None = None
 
 
 class PolledVehicles(Protocol):

@@ -52,6 +52,7 @@ async def take_up(
         tide = await session.get(TideTableRow, row.id)
         drift = await session.get(AdjustmentRow, row.id)
         heard = await telemetry_queries.last_heard(session, row.id)
+        batteries = await telemetry_queries.last_batteries(session, row.id)
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
     loop = asyncio.get_running_loop()
@@ -89,6 +90,7 @@ async def take_up(
         member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
         member.report = _last_report(positions.get(member.name))
         member.heard_s = heard.get(member.name)
+        member.stored_battery_pct = batteries.get(member.name)
         member.risings = risings.get(member.name, 0)
         member.flown = Flown.recall(vehicle.flown)
         member.energy.used_s = member.flown.used_s

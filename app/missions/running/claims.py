@@ -1,13 +1,14 @@
 """Which mission has which vehicle: every vehicle belongs to one at most."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub, called
-from app.missions.fleet.interface import Deployment, LinkState, VehicleRefusedError
+from app.missions.fleet.interface import Deployment, LinkState, VehicleRefusedError, VehicleReport
 from app.missions.live.mission import LiveMission
 from app.missions.search.site import simulated_world
 from app.missions.spec.vehicle import VehicleSpec
@@ -116,4 +117,13 @@ def _deployment(live: LiveMission, vehicle: VehicleSpec) -> Deployment:
     def world() -> ObstacleWorld | None:
         return None if live.spec.search is None else simulated_world(live.spec, live.spec.search)
 
-    return Deployment(vehicle, live.id, live.spec, berth, world)
+    return Deployment(vehicle, live.id, live.spec, berth, world, _last_heard(live, vehicle.name))
+
+
+def _last_heard(live: LiveMission, name: str) -> VehicleReport | None:
+    """Return what was heard last of a vehicle of a mission at sea; another process may have heard it."""
+    member = live.team.get(name) or live.team.left.get(name)
+    if live.header.state not in AT_SEA or member is None or member.report is None:
+        return None
+    battery_pct = member.report.battery_pct
+    return replace(member.report, battery_pct=member.stored_battery_pct if battery_pct is None else battery_pct)

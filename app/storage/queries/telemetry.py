@@ -43,3 +43,12 @@ async def last_heard(session: AsyncSession, mission_id: str) -> dict[str, float]
     query = select(TelemetryRow.vehicle, heard).where(TelemetryRow.mission_id == mission_id)
     found = await session.execute(query.group_by(TelemetryRow.vehicle))
     return {vehicle: at_s for vehicle, at_s in found if at_s is not None}
+
+
+async def last_batteries(session: AsyncSession, mission_id: str) -> dict[str, float]:
+    """Return what each vehicle told last of its battery's level, percent."""
+    told = (TelemetryRow.mission_id == mission_id) & TelemetryRow.battery_pct.is_not(None)
+    newest = select(func.max(TelemetryRow.id)).where(told).group_by(TelemetryRow.vehicle)
+    query = select(TelemetryRow.vehicle, TelemetryRow.battery_pct).where(TelemetryRow.id.in_(newest))
+    found = await session.execute(query)
+    return {vehicle: level_pct for vehicle, level_pct in found if level_pct is not None}

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
@@ -291,6 +292,34 @@ async def test_a_mission_waits_for_who_is_held_by_a_failsafe(service: MissionSer
     link.mend("a", FaultKind.ERROR)
     await until(lambda: a.withdrawal is None, "the error is over")
     await until(lambda: a.legs > before + 2, "a surveys again")
+    await act(service, mission.id, "abort")
+
+
+async def test_simulated_vehicles_are_where_they_were_when_the_service_restarts(harbour: Harbour) -> None:
+    service = harbour.service
+    vehicles = [{"name": name, "kind": "sim", "endurance_min": 30.0} for name in ("a", "b")]
+    mission = await service.create(recovered(vehicles=vehicles, point=OUTSIDE, side_m=120.0, steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    await call_home(live, "a", "Ana")
+    a, b = live.team.members["a"], live.team.members["b"]
+    began_m = b.place_m(live.frame)
+    await until(lambda: a.flown.phase is Phase.HOME and math.dist(b.place_m(live.frame), began_m) > 40.0, "a is home")
+    assert a.report is not None
+    assert a.report.battery_pct is not None
+    at_home_m, left_pct = a.place_m(live.frame), a.report.battery_pct
+    assert left_pct < 99.0
+    service = await harbour.reopen()
+    live = await service.get(mission.id)
+    a = live.team.members["a"]
+    await until(lambda: a.report is not None and a.report.battery_pct is not None, "a is heard")
+    assert math.dist(a.place_m(live.frame), at_home_m) < 3.0
+    assert a.report is not None
+    assert a.report.battery_pct == pytest.approx(left_pct, abs=0.5)
+    await until(lambda: live.team.members["b"].legs > b.legs + 2, "b goes on")
+    lon, lat, _ = np.array((await live.trails.newest())["b"]).T
+    assert np.abs(np.diff(live.frame.to_local(lat, lon))).max() < 30.0, "it did not begin anew"
     await act(service, mission.id, "abort")
 
 

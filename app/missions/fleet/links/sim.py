@@ -126,11 +126,19 @@ class SimFleetLink(FleetLink):
             await asyncio.gather(self._task, return_exceptions=True)
 
     def deploy(self, deployment: Deployment) -> None:
-        """Launch a vehicle where its mission has it begin, or where the mission that this one follows left it."""
+        """Launch a vehicle where its mission has it begin, or where the mission that this one follows left it.
+
+        One that was at sea for its mission in another process goes on from where it was heard last.
+        """
         vehicle, mission, world = deployment.vehicle, deployment.mission, deployment.world()
         frame, size = mission.frame(), mission.local_area().max(axis=0)
         final = self._final_states.get(vehicle.name)
-        goes_on = final is not None and final.mission_id == mission.after and vehicle.start is None
+        if final is not None and (final.mission_id != mission.after or vehicle.start is not None):
+            final = None
+        heard = deployment.last_heard
+        if heard is not None:
+            place = heard.position.lat_deg, heard.position.lon_deg
+            final = FinalState(deployment.mission_id, place, 100.0 if heard.battery_pct is None else heard.battery_pct)
         launch = Launch(
             vehicle=vehicle.name,
             mission_id=deployment.mission_id,
@@ -155,7 +163,7 @@ class SimFleetLink(FleetLink):
                 nominal_mps=mission.speed_of(vehicle),
                 endurance_min=vehicle.endurance_min or self._battery.endurance_min,
             ),
-            goes_on_from=final if goes_on else None,
+            goes_on_from=final,
         )
         try:
             self.launch(launch)

@@ -60,7 +60,7 @@ class Launch:
         For a search: then it is a boat that can stop and turn on the spot.
     battery
     goes_on_from
-        Where the mission before left it, when it goes on from there.
+        Where the mission before left it, or another process, when it goes on from there.
     """
 
     vehicle: str
