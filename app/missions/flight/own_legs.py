@@ -454,4 +454,5 @@ class OwnLegs:
     @property
     def _nobody_to_lead(self) -> bool:
         team = self._live.team
-        return not team.present and any(self._wants_legs(member) for member in team.surveying)
+        everybody_left = not list(team)
+        return everybody_left or (not team.present and any(self._wants_legs(member) for member in team.surveying))

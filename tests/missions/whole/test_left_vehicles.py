@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from app.missions.errors import ConflictError, MissionNotFoundError, VehicleNotFoundError
+from app.missions.operations.history import events_after
 from app.missions.operations.imports.uploads import Uploads
 from app.missions.preflight.survey import preflight
 from app.missions.running.mission_views import watched
@@ -121,3 +122,21 @@ async def test_a_mission_in_which_nothing_was_measured_is_deleted_and_any_other_
         await service.delete(await service.get(flown))
     service = await harbour.reopen()
     assert [mission.id for mission in await service.missions()] == [flown]
+
+
+async def test_a_mission_whose_vehicles_have_all_left_says_so_until_one_comes(service: MissionService) -> None:
+    mission = (await service.create(sim_spec("a", steps=1000))).id
+    await act(service, mission, "start", actor="Ana")
+    await until_step(service, mission, 2)
+    live = await service.get(mission)
+    await service.team_changes.stop_one(live, "a", actor="Ana")
+
+    async def said(words: str) -> bool:
+        return any(event.message == words for event in await events_after(live, 0, 1000))
+
+    await until(lambda: said("every vehicle left; add one to go on"), "it is told")
+    await service.team_changes.rejoin(live, "a", actor="Ana")
+    before = live.team.members["a"].legs
+    await until(lambda: live.team.members["a"].legs > before + 2, "it surveys again")
+    assert await said("a vehicle can be sent again")
+    await act(service, mission, "abort", actor="Ana")
