@@ -173,16 +173,26 @@ class Runner:
         await self._remember(step.memory)
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}
+        for member in live.team.left.values():
+            # It may come back, and goes on with its own numbers.
+            self._count_legs(member, last, way_m, spared)
         for member in live.team:
             was_led = member.legs > 0
-            member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
-            member.spared = spared[member.name]
+            self._count_legs(member, last, way_m, spared)
             of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             if not was_led:
                 self._leave_out_passed(member)  # after a pause all that was flown is written down
         await live.journal.log(Level.INFO, "resumed", f"going on after step {step.number}", step=step.number)
         return True
+
+    @staticmethod
+    def _count_legs(
+        member: Member, last: Mapping[str, int], way_m: Mapping[str, float], spared: Mapping[str, int]
+    ) -> None:
+        """Let a vehicle have the legs that were committed for it, and how long they are together."""
+        member.legs, member.committed_m = last.get(member.name, 0), way_m.get(member.name, 0.0)
+        member.spared = spared[member.name]
 
     async def _remember(self, memory: bytes) -> None:
         """Let the planner take up what it had in mind; where it cannot read that it begins anew, on the same map."""

@@ -140,3 +140,23 @@ async def test_a_mission_whose_vehicles_have_all_left_says_so_until_one_comes(se
     await until(lambda: live.team.members["a"].legs > before + 2, "it surveys again")
     assert await said("a vehicle can be sent again")
     await act(service, mission, "abort", actor="Ana")
+
+
+async def test_a_vehicle_that_left_before_a_restart_comes_back_with_its_own_numbers(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = (await service.create(sim_spec("a", "b", steps=1000))).id
+    await act(service, mission, "start", actor="Ana")
+    live = await service.get(mission)
+    a, b = live.team.members["a"], live.team.members["b"]
+    await until(lambda: a.legs > 3 and b.legs > 3, "both have legs")
+    await service.team_changes.stop_one(live, "a", actor="Ana")
+    flown = a.legs
+    service = await harbour.reopen()
+    live = await service.get(mission)
+    await until(lambda: live.team.members["b"].engaged, "b follows")
+    await service.team_changes.rejoin(live, "a", actor="Ana")
+    assert live.team.members["a"].legs == flown
+    assert live.team.members["a"].committed_m > 0.0
+    await until(lambda: live.team.members["a"].legs > flown + 2, "a surveys again")
+    assert live.header.state is MissionState.RUNNING
+    await act(service, mission, "abort", actor="Ana")
