@@ -202,7 +202,8 @@ class GivingWay:
             others = [that for name, that in near.items() if name != it.member.name]
             for place_m in self._places(it.member):
                 motion, around_m = self._motion_to(it.member, place_m), self._circle_m(it.member)
-                if self._zones.entered_by(motion.place_m[:, :2]):
+                # It circles where it waits.
+                if self._zones.entered_by(motion.place_m[:, :2]) or self._zones.near(place_m, around_m):
                     continue
                 waiting = _Imminent(it.member, motion, it.least_m, it.most_m, around_m)
                 nearest_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)

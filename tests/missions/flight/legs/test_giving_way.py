@@ -6,11 +6,13 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+from shapely.geometry import Point, box
 
 from app.commands.home import fly_mission
 from app.exploration.lines import lawnmower
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import LinkState, Position, WaypointStatus
+from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
@@ -23,7 +25,7 @@ from app.missions.spec.orders import OrderKind, OrderState
 from app.missions.team import CommittedLeg, OperatorOrder, Withdrawal
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import Place, PlacedVehicles
-from tests.support.missions.specs import LAT, LON
+from tests.support.missions.specs import LAT, LON, rectangle
 
 HERE, THERE = (5.0, 30.0, 3.0), (50.0, 30.0, 3.0)
 
@@ -126,6 +128,28 @@ async def test_who_makes_room_rather_goes_where_its_circles_stay_inside_the_area
     # First of all it keeps apart: where it heads decides where it can be in time.
     assert makes_room >= 3
     assert inside >= 0.75 * makes_room, (inside, makes_room)
+
+
+async def test_nobody_waits_where_its_circles_lead_into_a_zone(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seen at the end of a mission: one of 2.5 m/s made room beside a zone, and circled through it."""
+    limits = {"max_step_m": 20.0, "min_separation_m": 5.0, "keep_out_margin_m": 2.0}
+    spec = sim_spec("a", "b", side_m=60.0, limits=limits, speed_mps=2.5, keep_out=[rectangle(20, 20, 36, 24)])
+    scene = PlacedVehicles(await service.get((await service.create(spec)).id), service.hub, monkeypatch)
+    zone, circle_m, waits = box(20.0, 20.0, 36.0, 24.0), turn_radius_m(spec, spec.vehicles[1]), 0
+    for north_m in (35.0, 38.0, 42.0):
+        for heading_deg in range(0, 360, 45):
+            scene.ordered.clear()
+            scene.put("a", (1.0, north_m + 1.0, 3.0), (55.0, north_m + 1.0, 3.0), anew=True)
+            heading_rad = math.radians(heading_deg)
+            one = scene.put("b", (28.0, north_m, 3.0), (27.0, north_m, 3.0), heading_rad=heading_rad, anew=True)
+            one.status = WaypointStatus.REACHED
+            await scene.giving_way.look()
+            for order in scene.ordered:
+                waits += 1
+                assert zone.distance(Point(scene.where_m(order))) > circle_m
+    assert waits >= 5
 
 
 @pytest.mark.parametrize("lead_m", [None, (30.0, 5.0, 3.0)])
