@@ -30,7 +30,7 @@ class PlacedVehicles:
         self.live = live
         self.ordered: list[WaypointOrder] = []
         constraints = make_constraints(live.spec)
-        committing = LegCommit(live, constraints, leads=False)
+        self.committing = committing = LegCommit(live, constraints, leads=False)
         self.dispatch = dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
         zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
         self.asides = asides = Asides(live, committing, dispatch)

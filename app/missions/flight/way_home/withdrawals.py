@@ -21,6 +21,7 @@ from app.missions.live.vehicle_reports import phase_of
 from app.missions.live.watchers.vehicles import energy_left_pct
 from app.missions.recovery.berths import home_of, is_home, point_of, room_of_m
 from app.missions.recovery.failsafes import LINK_LOST_S
+from app.missions.recovery.way_home import passed_over
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.team import Member, Withdrawal
 from app.missions.views.mission import Level
@@ -62,6 +63,8 @@ class Withdrawals:
         self._range = energy_range
         self._time_scale = time_scale
         self._stranded: set[str] = set()
+        self._lay: dict[str, frozenset[str]] = {}
+        """Who lay at rest when each vehicle was led home: its way leads past those."""
         self._ending: set[str] = set()
         """Vehicles that are just being stopped where they were to go."""
         self._below_since_s: dict[str, float] = {}
@@ -75,15 +78,19 @@ class Withdrawals:
     async def keep(self) -> None:
         """Go on until cancelled."""
         while True:
-            for member in self._live.team:
-                if member.withdrawal is not None and not member.withdrawal.over and not self._live.halted:
-                    try:
-                        await self._lead(member, member.withdrawal)
-                    except Exception:
-                        # Whatever keeps one from being led now keeps nobody else, and is tried again.
-                        log.exception("a vehicle could not be led", vehicle=member.name)
+            await self.look()
             await self._dispatch.settle_late([m for m in self._live.team if m.withdrawal is not None])
             await until_next_look(self._time_scale)
+
+    async def look(self) -> None:
+        """Look once at everybody."""
+        for member in self._live.team:
+            if member.withdrawal is not None and not member.withdrawal.over and not self._live.halted:
+                try:
+                    await self._lead(member, member.withdrawal)
+                except Exception:
+                    # Whatever keeps one from being led now keeps nobody else, and is tried again.
+                    log.exception("a vehicle could not be led", vehicle=member.name)
 
     async def finished(self, leaves_off: Callable[[], bool]) -> bool:
         """Wait until every vehicle that was called home is there, or is out of reach for long.
@@ -116,6 +123,9 @@ class Withdrawals:
             await self._begin(member, withdrawal)
         if withdrawal.response is Response.STOP:
             await self._end(member, withdrawal, f"{member.name} is stopped")
+        elif withdrawal.response is Response.RETURN and (other := self._lies_on_its_way(member)):
+            self._dispatch.give_up_legs(member, f"{other} lies on its way home")
+            await self._go_home(member, withdrawal)
         elif (
             not member.present
             or withdrawal.response is Response.HOLD
@@ -155,6 +165,25 @@ class Withdrawals:
         words = f"{member.name} waits below for {others} to pass"
         await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name)
         return True
+
+    def _lies_on_its_way(self, member: Member) -> str:
+        """Return who came to lie on a vehicle's way home since it was led there; '' where nobody did."""
+        limits, known = self._live.spec.limits, self._lay.get(member.name, frozenset())
+        if not member.present or not member.ordered or member.order is None or member.target_m is None:
+            return ""
+        way_m = np.array([member.target_m, *(leg.target_m for leg in member.ahead)])
+        depths_m = [member.order.position.depth_m, *(leg.position.depth_m for leg in member.ahead)]
+        least_m, above_m = limits.min_separation_m, limits.min_vertical_separation_m
+        here_m = member.place_m(self._live.frame)
+        for other in self._lying():
+            place_m = other.place_m(self._live.frame)
+            if other.name not in known and passed_over(here_m, way_m, depths_m, place_m, least_m, above_m):
+                return other.name
+        return ""
+
+    def _lying(self) -> list[Member]:
+        """Return those that lie where they were to be in the end."""
+        return [m for m in self._live.team if m.withdrawal is not None and m.withdrawal.over and m.report is not None]
 
     def _passes_above(self, member: Member) -> str:
         """Return which vehicle passes where this one would come up; '' where none does, or it has waited for long."""
@@ -215,6 +244,7 @@ class Withdrawals:
             await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
+        self._lay[member.name] = frozenset(other.name for other in self._lying())
         self._committing.lead_home(member, [*way, (home_m, 0.0)])
         await self._dispatch.begin()
 

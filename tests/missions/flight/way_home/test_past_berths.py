@@ -13,12 +13,14 @@ from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.past_berths import way_past_berths
+from app.missions.flight.way_home.withdrawals import Withdrawals
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
 from app.missions.team import Withdrawal
 from tests.support.missions.harbour import sim_spec
+from tests.support.missions.placed import PlacedVehicles
 from tests.support.missions.specs import lon_lat
 
 POINT_M = (60.0, 120.0)
@@ -92,3 +94,37 @@ async def test_a_way_through_deep_water_leads_straight_below_those_who_wait(serv
         way = way_past_berths(member, np.array([50.0, 20.0]), home_m, live, energy_range)
         assert way is not None
         assert [depth_m >= 2.0 for _, depth_m in way] == [True]
+
+
+@pytest.mark.parametrize("aside_m", [1.0, 12.0], ids=["on its way", "beside it"])
+async def test_who_comes_to_lie_on_a_way_home_is_gone_round(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch, aside_m: float
+) -> None:
+    """Seen in shallow water: one was home where it had turned, and another one that was led before passed over it."""
+    live, _ = await team_over(service, 4.0)
+    scene = PlacedVehicles(live, service.hub, monkeypatch)
+    energy_range = EnergyRange(live, make_constraints(live.spec), scene.committing)
+    withdrawals = Withdrawals(live, service.hub, scene.committing, scene.dispatch, energy_range, 1.0)
+    home_m = berth_m(live, "a")
+    here, lies_m = (float(home_m[0]), 30.0, 1.0), home_m - (aside_m, 40.0)
+    a = scene.put("a", here, (*home_m, 0.0))
+    a.withdrawal = Withdrawal(Response.RETURN, "")
+    for _ in range(2):
+        await withdrawals.look()
+    first = a.order
+    assert a.ordered
+    b = scene.put("b", (*lies_m, 0.0), (*lies_m, 0.0))
+    b.withdrawal = Withdrawal(Response.RETURN, "", over=True)
+    for _ in range(3):
+        await withdrawals.look()
+    assert a.ordered
+    assert a.order is not None
+    if aside_m > LEAST_M:
+        assert a.order is first
+        return
+    assert a.target_m is not None
+    ends = [(a.target_m, a.order.position.depth_m), *((leg.target_m, leg.position.depth_m) for leg in a.ahead)]
+    assert nearest_m(np.array(here[:2]), ends, lies_m, above_m=1.0) >= LEAST_M
+    led = a.order
+    await withdrawals.look()
+    assert a.order is led, "once is enough"
