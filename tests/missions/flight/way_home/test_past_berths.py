@@ -101,9 +101,8 @@ async def test_who_comes_to_lie_on_a_way_home_is_gone_round(
     service: MissionService, monkeypatch: pytest.MonkeyPatch, aside_m: float
 ) -> None:
     """Seen in shallow water: one was home where it had turned, and another one that was led before passed over it."""
-    live, _ = await team_over(service, 4.0)
+    live, energy_range = await team_over(service, 4.0)
     scene = PlacedVehicles(live, service.hub, monkeypatch)
-    energy_range = EnergyRange(live, make_constraints(live.spec), scene.committing)
     withdrawals = Withdrawals(live, service.hub, scene.committing, scene.dispatch, energy_range, 1.0)
     home_m = berth_m(live, "a")
     here, lies_m = (float(home_m[0]), 30.0, 1.0), home_m - (aside_m, 40.0)
