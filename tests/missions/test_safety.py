@@ -317,6 +317,27 @@ def test_a_vehicle_behind_a_zone_that_bars_every_straight_way_in_comes_round_it(
     )
 
 
+@pytest.mark.parametrize("east_m", [-1.0, -3.0, -6.0])
+@pytest.mark.parametrize("zone_north_m", [30, 24, 18])
+def test_a_vehicle_outside_comes_in_beside_the_margin_of_a_zone_at_the_border(east_m: float, zone_north_m: int) -> None:
+    """It was planned for from the border there, got no leg, as that may not end in a margin, and stayed outside."""
+    rocks = rectangle(6, zone_north_m - 6, 16, zone_north_m + 6)
+    limits = {"keep_out_margin_m": 8.0, "max_step_m": 10.0}
+    at = np.array([east_m, 30.0])
+    for _ in range(4):
+        comes = place("a", *at)
+        wish = at + np.array([8.0, 0.0])
+        decision, _, spec = decide_for([comes], [[*wish, 2.0]], keep_out=[rocks], limits=limits)
+        (leg,) = decision.legs
+        assert not leg.refusal, decision.notes
+        end, zone = leg.target_m[:2], Polygon(spec.to_local(spec.keep_out[0]))
+        assert zone.distance(LineString([at, end])) >= 0.85 * min(zone.distance(Point(at)), 8.0)
+        at = end
+        if Polygon(spec.local_area()).covers(Point(end)) and zone.distance(Point(end)) > 7.99:
+            return
+    pytest.fail("it did not come in")
+
+
 def test_a_vehicle_beyond_a_zone_close_to_the_border_is_not_planned_for_from_there() -> None:
     """It was within ten metres of the border, and its leg would have led through the zone."""
     quay = rectangle(-6, 20, -4, 40)

@@ -354,8 +354,11 @@ def _planned_for(
     for place in places:
         outside_m = free_space.distance_outside_m(polygon, place.en_m)
         border = free_space.nearest_inside(polygon, place.en_m)
+        # No leg may end in a zone's margin: who is beyond one at the border is planned for from beside it.
+        begins = clear_of_zones(constraints, border) if outside_m > 0.0 else place.en_m
         # Who is beyond a zone at the border is not planned for as if it were there.
         cut_off = outside_m > arrival_room_m(spec) and free_space.barred(constraints, place.en_m, border)
+        cut_off |= outside_m > 0.0 and math.dist(place.en_m, begins) > constraints.max_step_m
         far = cut_off or from_outside(place.en_m, polygon, spec)
         if far and not place.moving:
             continue
@@ -373,9 +376,8 @@ def _planned_for(
             notes.append(f"{place.vehicle} is {outside_m:.0f} m outside the area: {what}")
             legs.append(leg)
         else:
-            here_m = free_space.nearest_inside(polygon, place.en_m) if outside_m > 0 else place.en_m
             # Nobody may stay where a limit is broken: who gets no leg there would keep all others from theirs.
-            team.append(replace(place, en_m=here_m if place.moving else clear_of_zones(constraints, here_m)))
+            team.append(replace(place, en_m=begins if place.moving else clear_of_zones(constraints, begins)))
     return team, legs, notes
 
 
