@@ -17,7 +17,7 @@ from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
-from app.missions.states import ENDED
+from app.missions.states import AT_SEA, ENDED
 from app.missions.targets.filters import warm_up as tracking_warm_up
 from app.missions.team import Withdrawal
 from app.storage.database import Database
@@ -52,7 +52,7 @@ async def take_up(
         tide = await session.get(TideTableRow, row.id)
         drift = await session.get(AdjustmentRow, row.id)
         heard = await telemetry_queries.last_heard(session, row.id)
-        batteries = await telemetry_queries.last_batteries(session, row.id)
+        batteries = await telemetry_queries.last_batteries(session, row.id) if row.state in AT_SEA else {}
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
     loop = asyncio.get_running_loop()
