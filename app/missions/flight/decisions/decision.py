@@ -358,7 +358,8 @@ def _planned_for(
         begins = clear_of_zones(constraints, border) if outside_m > 0.0 else place.en_m
         # Who is beyond a zone at the border is not planned for as if it were there.
         cut_off = outside_m > arrival_room_m(spec) and free_space.barred(constraints, place.en_m, border)
-        cut_off |= outside_m > 0.0 and math.dist(place.en_m, begins) > constraints.max_step_m
+        if outside_m > 0.0 and not np.array_equal(begins, border):
+            cut_off |= math.dist(place.en_m, begins) > constraints.max_step_m
         far = cut_off or from_outside(place.en_m, polygon, spec)
         if far and not place.moving:
             continue
