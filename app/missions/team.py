@@ -117,9 +117,9 @@ class Member:
     swath: Swath | None = None
     """What its swath sonar saw last."""
     heard_s: float | None = None
+    """When that was, Unix seconds by the service's clock."""
     stored_battery_pct: float | None = None
     """What its battery held when another process heard it last."""
-    """When that was, Unix seconds by the service's clock."""
     flown: Flown = field(default_factory=Flown)
     left_at: datetime | None = None
     """When it left the mission; None while it takes part."""
@@ -356,6 +356,13 @@ class Team:
     def surveying(self) -> list[Member]:
         """Those that take part in the survey, whether or not they can be reached now."""
         return [m for m in self.members.values() if m.withdrawal is None]
+
+    @property
+    def at_rest(self) -> list[Member]:
+        """Those that lie where they were to be in the end: home, up or stopped."""
+        return [
+            m for m in self.members.values() if m.withdrawal is not None and m.withdrawal.over and m.report is not None
+        ]
 
     @property
     def held(self) -> list[Member]:

@@ -124,8 +124,7 @@ class OrderBook:
         member = live.team.named(name)
         if live.header.state is not MissionState.RUNNING:
             raise ConflictError(f"the mission is {live.header.state}: nobody is led", "start or resume it first")
-        if live.ending is not None:
-            raise ConflictError("everybody goes home: the mission is ending", "create a new mission")
+        live.refuse_ending()
         if self._flight is None:
             raise ConflictError("the flight is just beginning", "try again in a moment")
         if not self._flight.apart:

@@ -16,6 +16,7 @@ from app.compute.compute import Compute
 from app.estimation import Sensor, SingleBeam
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
+from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetEvent
 from app.missions.flown import Phase
@@ -323,6 +324,11 @@ class LiveMission:
         member.pursuing = None
         self.changed.set()
         return True
+
+    def refuse_ending(self) -> None:
+        """Raise ConflictError while everybody goes home because the mission was finished or aborted."""
+        if self.ending is not None:
+            raise ConflictError("everybody goes home: the mission is ending", "create a new mission")
 
     def call_everybody_home(self) -> None:
         """Withdraw all vehicles of a mission that is ending; those without a recovery point stop."""

@@ -64,8 +64,7 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
         return
     if member.withdrawal is None:
         raise ConflictError(f"vehicle {name!r} is surveying", "nothing has to be done")
-    if live.ending is not None:
-        raise ConflictError("everybody goes home: the mission is ending", "create a new mission")
+    live.refuse_ending()
     strongest = next((one for one in member.failsafes if one.response is not Response.WARN), None)
     if strongest is not None and not member.withdrawal.over:
         raise ConflictError(f"vehicle {name!r} is not fit to go on: {strongest.message}", "see to that first")

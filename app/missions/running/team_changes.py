@@ -32,8 +32,7 @@ class TeamChanges:
         """Let a vehicle join. Raises ConflictError, InvalidRequestError."""
         async with self._supervisor.acting(live.id):
             refuse_ended(live, "takes no more vehicles")
-            if live.ending is not None:
-                raise ConflictError("everybody goes home: the mission is ending", "create a new mission")
+            live.refuse_ending()
             check_vehicle(vehicle, live.spec, self._hub.kinds)
             if live.team.get(vehicle.name) is not None:
                 raise ConflictError(

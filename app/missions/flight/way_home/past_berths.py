@@ -42,10 +42,11 @@ def way_past_berths(
 
 def _taken(member: Member, live: LiveMission) -> Iterator[FloatArray]:
     """Yield where others wait to be taken out of the water, or will, each (2,)."""
+    at_rest = {other.name for other in live.team.at_rest}
     for other in live.team:
         if other is member:
             continue
-        ended = other.withdrawal is not None and other.withdrawal.over and other.report is not None
-        place_m = other.place_m(live.frame) if ended else home_of(other.spec, other.slot, live.spec)
+        lies = other.name in at_rest
+        place_m = other.place_m(live.frame) if lies else home_of(other.spec, other.slot, live.spec)
         if place_m is not None:
             yield place_m

@@ -175,15 +175,11 @@ class Withdrawals:
         depths_m = [member.order.position.depth_m, *(leg.position.depth_m for leg in member.ahead)]
         least_m, above_m = limits.min_separation_m, limits.min_vertical_separation_m
         here_m = member.place_m(self._live.frame)
-        for other in self._lying():
+        for other in self._live.team.at_rest:
             place_m = other.place_m(self._live.frame)
             if other.name not in known and passed_over(here_m, way_m, depths_m, place_m, least_m, above_m):
                 return other.name
         return ""
-
-    def _lying(self) -> list[Member]:
-        """Return those that lie where they were to be in the end."""
-        return [m for m in self._live.team if m.withdrawal is not None and m.withdrawal.over and m.report is not None]
 
     def _passes_above(self, member: Member) -> str:
         """Return which vehicle passes where this one would come up; '' where none does, or it has waited for long."""
@@ -244,7 +240,7 @@ class Withdrawals:
             await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
-        self._lay[member.name] = frozenset(other.name for other in self._lying())
+        self._lay[member.name] = frozenset(other.name for other in self._live.team.at_rest)
         self._committing.lead_home(member, [*way, (home_m, 0.0)])
         await self._dispatch.begin()
 
