@@ -284,6 +284,7 @@ def draw(file: Path, drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:
         axes.plot(*ends.T, ".", color=f"C{k}", markersize=4)
         axes.plot(*track.T, color=f"C{k}", linewidth=1.5, alpha=0.6)
     axes.set_aspect("equal")
+    file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=110)
 
 

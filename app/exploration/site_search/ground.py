@@ -15,6 +15,8 @@ STRAIGHT, DIAGONAL = 5, 7
 """Lengths of moves between cells in fifths of a cell: at most 8 % above or below the true length of a way."""
 UNREACHED = np.int32(2**30)
 _AROUND = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3), indexing="ij"), axis=-1).reshape(-1, 2)
+LOOKAHEAD = 60.0
+"""Legs of a whole way are at most this long, in cells."""
 EVERY, SLACK = 0.1, 0.02
 """Distance between the points at which a leg is checked, and what is kept more than asked for there, in cells."""
 
@@ -39,9 +41,11 @@ class Ground:
     _beside: dict[tuple[float, float], IntArray] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, task: SearchTask) -> "Ground":
-        """Make it from what is known now."""
+    def of(cls, task: SearchTask, taken: BoolArray | None = None) -> "Ground":
+        """Make it from what is known now; ``taken`` (rows, cols): cells that are hazards for another reason."""
         hazard = task.states != Cell.EXPLORED
+        if taken is not None:
+            hazard |= taken
         return cls(task, hazard, _away_from(hazard, _within(_margin(task))))
 
     @classmethod
@@ -111,6 +115,11 @@ class Ground:
         """Cells whose centre keeps the safety distance from every known obstacle."""
         return _away_from(self.task.states >= Cell.KNOWN, _within(_margin(self.task)))
 
+    def may_be_open(self, en_m: FloatArray) -> bool:
+        """Return whether a position (2,) is on the site and keeps the safety distance from every known obstacle."""
+        [place], [on_site] = self.places(en_m[None]), np.stack(self.task.grid.cell_of(en_m[None]), axis=-1)
+        return bool(np.array_equal(place, on_site) and self._hoped_open[place[0], place[1]])
+
     def way_m(self, origin_m: FloatArray, distance: NDArray[np.int32]) -> float:
         """Return how far it is from a position (2,) to where ``distance`` is 0; inf where there is no way."""
         cells = self.beside(origin_m)
@@ -123,6 +132,23 @@ class Ground:
         """Return distances in metres; inf where there is no way."""
         far = np.asarray(fifths, dtype=np.float64)
         return np.where(far >= UNREACHED, np.inf, far * self.task.grid.cell_m / STRAIGHT)
+
+    def way(self, origin_m: FloatArray, end_m: FloatArray) -> FloatArray | None:
+        """Return the corners (n, 2) of a way between positions (2,), its end the last of them.
+
+        Every leg of it is clear. None: no such way is known.
+        """
+        cells = self.beside(end_m)
+        distance = self.distances(cells)
+        corners: list[FloatArray] = []
+        here_m = origin_m
+        while not self.clear(here_m, end_m[None])[0]:
+            on_m = self.towards(here_m, distance, LOOKAHEAD * self.task.grid.cell_m)
+            if len(corners) > distance.size or np.array_equal(on_m, here_m):
+                return None
+            corners.append(on_m)
+            here_m = on_m
+        return np.array([*corners, end_m])
 
     def towards(self, origin_m: FloatArray, distance: NDArray[np.int32], step_m: float) -> FloatArray:
         """Return the next position (2,) on the way down ``distance``, as far as a clear leg of ``step_m`` goes."""

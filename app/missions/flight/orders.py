@@ -243,11 +243,6 @@ class OrderBook:
         return {} if self._flight is None else self._flight.dispatch.given_up
 
     @property
-    def led_apart(self) -> bool:
-        """Whether vehicles have legs of their own now."""
-        return self._flight is not None and self._flight.apart
-
-    @property
     def waiting(self) -> bool:
         """Whether an order waits to be taken up, or to be given up."""
         flight = self._flight

@@ -46,7 +46,7 @@ class SearchHooks:
     def barred(self) -> list[Member]:
         """Return the vehicles under way that have something on their way by what is known now."""
         course = self._course
-        return [] if course is None else [m for m in self._live.team if m.busy and course.barred(m)]
+        return [] if course is None else [m for m in self._live.team.surveying if m.busy and course.barred(m)]
 
     def still_clear(self, decision: Decision) -> bool:
         """Return whether the legs of a decision are still clear by what was seen since it was made."""
@@ -100,9 +100,11 @@ class SearchHooks:
             message = f"{why} and not everybody is back (from the entry: {far}): {then}"
             await live.journal.alarm(AlarmKind.SEARCH_LATE, message, vehicles=away)
         if away and course.idle == IDLE_STEPS:
+            stand = "stands" if len(away) == 1 else "stand"
             message = (
-                f"nobody can go anywhere from where {', '.join(away)} stand: no way that was looked at is wide enough "
-                "and leads on, or to the entry. Bring them there, or make search.safety_m smaller in a new mission"
+                f"nobody can go anywhere from where {', '.join(away)} {stand}: no way that was looked at is wide "
+                "enough and leads on, or to the entry. Bring them there, or make search.safety_m smaller in a new "
+                "mission"
             )
             await live.journal.alarm(AlarmKind.SEARCH_STUCK, message, vehicles=away)
         return course.over(team, int(decision.terms.get("homebound", 0)))

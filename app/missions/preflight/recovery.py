@@ -57,6 +57,16 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
     if home_m is None:
         return
     name, title = f"recovery.{member.name}", f"Way home of {member.name}"
+    if live.search is not None and not live.search.may_be_open(home_m):
+        yield CheckView(
+            id=name,
+            title=title,
+            status=WARNING,
+            message=f"its place there lies outside the site, or within {live.search.spec.safety_m:g} m of what is "
+            "known to stand there: it will stop where it is",
+            remedy="Move the recovery point, or give the vehicle a recovery_point of its own",
+        )
+        return
     constraints = make_constraints(live.spec)
     ways_home = WaysHome(constraints, home_m)
     speed_mps = live.spec.speed_of(member.spec)

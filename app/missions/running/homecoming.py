@@ -50,8 +50,6 @@ async def hold(live: LiveMission, name: str, actor: str) -> None:
     member = live.team.named(name)
     if live.header.state is not MissionState.RUNNING or live.ending is not None:
         raise ConflictError(f"the mission is {_what(live)}: nobody is held", "see to the mission first")
-    if member.withdrawal is None and live.team.surveying == [member] and not live.part(OrderBook).led_apart:
-        raise ConflictError(f"nobody but {name!r} surveys", "pause the mission: that holds it, too")
     if not live.withdraw(member, Response.HOLD, f"held by {actor}", asked=True):
         raise ConflictError(f"vehicle {name!r} surveys no more: {_why(member)}", "send it on first")
     live.publish_summary()

@@ -21,8 +21,6 @@ RESERVE = 0.1
 """Part of the time that is left which nobody plans with."""
 SPARE_STEPS = 0.5
 """Part of a full step that each step that is left counts as on the way home."""
-SPARE_PART = 0.5
-"""Part of the arrival radius that legs keep beside the safety distance: so far from its waypoint a vehicle may be."""
 REST_S = 2.0
 """Vehicle time that a decision in which nobody moves waits for a new scan."""
 STILL_M = 0.1
@@ -65,7 +63,7 @@ class Course:
         """Return what planners are to see when ``step`` is decided: the way that is left by time and by steps."""
         by_time_m = self.search.left_s() * (1.0 - RESERVE) * self.pace_mps
         by_steps_m = (self.spec.steps - step + 1) * self.spec.limits.max_step_m * SPARE_STEPS
-        return self.search.task(min(by_time_m, by_steps_m), spare_m=SPARE_PART * self.spec.arrival_radius_m)
+        return self.search.task(min(by_time_m, by_steps_m), spare_m=self.search.spare_m)
 
     def unseen(self, team: Sequence[Member]) -> list[str]:
         """Return the vehicles whose own place nobody has looked at yet: where to go from there is not known."""

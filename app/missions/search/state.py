@@ -7,7 +7,7 @@ from datetime import datetime
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.base import HOME_STEPS
@@ -22,6 +22,8 @@ from app.missions.spec.search import SearchSpec
 
 DOUBT_CELLS = 1.0
 """An echo so close in front of a known obstacle comes from that."""
+SPARE_PART = 0.5
+"""Part of the arrival radius that legs keep beside the safety distance: so far from its waypoint a vehicle may be."""
 NEAR_M = 1e-3
 """A position this little outside of the site comes from rounding."""
 
@@ -52,12 +54,15 @@ class Search:
         self.began_at: datetime | None = None
         """When its first step was committed."""
         self._frame = frame
+        self.spare_m = SPARE_PART * spec.arrival_radius_m
+        """What legs are to keep beside the safety distance."""
         self._step_m = spec.limits.max_step_m
         self._speed_mps = spec.speed_mps
         self._time_scale = time_scale
         self._grid = self.site.grid
         self._figures: Figures | None = None
         self._ground: Ground | None = None
+        self._ways: Ground | None = None
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -77,7 +82,7 @@ class Search:
             self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m, doubt_m=doubt_m)
             self.version += 1
         if scans:
-            self._figures = self._ground = None
+            self._figures = self._ground = self._ways = None
 
     def refusal(self, scan: ScanReport) -> str:
         """Return why a scan cannot be used; empty when it can."""
@@ -146,6 +151,45 @@ class Search:
         if self._ground is None:
             self._ground = Ground.for_legs(self.task(0.0))
         return bool(self._ground.clear(origin_m, end_m[None])[0])
+
+    def way_m(
+        self, here_m: FloatArray, end_m: FloatArray, off_m: Sequence[FloatArray] = (), apart_m: float = 0.0
+    ) -> FloatArray | None:
+        """Return the corners (n, 2) of a way to a place (2,), every leg of it clear; None: no such way is known now.
+
+        Parameters
+        ----------
+        off_m, apart_m
+            Places (2,) to go round, and how far from them.
+        """
+        if off_m:
+            return self._ground_for_ways(self._about(off_m, apart_m)).way(here_m, end_m)
+        return self._seen_ground.way(here_m, end_m)
+
+    def may_be_open(self, en_m: FloatArray) -> bool:
+        """Return whether a place (2,) is on the site and keeps the safety distance from what is known to stand there.
+
+        Nobody need have looked there yet.
+        """
+        return self._seen_ground.may_be_open(en_m)
+
+    def _ground_for_ways(self, taken: BoolArray | None = None) -> Ground:
+        return Ground.of(self.task(0.0, spare_m=self.spare_m), taken)
+
+    @property
+    def _seen_ground(self) -> Ground:
+        if self._ways is None:
+            self._ways = self._ground_for_ways()
+        return self._ways
+
+    def _about(self, places_m: Sequence[FloatArray], apart_m: float) -> BoolArray:
+        """Return the cells (rows, cols) that legs keep off as off hazards, to be ``apart_m`` off places."""
+        grid = self._grid
+        rows, cols = np.indices(grid.evidence.shape)
+        east_m, north_m = grid.west_m + grid.cell_m * (cols + 0.5), grid.south_m + grid.cell_m * (rows + 0.5)
+        within_m = max(apart_m - self.spec.safety_m, 0.0) + grid.cell_m
+        near = [np.hypot(east_m - east, north_m - north) <= within_m for east, north in places_m]
+        return np.asarray(np.any(near, axis=0), dtype=np.bool_)
 
     @property
     def figures(self) -> Figures:

@@ -1,12 +1,13 @@
 """Leads vehicles aside from their legs for a while, and on again."""
 
 import asyncio
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
 from app.arrays import FloatArray
 from app.missions.fleet.interface import WaypointOrder, WaypointStatus
-from app.missions.flight.legs.commit import LegCommit
+from app.missions.flight.legs.commit import STILL_M, LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.live.mission import LiveMission
 from app.missions.spec.vehicle import Guidance
@@ -60,6 +61,11 @@ class Asides:
         waits = member.order is not None and member.status is WaypointStatus.REACHED and not member.ahead
         wanted = member.withdrawal is not None or member.asked is not None or member.pursuing is not None
         return _follows(member) and waits and not wanted and not member.surfacing
+
+    def is_clear(self, member: Member, place_m: FloatArray) -> bool:
+        """Whether a vehicle may go aside to a place (2,): in a search not close to what stands or nobody looked at."""
+        search, here_m = self._live.search, member.place_m(self._live.frame)
+        return search is None or math.dist(here_m, place_m) < STILL_M or search.clear(here_m, place_m)
 
     async def stand(self, member: Member, place_m: FloatArray) -> bool:
         """Send a vehicle that only waits to another place (2,), and have it wait there; whether it takes this order.

@@ -248,9 +248,14 @@ class LegCommit:
         return end_m if lead is None else self._local(lead)
 
     def holding(self, member: Member) -> WaypointOrder | None:
-        """Return an order that keeps a vehicle circling near where it is; None where there is no room for that."""
+        """Return an order that keeps a vehicle circling near where it is; None where there is no room for that.
+
+        In a search it stays where it is: what is beside it may not be known.
+        """
         if member.report is None or member.order is None:
             return None
+        if self._live.search is not None:
+            return self.waiting_at(member, member.place_m(self._live.frame))
         inside = free_space.nearest_inside(Polygon(self._constraints.area), member.place_m(self._live.frame))
         centre_m = self._room(member, inside, inside)
         if centre_m is None:

@@ -73,13 +73,23 @@ class EnergyRange:
         here_m = member.place_m(self._live.frame)
         last_m = self._committing.followed_to_m(member, end_m)
         on_leg = here_m + np.linspace(0.0, 1.0, travel_depth.LEG_SAMPLES)[:, None] * (last_m - here_m)
-        if self._ways_to(home_m)[0].sees(on_leg, np.broadcast_to(way_m[0], on_leg.shape)).all():
+        if self._live.search is None and self._sees(home_m, on_leg, way_m[0]):
             return way_m
         beyond = self.way_from(end_m, home_m)
         return way_m if beyond is None else np.vstack([end_m, beyond])
 
+    def _sees(self, home_m: FloatArray, places_m: FloatArray, corner_m: FloatArray) -> bool:
+        """Whether nothing stands between any of some places (n, 2) and a corner (2,) of the way home."""
+        corners_m = np.broadcast_to(corner_m, places_m.shape)
+        return bool(self._ways_to(home_m)[0].sees(places_m, corners_m).all())
+
     def way_from(self, here_m: FloatArray, home_m: FloatArray) -> FloatArray | None:
-        """Return the corners of the way home from a place, (n, 2); None: there is none."""
+        """Return the corners of the way home from a place, (n, 2); None: there is none.
+
+        In a search it leads only where somebody has looked.
+        """
+        if self._live.search is not None:
+            return self._live.search.way_m(here_m, home_m)
         self._look_for_land()
         anyhow, off_land = self._ways_to(home_m)
         way_m = None if off_land is None else off_land.way(here_m)
@@ -90,6 +100,8 @@ class EnergyRange:
         self, here_m: FloatArray, home_m: FloatArray, places_m: Sequence[FloatArray], apart_m: float
     ) -> FloatArray | None:
         """Return a way home as :meth:`way_from` does, that goes round some places (2,) so far from them."""
+        if self._live.search is not None:
+            return self._live.search.way_m(here_m, home_m, places_m, apart_m)
         self._look_for_land()
         for bottom, least_m in ((self._committing.bottom, self._least_m), (None, 0.0)):
             ways = WaysHome(self._constraints, home_m, bottom, least_m, (places_m, apart_m))

@@ -9,6 +9,7 @@ import asyncio
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -200,7 +201,7 @@ class GivingWay:
             if not (self._asides.may_lead(it.member, Because.VEHICLE) or stands(it.member)):
                 continue
             others = [that for name, that in near.items() if name != it.member.name]
-            for place_m in self._places(it.member):
+            for place_m in filter(partial(self._asides.is_clear, it.member), self._places(it.member)):
                 motion, around_m = self._motion_to(it.member, place_m), self._circle_m(it.member)
                 # It circles where it waits.
                 if self._zones.entered_by(motion.place_m[:, :2]) or self._zones.near(place_m, around_m):

@@ -170,5 +170,5 @@ class KeepingOff:
         places_m = np.concatenate([here_m + max(reach * radius_m, LEAST_REACH_M) * unit for reach in REACHES])
         inside = shapely.contains_xy(Polygon(constraints.area), places_m[:, 0], places_m[:, 1])
         for place_m in places_m[inside][np.argsort(np.hypot(*(places_m[inside] - end_m).T), kind="stable")]:
-            if self._zones.room_m(np.array([here_m, place_m])) > 0.0:
+            if self._zones.room_m(np.array([here_m, place_m])) > 0.0 and self._asides.is_clear(member, place_m):
                 yield place_m

@@ -1,6 +1,7 @@
 """Leads vehicles that survey no more: home, up, or to a stop."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -123,8 +124,8 @@ class Withdrawals:
             await self._begin(member, withdrawal)
         if withdrawal.response is Response.STOP:
             await self._end(member, withdrawal, f"{member.name} is stopped")
-        elif withdrawal.response is Response.RETURN and (other := self._lies_on_its_way(member)):
-            self._dispatch.give_up_legs(member, f"{other} lies on its way home")
+        elif withdrawal.response is Response.RETURN and (why := self._barred(member)):
+            self._dispatch.give_up_legs(member, why)
             await self._go_home(member, withdrawal)
         elif (
             not member.present
@@ -165,6 +166,17 @@ class Withdrawals:
         words = f"{member.name} waits below for {others} to pass"
         await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name)
         return True
+
+    def _barred(self, member: Member) -> str:
+        """Return why a vehicle gets another way home than the one it flies; '' where it may go on."""
+        search = self._live.search
+        if search is not None and member.present and member.ordered and member.target_m is not None:
+            here_m = member.place_m(self._live.frame)
+            away_m = math.dist(here_m, member.target_m)
+            if away_m > self._live.spec.arrival_radius_m and not search.clear(here_m, member.target_m):
+                return "something was seen on its way home"
+        other = self._lies_on_its_way(member)
+        return f"{other} lies on its way home" if other else ""
 
     def _lies_on_its_way(self, member: Member) -> str:
         """Return who came to lie on a vehicle's way home since it was led there; '' where nobody did."""
@@ -227,7 +239,10 @@ class Withdrawals:
         away_m = float(np.hypot(*(home_m - here_m)))
         point_m = point_of(recovery, spec)
         from_point_m = float(np.hypot(*(point_m - here_m)))
-        near = is_home(here_m, home_m, point_m, room_of_m(member.spec, spec), recovery.radius_m)
+        room_m, search = room_of_m(member.spec, spec), self._live.search
+        near = is_home(here_m, home_m, point_m, room_m, recovery.radius_m)
+        if search is not None and away_m > room_m:
+            near = near and search.clear(here_m, home_m)  # not while something stands between
         if near and (self._at_surface(member) or self._waited_to_rise(member)):
             facts = {"from_point_m": round(from_point_m, 1), "energy_left_pct": energy_left_pct(member)}
             await self._end(member, withdrawal, f"{member.name} is home, {away_m:.0f} m from its place", **facts)
@@ -236,7 +251,8 @@ class Withdrawals:
             return
         way = way_past_berths(member, here_m, home_m, self._live, self._range)
         if way is None:
-            words = "no way leads home that keeps clear of zones: it comes up where it is"
+            off = "zones" if self._live.search is None else "what stands there, or nobody has looked at"
+            words = f"no way leads home that keeps clear of {off}: it comes up where it is"
             await self._live.journal.alarm(AlarmKind.NO_WAY_HOME, f"{member.name}: {words}", vehicle=member.name)
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
