@@ -1,6 +1,7 @@
 """What all planners of search missions share: where one may go, being back in time, and giving way to each other."""
 
 from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -82,19 +83,19 @@ class SearchPlanner(PlannerBase):
         wishes = self._seek(scene, seed)
         here = team.positions[:, :2]
         gone = max(scene.step_m, float(np.hypot(*(wishes - here).T).max()))
-        late = 0
+        late = np.zeros(len(here), dtype=np.bool_)
         for i in range(len(here)):
             clear = scene.ground.clear(here[i], wishes[i : i + 1])[0]
             if not clear or not scene.in_time(wishes[i], gone):
-                late += 1
+                late[i] = True
                 wishes[i] = scene.ground.towards(here[i], scene.home, scene.step_m)
-        positions = give_way(scene, bottom, wishes, seed)
+        positions = give_way(scene, bottom, wishes, seed, late | self._homewards)
         task = scene.task
         at_home = np.hypot(*(positions[:, :2] - task.entry_m).T) <= HOME_STEPS * scene.step_m * len(positions)
         figures = {
             "F_1": task.explored_part,
             "F_2": task.explored_goal_part,
-            "homebound": float(late),
+            "homebound": float(late.sum()),
             "homewards": float(self._homewards),
             "at_home": float(at_home.sum()),
         }
@@ -114,39 +115,103 @@ class SearchPlanner(PlannerBase):
         return float(terms(scene.task, positions[:, :2], homewards=False, weights=Weights()).sum())
 
 
-def give_way(scene: Scene, bottom: Bottom, wishes: FloatArray, seed: int) -> FloatArray:
+def give_way(scene: Scene, bottom: Bottom, wishes: FloatArray, seed: int, homebound: NDArray[np.bool_]) -> FloatArray:
     """Return the team's next positions (n_vehicles, 3): the wishes (n_vehicles, 2), a step aside, or where it is.
 
-    One after the other, beginning with another one each step, vehicles take the first place at which no limit is
-    broken while the others go where they have decided to, or stand. Standing breaks none, since it changes nothing.
+    One after the other vehicles take the first place at which no limit is broken while the others go where they have
+    decided to, or stand: those first that have to go home now, the nearest to the entry before the others, then
+    beginning with another one each step. For who goes home others go out of the way that have not decided yet; where
+    nobody could move, for anybody. Standing breaks no limit, since it changes nothing.
+
+    Parameters
+    ----------
+    homebound : (n_vehicles,)
+        Who has to go home now.
     """
-    team, positions = scene.team, scene.team.positions.copy()
-    for i in np.roll(np.arange(len(positions)), -team.step):
-        here = positions[i, :2].copy()
-
-        def may(ends: FloatArray, i: int = int(i), others: FloatArray = positions) -> FloatArray | None:
-            options = np.repeat(others[None], len(ends), axis=0)
-            options[:, i, :2] = ends
-            ok = team.constraints.feasible(team.positions, options, bottom)
-            return options[int(np.argmax(ok))] if ok.any() else None
-
-        decided = may(wishes[i : i + 1])
-        if decided is None:  # a step aside is dear to work out
-            aside = _aside(scene, int(i), wishes[i], seed) if len(positions) > 1 else np.zeros((0, 2))
-            decided = may(np.vstack([aside, here]))
-        positions = positions if decided is None else decided
-    return positions
+    team = scene.team
+    ways_m = [scene.ground.way_m(here, scene.home) if goes else np.inf for here, goes in _pairs(team, homebound)]
+    rolled = np.roll(np.arange(len(wishes)), -team.step)
+    order = [int(i) for i in rolled[np.argsort(np.array(ways_m)[rolled], kind="stable")]]
+    yields = _Yields(scene, bottom, wishes, seed)
+    decided = yields.decided(order, homebound)
+    if len(order) > 1 and np.array_equal(decided, team.positions):
+        decided = yields.decided(order, np.ones_like(homebound))
+    return decided
 
 
-def _aside(scene: Scene, i: int, wish: FloatArray, seed: int) -> FloatArray:
-    """Return places (k, 2) a step away, those closest to the wish first, from where the vehicle is still in time."""
-    here = scene.team.positions[i, :2]
-    turn = vehicle_rng(seed, scene.team.vehicles[i]).uniform(0.0, 2.0 * np.pi)
-    bearing = turn + np.linspace(0.0, 2.0 * np.pi, ASIDE, endpoint=False)
-    ends = here + scene.step_m * np.column_stack([np.sin(bearing), np.cos(bearing)])
-    ends = ends[scene.ground.clear(here, ends)]
-    ends = ends[np.argsort(np.hypot(*(ends - wish).T))]
-    return ends[[scene.in_time(end, scene.step_m) for end in ends]] if len(ends) else ends
+def _pairs(team: Situation, homebound: NDArray[np.bool_]) -> Iterator[tuple[FloatArray, bool]]:
+    return zip(team.positions[:, :2], homebound.tolist(), strict=True)
+
+
+@dataclass(frozen=True)
+class _Yields:
+    """The vehicles of one decision, which go where they wish to, or out of each other's way.
+
+    Attributes
+    ----------
+    wishes : (n_vehicles, 2)
+    """
+
+    scene: Scene
+    bottom: Bottom
+    wishes: FloatArray
+    seed: int
+
+    def decided(self, order: Sequence[int], has_way: NDArray[np.bool_]) -> FloatArray:
+        """Return the next positions (n_vehicles, 3), decided in that order.
+
+        ``has_way`` (n_vehicles,): who can have others go out of the way.
+        """
+        positions, settled = self.scene.team.positions.copy(), set[int]()
+        for i in order:
+            if i in settled:
+                continue
+            settled.add(i)
+            taken = self._first(positions, {i: self.wishes[i : i + 1]})
+            if taken is None and has_way[i]:
+                for j in (j for j in order if j not in settled):
+                    taken = self._first(positions, {i: self.wishes[i : i + 1], j: self._out_of_the_way(j)})
+                    if taken is not None:
+                        settled.add(j)
+                        break
+            if taken is None and len(order) > 1:  # a step aside is dear to work out
+                taken = self._first(positions, {i: self._aside(i)})
+            positions = positions if taken is None else taken
+        return positions
+
+    def _first(self, positions: FloatArray, ends: Mapping[int, FloatArray]) -> FloatArray | None:
+        """Return the positions (n_vehicles, 3) with the first ends that break no limit; None: all of them break one.
+
+        ``ends``: by vehicle, each (k, 2), or (1, 2) for all of the others' ends.
+        """
+        most = min(len(of_one) for of_one in ends.values()) and max(len(of_one) for of_one in ends.values())
+        options = np.repeat(positions[None], most, axis=0)
+        for i, of_one in ends.items():
+            options[:, i, :2] = of_one
+        if most == 0:
+            return None
+        team = self.scene.team
+        ok = team.constraints.feasible(team.positions, options, self.bottom)
+        return np.asarray(options[int(np.argmax(ok))]) if ok.any() else None
+
+    def _aside(self, i: int) -> FloatArray:
+        """Return places (k, 2) a step away, those closest to the wish first, from where the vehicle is still in time.
+
+        Who is late where it is may go anywhere.
+        """
+        scene, ends = self.scene, self._out_of_the_way(i)
+        if not len(ends) or not scene.in_time(scene.team.positions[i, :2], 0.0):
+            return ends
+        return ends[[scene.in_time(end, scene.step_m) for end in ends]]
+
+    def _out_of_the_way(self, i: int) -> FloatArray:
+        """Return places (k, 2) a step away to which clear legs lead, those closest to the wish first."""
+        here = self.scene.team.positions[i, :2]
+        turn = vehicle_rng(self.seed, self.scene.team.vehicles[i]).uniform(0.0, 2.0 * np.pi)
+        bearing = turn + np.linspace(0.0, 2.0 * np.pi, ASIDE, endpoint=False)
+        ends = here + self.scene.step_m * np.column_stack([np.sin(bearing), np.cos(bearing)])
+        ends = ends[self.scene.ground.clear(here, ends)]
+        return ends[np.argsort(np.hypot(*(ends - self.wishes[i]).T))]
 
 
 def hold(scene: Scene) -> FloatArray:

@@ -212,6 +212,33 @@ def test_no_planner_hits_anything_and_all_are_back_in_time(name: str, seed: int,
     assert np.hypot(*(positions[:, :2] - CORNER).T).max() <= 3.0 * robots
 
 
+@pytest.mark.parametrize("apart_m", [5.2, 6.0, 7.0])
+@pytest.mark.parametrize("robots", [2, 3])
+def test_who_meet_before_a_lane_that_leads_home_go_one_after_the_other(apart_m: float, robots: int) -> None:
+    solid = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    solid[12:20, :] = True
+    solid[12:20, 18:22] = False
+    world = ObstacleWorld("lane", solid, solid, 1.0, np.array([20.0, 5.0]), np.array([20.0, 35.0]), CORNER)
+    grid = OccupancyGrid.from_blueprint(world.known, 1.0)
+    for row in range(1, SIDE, 4):
+        for col in range(1, SIDE, 4):
+            if not solid[row, col]:
+                grid = look(grid, world, np.array([col + 0.5, row + 0.5]))
+    places = 20.0 + apart_m * (np.arange(robots) - (robots - 1) / 2)
+    positions = np.column_stack([places, np.full(robots, 22.0), np.zeros(robots)])
+    planner, left_m = create_planner("rollout", PlannerOptions(), SCANNER), 32.0
+    for step in range(1, 60):
+        task = replace(task_of(world, grid, left_m), step_m=2.0)
+        team = situation(task, positions, step)
+        team = replace(team, constraints=replace(team.constraints, max_step_m=2.0, min_separation_m=5.0))
+        proposal = planner.propose(team, np.random.default_rng([3, step]))
+        assert not team.constraints.violations(team.vehicles, positions, proposal.positions)
+        left_m -= max(float(np.linalg.norm(proposal.positions - positions, axis=1).max()), 1.0)
+        positions = proposal.positions
+    assert np.hypot(*(positions[:, :2] - world.entry_m).T).max() <= 6.0 * robots
+    assert positions[:, 1].max() < 12.0
+
+
 @pytest.mark.parametrize("name", sorted(SEARCHERS))
 def test_a_restored_planner_goes_on_as_if_nothing_had_happened(name: str) -> None:
     world, task = explored(7, looks=0)
