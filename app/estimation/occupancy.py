@@ -102,7 +102,8 @@ class OccupancyGrid:
     ) -> "OccupancyGrid":
         """Return the grid after a scan.
 
-        Every cell that beams pass or end in is counted once per scan; an echo in it outweighs beams that pass.
+        Every cell that beams pass or end in is counted once per scan; an echo in it outweighs beams that pass. An echo
+        in the cell that the scanner is in counts for the next one: no obstacle fills a cell that a vehicle is in.
 
         Parameters
         ----------
@@ -180,6 +181,8 @@ def _mark(
         per_r = 1.0 / abs(north) if north != 0.0 else np.inf
         next_c = ((col + 1 - start[0]) if east > 0 else (start[0] - col)) * per_c if east != 0.0 else np.inf
         next_r = ((row + 1 - start[1]) if north > 0 else (start[1] - row)) * per_r if north != 0.0 else np.inf
+        # No obstacle fills the cell that the scanner is in: what is so close stands in the next one.
+        length = max(length, min(next_c, next_r) + INTO)
         while 0 <= row < rows and 0 <= col < cols:
             leaves = min(next_c, next_r)
             if leaves >= length:

@@ -93,6 +93,16 @@ def test_an_obstacle_that_left_is_unlearned_and_a_beam_without_a_value_says_noth
     assert (silent.states == Cell.UNEXPLORED).all()
 
 
+@pytest.mark.parametrize("range_m", [0.1, 0.3, 0.499, 0.501])
+def test_an_obstacle_close_by_is_never_in_the_cell_that_the_vehicle_is_in(range_m: float) -> None:
+    nothing = OccupancyGrid.from_blueprint(np.zeros((5, 5), dtype=bool), 1.0)
+    place, bearings = np.array([2.5, 2.5]), np.array([0.0, np.pi / 2, np.pi])
+    states = nothing.seen_from(place, bearings, np.array([range_m, np.inf, np.inf]), 5.0).states
+    assert states[2, 2] == Cell.EXPLORED
+    assert states[3, 2] == Cell.FOUND
+    assert states[4, 2] == Cell.UNEXPLORED
+
+
 def test_an_echo_just_in_front_of_a_known_obstacle_is_that_obstacle() -> None:
     blueprint = np.zeros((SIDE, SIDE), dtype=np.bool_)
     blueprint[12] = True

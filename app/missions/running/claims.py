@@ -105,12 +105,14 @@ class Claims:
 def _deployment(live: LiveMission, vehicle: VehicleSpec) -> Deployment:
     def berth() -> tuple[float, float] | None:
         """Return a place by a search's entry that is free for this vehicle."""
-        if live.search is None:
+        truth = world()
+        if live.search is None or truth is None:
             return None
         member = live.team.get(vehicle.name)
         slot = member.slot if member is not None else len(list(live.team))
         apart_m = max(live.spec.limits.min_separation_m, 1.0) * 1.1
-        east, north = live.search.site.berths(slot + 1, apart_m, live.search.spec.safety_m)[slot]
+        clear_m = live.search.spec.safety_m + live.search.spare_m
+        east, north = live.search.site.berths(slot + 1, apart_m, clear_m, truth.solid)[slot]
         lat, lon = live.frame.to_geographic(np.array(east), np.array(north))
         return float(lat), float(lon)
 

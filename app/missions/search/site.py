@@ -28,14 +28,15 @@ class Site:
     entry_m: FloatArray
     transmitter_m: FloatArray
 
-    def berths(self, count: int, apart_m: float, clear_m: float) -> FloatArray:
-        """Return ``count`` places (count, 2) by the entry for vehicles to begin at.
+    def berths(self, count: int, apart_m: float, clear_m: float, solid: BoolArray) -> FloatArray:
+        """Return ``count`` places (count, 2) by the entry for simulated vehicles to begin at.
 
-        Clear of known obstacles and apart from each other, as close as that goes; where there is no room, at the entry.
+        Clear of what is known to stand there and of what they meet, ``solid`` (rows, cols), and apart from each other,
+        as close as that goes; where there is no room, at the entry.
         """
         grid = self.grid
         # From centre to centre, so one half of the obstacle's cell less than to its edge.
-        free = distance_transform_edt(~grid.blueprint) * grid.cell_m >= clear_m + 0.75 * grid.cell_m
+        free = distance_transform_edt(~(grid.blueprint | solid)) * grid.cell_m >= clear_m + 0.75 * grid.cell_m
         places = grid.centres_m[free]
         away = np.hypot(*(places - self.entry_m).T)
         chosen: list[FloatArray] = []

@@ -263,6 +263,26 @@ def test_the_examples_are_missions() -> None:
         np.testing.assert_array_equal(world.solid, truth.solid)
 
 
+@pytest.mark.parametrize("site", ["car-park-1", "car-park-2", "car-park-3"])
+async def test_every_boat_of_an_example_begins_where_it_has_room_and_takes_part(
+    service: MissionService, site: str
+) -> None:
+    spec = MissionSpec.model_validate(example(site, seed=5, vehicles=3))
+    assert spec.search is not None
+    live = await service.get((await service.create(spec)).id)
+    await act(service, live.id, "start", actor="Ana")
+    await until(lambda: all(member.report is not None for member in live.team), "all are heard")
+    starts = {member.name: member.place_m(live.frame) for member in live.team}
+    world = simulated_world(spec, spec.search)
+    assert (world.clearance_m(np.array(list(starts.values()))) >= spec.search.safety_m).all()
+
+    def moved() -> bool:
+        return all(np.hypot(*(m.place_m(live.frame) - starts[m.name])) > 5.0 for m in live.team)
+
+    await until(moved, "every boat searches")
+    await act(service, live.id, "abort", actor="Ana")
+
+
 async def test_who_is_not_at_the_entry_and_sees_no_way_to_it_is_an_alarm(service: MissionService) -> None:
     boat = {"name": "boat", "kind": "sim", "depth_m": 0, "start": lon_lat(14, 25)}
     walls = [rectangle(0, 8, 30, 10)]
