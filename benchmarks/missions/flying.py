@@ -5,8 +5,9 @@ processes of their own. Of the tracks as they were stored is told, by vehicle an
 the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
 ``waiting_pct``, the part of the time spent in them; ``loops_under_way``, those until its last leg was reached, after
 which a vehicle waits for the others; ``loops_giving_way``, those of them that it flew to let another one pass;
-``survey_minutes``, how long each vehicle surveyed by its clock, of which a
-mission has so many; and how many legs were not reached. ``--slow-decisions 5`` makes each decision take that many
+``loops_of_legs``, those whose turns are the ends of three legs and more, where its planned way crosses itself;
+``survey_minutes``, how long each vehicle surveyed by its clock, of which a mission has so many; and how many legs were
+not reached. ``--slow-decisions 5`` makes each decision take that many
 seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a page.
 """
 
@@ -48,6 +49,8 @@ CLOSED_M = 6.0
 MOST_FLOWN = 0.9
 """A vehicle that flew less than this part of its legs is not at the end of the last one."""
 RESAMPLED_M = 1.0
+ENDS_OF_LOOP = 3
+"""A closed way that turns at so many ends of legs is one that was planned: who waits turns about one end."""
 GIVING_WAY_S = (-15.0, 70.0)
 """When a vehicle flies a circle to let another one pass, from when that was seen in the log on."""
 PORTS_APART = 10
@@ -165,6 +168,7 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         "loops": sum(found["loops"] for found in by_vehicle.values()),
         "loops_under_way": sum(found["loops_under_way"] for found in by_vehicle.values()),
         "loops_giving_way": sum(found["loops_giving_way"] for found in by_vehicle.values()),
+        "loops_of_legs": sum(found["loops_of_legs"] for found in by_vehicle.values()),
         "waiting_pct": round(float(np.mean([found["waiting_pct"] for found in by_vehicle.values()])), 2),
         "missed": sum(row.status != "reached" for row in waypoints),
         "by_vehicle": by_vehicle,
@@ -218,6 +222,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
             "loops": 0,
             "loops_under_way": 0,
             "loops_giving_way": 0,
+            "loops_of_legs": 0,
             "waiting_pct": 0.0,
             "hours": 0.0,
         }
@@ -246,7 +251,8 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
     window = int(LOOP_WITHIN_M / RESAMPLED_M)
     at_end = (np.hypot(*(path - ends[-1]).T) <= CLOSED_M) & (places_m >= MOST_FLOWN * float(legs_m.sum()))
     end_m = int(np.argmax(at_end)) if at_end.any() else len(path)
-    circling, loops, under_way, giving_way, k = np.zeros(len(step), dtype=bool), 0, 0, 0, 0
+    passed = ends_passed(path, ends)
+    circling, loops, under_way, giving_way, of_legs, k = np.zeros(len(step), dtype=bool), 0, 0, 0, 0, 0
     while k < len(turned):
         ahead = np.abs(turned[k : k + window] - turned[k])
         back = np.hypot(*(path[k : k + len(ahead)] - path[k]).T) <= CLOSED_M
@@ -258,6 +264,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
             begins_s, ends_s = times[k], times[min(end, len(times) - 1)]
             lets_pass = any(at + GIVING_WAY_S[0] <= ends_s and begins_s <= at + GIVING_WAY_S[1] for at in gives_way_s)
             giving_way += end <= end_m and lets_pass
+            of_legs += end <= end_m and not lets_pass and passed[end] - passed[k] >= ENDS_OF_LOOP
             loops, k = loops + 1, end
         k += 1
     spent = np.diff(times)
@@ -268,9 +275,20 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
         "loops": loops,
         "loops_under_way": under_way,
         "loops_giving_way": giving_way,
+        "loops_of_legs": of_legs,
         "waiting_pct": round(100.0 * float(spent[circling].sum() / max(spent.sum(), 1e-9)), 2),
         "hours": round(float(spent.sum()) / 3600.0, 3),
     }
+
+
+def ends_passed(path: FloatArray, ends: FloatArray) -> list[int]:
+    """Return how many of the ends of legs (k, 2) were passed, one after the other, at each place of a path (n, 2)."""
+    passed, count = 0, []
+    for place in path:
+        while passed < len(ends) and np.hypot(*(ends[passed] - place)) <= CLOSED_M:
+            passed += 1
+        count.append(passed)
+    return count
 
 
 def draw(file: Path, drawn: dict[str, tuple[FloatArray, FloatArray]]) -> None:

@@ -5,7 +5,7 @@ with one of 2.5 m/s beside others of 1 m/s, over squares of 100 m to 1 km, each 
 to 50 m; each third mission is flown by lines, the others by what the service has by default; each fifth over IMC, by
 two fake DUNE nodes in processes of their own. The sea floor is the generated harbour, over IMC a smooth one. Told is
 what :mod:`benchmarks.missions.flying` tells: ``loops_under_way`` are closed circles of vehicles that still had legs,
-``loops_giving_way`` those of them that let another vehicle pass.
+``loops_giving_way`` those of them that let another vehicle pass, ``loops_of_legs`` those that the legs describe.
 With ``--keep FILE`` the missions are kept there, and are not flown again as long as the program is the same.
 """
 
@@ -95,7 +95,7 @@ def summary(flown: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return what all missions came to, and each."""
     figures: dict[str, Any] = {"missions": len(flown)}
     figures["missions_of_versions"] = dict(Counter(mission["version"] for mission in flown))
-    for key in ("loops_under_way", "loops_giving_way", "loops", "missed"):
+    for key in ("loops_under_way", "loops_giving_way", "loops_of_legs", "loops", "missed"):
         figures[key] = sum(mission[key] for mission in flown)
     figures["vehicle_hours"] = round(sum(vehicle["hours"] for m in flown for vehicle in m["by_vehicle"].values()), 1)
     for name, some in (
@@ -107,7 +107,7 @@ def summary(flown: Sequence[dict[str, Any]]) -> dict[str, Any]:
     for mission in flown:
         figures[f"{mission['seed']}: {mission['flight']}"] = (
             f"{mission['on_plan_pct']} % on plan, {mission['loops_under_way']} circles under way "
-            f"({mission['loops_giving_way']} to let another one pass), "
+            f"({mission['loops_giving_way']} to let another one pass, {mission['loops_of_legs']} by its legs), "
             f"{mission['loops'] - mission['loops_under_way']} at the end, {mission['waiting_pct']} % in them, "
             f"{mission['missed']} legs missed, load {mission['load']}"
         )
