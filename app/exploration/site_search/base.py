@@ -60,6 +60,16 @@ class Scene:
         """Largest leg that the constraints allow."""
         return float(self.team.constraints.max_step_m) * (1.0 - 1e-9)
 
+    @property
+    def is_back(self) -> NDArray[np.bool_]:
+        """Which vehicles are back at the entry, (n_vehicles,)."""
+        return self.back_from(self.team.positions[:, :2])
+
+    def back_from(self, places_m: FloatArray) -> NDArray[np.bool_]:
+        """Return which places (n, 2) of a team of n are at the entry, (n,)."""
+        away_m = np.hypot(*(places_m - self.task.entry_m).T)
+        return np.asarray(away_m <= HOME_STEPS * self.step_m * len(places_m))
+
     def in_time(self, end_m: FloatArray, gone_m: float) -> bool:
         """Return whether from a place (2,) the entry is within the time that is left after a step of ``gone_m``."""
         way = _with_spare(self.team, self.task, np.array(self.ground.way_m(end_m, self.home)))
@@ -91,7 +101,7 @@ class SearchPlanner(PlannerBase):
                 wishes[i] = scene.ground.towards(here[i], scene.home, scene.step_m)
         positions = give_way(scene, bottom, wishes, seed, late | self._homewards)
         task = scene.task
-        at_home = np.hypot(*(positions[:, :2] - task.entry_m).T) <= HOME_STEPS * scene.step_m * len(positions)
+        at_home = scene.back_from(positions[:, :2])
         figures = {
             "F_1": task.explored_part,
             "F_2": task.explored_goal_part,
@@ -132,7 +142,7 @@ def give_way(scene: Scene, bottom: Bottom, wishes: FloatArray, seed: int, homebo
     ways_m = [scene.ground.way_m(here, scene.home) if goes else np.inf for here, goes in _pairs(team, homebound)]
     rolled = np.roll(np.arange(len(wishes)), -team.step)
     order = [int(i) for i in rolled[np.argsort(np.array(ways_m)[rolled], kind="stable")]]
-    yields = _Yields(scene, bottom, wishes, seed)
+    yields = _Yields(scene, bottom, wishes, seed, homebound & scene.is_back)
     decided = yields.decided(order, homebound)
     if len(order) > 1 and np.array_equal(decided, team.positions):
         decided = yields.decided(order, np.ones_like(homebound))
@@ -150,12 +160,15 @@ class _Yields:
     Attributes
     ----------
     wishes : (n_vehicles, 2)
+    rests : (n_vehicles,)
+        Who is back at the entry, and steps aside only to come nearer to it.
     """
 
     scene: Scene
     bottom: Bottom
     wishes: FloatArray
     seed: int
+    rests: NDArray[np.bool_]
 
     def decided(self, order: Sequence[int], has_way: NDArray[np.bool_]) -> FloatArray:
         """Return the next positions (n_vehicles, 3), decided in that order.
@@ -200,6 +213,10 @@ class _Yields:
         Who is late where it is may go anywhere.
         """
         scene, ends = self.scene, self._out_of_the_way(i)
+        if self.rests[i]:
+            ways_m = np.array([scene.ground.way_m(end, scene.home) for end in ends])
+            here_m = scene.ground.way_m(scene.team.positions[i, :2], scene.home)
+            return ends[ways_m < here_m - scene.task.grid.cell_m] if len(ends) else ends
         if not len(ends) or not scene.in_time(scene.team.positions[i, :2], 0.0):
             return ends
         return ends[[scene.in_time(end, scene.step_m) for end in ends]]

@@ -150,6 +150,24 @@ class Ground:
             here_m = on_m
         return np.array([*corners, end_m])
 
+    def way_towards(self, origin_m: FloatArray, end_m: FloatArray) -> FloatArray | None:
+        """Return the corners (n, 2) of a way to a position (2,), or as near to it as ways are known to lead.
+
+        None: nowhere nearer than where it begins.
+        """
+        whole = self.way(origin_m, end_m)
+        if whole is not None:
+            return whole
+        reached = np.argwhere(self.distances(self.beside(origin_m)) < UNREACHED)
+        if len(reached) == 0:
+            return None
+        places = self.centre_m(reached)
+        away_m = np.hypot(*(places - end_m).T)
+        nearest = int(np.argmin(away_m))
+        if away_m[nearest] > np.hypot(*(origin_m - end_m)) - self.task.grid.cell_m:
+            return None
+        return self.way(origin_m, places[nearest])
+
     def towards(self, origin_m: FloatArray, distance: NDArray[np.int32], step_m: float) -> FloatArray:
         """Return the next position (2,) on the way down ``distance``, as far as a clear leg of ``step_m`` goes."""
         cells = self.beside(origin_m)

@@ -5,11 +5,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from app.arrays import FloatArray
 from app.missions.flight.decisions.decision import make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import berth_spacing_m, farthest_m, home_of
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome, way_time_s
+from app.missions.search.state import Search
+from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 from app.missions.views.mission import CheckStatus, CheckView
 
@@ -57,15 +60,8 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
     if home_m is None:
         return
     name, title = f"recovery.{member.name}", f"Way home of {member.name}"
-    if live.search is not None and not live.search.may_be_open(home_m):
-        yield CheckView(
-            id=name,
-            title=title,
-            status=WARNING,
-            message=f"its place there lies outside the site, or within {live.search.spec.safety_m:g} m of what is "
-            "known to stand there: it will stop where it is",
-            remedy="Move the recovery point, or give the vehicle a recovery_point of its own",
-        )
+    if live.search is not None:
+        yield _way_of_search(live.search, member, live.spec, home_m)
         return
     constraints = make_constraints(live.spec)
     ways_home = WaysHome(constraints, home_m)
@@ -103,4 +99,26 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
         status=status,
         message=f"{words}; its energy lasts {left.time_s / 60:.0f} min, and {needs_s / 60:.0f} min are asked for",
         remedy="" if status is OK else "Charge it or make the mission shorter: it turns back before its part is done",
+    )
+
+
+def _way_of_search(search: Search, member: Member, spec: MissionSpec, home_m: FloatArray) -> CheckView:
+    """Return whether a vehicle's place at its recovery point can be got to, and its energy lasts for the window."""
+    left, lasts_s = member.energy.left, with_reserve_s(search.spec.window_s)
+    status, remedy = OK, ""
+    if not search.may_be_open(home_m):
+        status, remedy = NOTE, "Move the recovery point, or look for the vehicle nearby"
+        words = (
+            f"its place there lies outside the site, or within {search.spec.safety_m:g} m of what is known to stand "
+            "there: it comes as near as that goes"
+        )
+    elif left is None:
+        words = "where somebody has looked; how long its energy lasts is not known"
+        status, remedy = NOTE, "Give its endurance_min: without it the vehicle does not turn back in time"
+    else:
+        words = f"where somebody has looked; its energy lasts {left.time_s / 60:.0f} min"
+        if left.time_s < lasts_s:
+            status, remedy = WARNING, "Charge it or make search.window_s shorter: it turns back before the time is up"
+    return CheckView(
+        id=f"recovery.{member.name}", title=f"Way home of {member.name}", status=status, message=words, remedy=remedy
     )

@@ -166,6 +166,13 @@ class Search:
             return self._ground_for_ways(self._about(off_m, apart_m)).way(here_m, end_m)
         return self._seen_ground.way(here_m, end_m)
 
+    def way_towards_m(self, here_m: FloatArray, end_m: FloatArray) -> FloatArray | None:
+        """Return the corners (n, 2) of a way to a place (2,), or as near to it as ways lead by what is known now.
+
+        Every leg of it is clear. None: nothing nearer than where it begins is known to be free.
+        """
+        return self._seen_ground.way_towards(here_m, end_m)
+
     def may_be_open(self, en_m: FloatArray) -> bool:
         """Return whether a place (2,) is on the site and keeps the safety distance from what is known to stand there.
 

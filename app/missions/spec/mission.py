@@ -21,7 +21,7 @@ from app.missions.spec.base import Model, PolygonGeometry, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.limits import Limits
-from app.missions.spec.recovery import Recovery
+from app.missions.spec.recovery import Homecoming, Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.site import SiteId
@@ -36,6 +36,8 @@ MissionId = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z
 FARTHEST_HOME_M = 10_000.0
 """Farther from the area no recovery point lies."""
 
+BACK_STEPS, MOST_BACK_M = 3.0, 25.0
+"""Who is so many steps from a search's entry, and no farther than that, is home there."""
 MAX_GRID_CELLS = 4_000_000
 MAX_SEARCH_CELLS = 1_000_000
 """Of a search, which plans on every cell at every step."""
@@ -317,7 +319,16 @@ class MissionSpec(Model):
         return self.speed_mps if own is None else own
 
     def recovery_of(self, vehicle: VehicleSpec) -> Recovery | None:
-        """Return where a vehicle comes home to, and when; None where neither it nor the mission says."""
+        """Return where a vehicle comes home to, and when; None where neither it nor the mission says.
+
+        In a search that is its entry, where all are in the end anyway, unless something else is said.
+        """
+        if vehicle.recovery_point is None and self.recovery is None and self.search is not None:
+            return Recovery(
+                point=self.search.entry,
+                radius_m=min(BACK_STEPS * self.limits.max_step_m, MOST_BACK_M),
+                on_finish=Homecoming.STOP,
+            )
         if vehicle.recovery_point is None:
             return self.recovery
         of_all = {} if self.recovery is None else self.recovery.model_dump(exclude={"point"})

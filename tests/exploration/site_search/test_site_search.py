@@ -225,8 +225,8 @@ def test_who_meet_before_a_lane_that_leads_home_go_one_after_the_other(apart_m: 
             if not solid[row, col]:
                 grid = look(grid, world, np.array([col + 0.5, row + 0.5]))
     places = 20.0 + apart_m * (np.arange(robots) - (robots - 1) / 2)
-    positions = np.column_stack([places, np.full(robots, 22.0), np.zeros(robots)])
-    planner, left_m = create_planner("rollout", PlannerOptions(), SCANNER), 32.0
+    positions = np.column_stack([places, np.full(robots, 26.0), np.zeros(robots)])
+    planner, left_m = create_planner("rollout", PlannerOptions(), SCANNER), 38.0
     for step in range(1, 60):
         task = replace(task_of(world, grid, left_m), step_m=2.0)
         team = situation(task, positions, step)
@@ -236,7 +236,23 @@ def test_who_meet_before_a_lane_that_leads_home_go_one_after_the_other(apart_m: 
         left_m -= max(float(np.linalg.norm(proposal.positions - positions, axis=1).max()), 1.0)
         positions = proposal.positions
     assert np.hypot(*(positions[:, :2] - world.entry_m).T).max() <= 6.0 * robots
-    assert positions[:, 1].max() < 12.0
+
+
+def test_who_is_back_stays_where_it_is_while_another_is_at_the_entry() -> None:
+    nothing = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    world = ObstacleWorld("open", nothing, nothing, 1.0, CORNER, np.full(2, 30.0), CORNER)
+    grid = look(look(OccupancyGrid.from_blueprint(world.known, 1.0), world, CORNER), world, CORNER + 5.0)
+    positions, moved_m = np.array([[*CORNER, 0.0], [*(CORNER + 4.0), 0.0]]), np.inf
+    planner = create_planner("rollout", PlannerOptions(), SCANNER)
+    for step in range(1, 6):
+        team = situation(replace(task_of(world, grid, 1.0), step_m=3.0), positions, step)
+        team = replace(team, constraints=replace(team.constraints, max_step_m=3.0, min_separation_m=5.0))
+        proposed = planner.propose(team, np.random.default_rng(step)).positions
+        np.testing.assert_array_equal(proposed[0], positions[0])
+        assert np.hypot(*(proposed[1, :2] - CORNER)) <= np.hypot(*(positions[1, :2] - CORNER))
+        moved_m = float(np.hypot(*(proposed[1, :2] - positions[1, :2])))
+        positions = proposed
+    assert moved_m == 0.0
 
 
 @pytest.mark.parametrize("name", sorted(SEARCHERS))

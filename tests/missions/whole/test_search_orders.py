@@ -95,11 +95,31 @@ async def test_nobody_goes_to_a_recovery_point_that_nobody_has_looked_at(service
 
 
 async def test_the_checklist_says_when_there_is_no_room_at_the_recovery_point(service: MissionService) -> None:
-    for point, status in ((lon_lat(14.0, 5.0), None), (lon_lat(28.0, 5.0), CheckStatus.WARNING)):
+    for point, free in ((lon_lat(14.0, 5.0), True), (lon_lat(28.0, 5.0), False)):
         live = await service.get((await service.create(search_spec(recovery={"point": point}))).id)
         line = next(check for check in preflight(live).checks if check.id == "recovery.boat")
-        assert (line.status is CheckStatus.WARNING) is (status is CheckStatus.WARNING)
-        assert ("within 1.5 m of what is known to stand there" in line.message) is (status is CheckStatus.WARNING)
+        assert line.status is CheckStatus.NOTE
+        assert ("within 1.5 m of what is known to stand there" in line.message) is not free
+
+
+async def test_a_search_whose_time_is_longer_than_the_energy_lasts_is_warned_of(service: MissionService) -> None:
+    boat = {"name": "boat", "kind": "sim", "depth_m": 0, "endurance_min": 30}
+    for window_s, status in ((600.0, CheckStatus.OK), (4000.0, CheckStatus.WARNING)):
+        spec = search_spec(vehicles=[boat], search={"window_s": window_s})
+        live = await service.get((await service.create(spec)).id)
+        assert next(check for check in preflight(live).checks if check.id == "recovery.boat").status is status
+
+
+async def test_who_is_called_home_in_a_search_comes_to_its_entry(service: MissionService) -> None:
+    live = await flying(service, 6)
+    boat = live.team.members["boat"]
+    await until(lambda: bool(boat.place_m(live.frame)[1] > 17.0), "it is behind the pontoon")
+    await call_home(live, "boat", "Ana")
+    await until_state(service, live.id, MissionState.FINISHED)
+    assert np.hypot(*(boat.place_m(live.frame) - (14.0, 5.0))) < 12.0
+    words = await said(live)
+    assert any("is home" in line for line in words)
+    assert not any(AGROUND in line for line in words)
 
 
 @pytest.mark.parametrize("half_m", [2.5, 9.0], ids=["in a lane", "where there is room"])

@@ -86,10 +86,10 @@ class EnergyRange:
     def way_from(self, here_m: FloatArray, home_m: FloatArray) -> FloatArray | None:
         """Return the corners of the way home from a place, (n, 2); None: there is none.
 
-        In a search it leads only where somebody has looked.
+        In a search it leads only where somebody has looked, as near as that goes.
         """
         if self._live.search is not None:
-            return self._live.search.way_m(here_m, home_m)
+            return self._live.search.way_towards_m(here_m, home_m)
         self._look_for_land()
         anyhow, off_land = self._ways_to(home_m)
         way_m = None if off_land is None else off_land.way(here_m)

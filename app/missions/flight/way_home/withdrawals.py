@@ -257,7 +257,9 @@ class Withdrawals:
             member.withdrawal = Withdrawal(Response.SURFACE, words)
             return
         self._lay[member.name] = frozenset(other.name for other in self._live.team.at_rest)
-        self._committing.lead_home(member, [*way, (home_m, 0.0)])
+        # In a search it ends where it leads, which may be beside that place.
+        end_m = home_m if search is None else way[-1][0]
+        self._committing.lead_home(member, [*way, (end_m, 0.0)])
         await self._dispatch.begin()
 
     def _waited_to_rise(self, member: Member) -> bool:
