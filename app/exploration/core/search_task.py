@@ -1,6 +1,6 @@
 """What a search is about: the site as known now, the goal, the way out, and what is left of the time window."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +36,8 @@ class SearchTask:
         The same when the mission began.
     spare_m : float
         How much more than ``safety_m`` legs keep where they can: real vehicles do not arrive at the very place.
+    standing_m, apart_m : (k, 2), float
+        Where vehicles are that take no part now, and how far legs keep from them.
     """
 
     grid: OccupancyGrid
@@ -50,6 +52,8 @@ class SearchTask:
     left_m: float
     window_m: float
     spare_m: float = 0.0
+    standing_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    apart_m: float = 0.0
 
     @cached_property
     def states(self) -> NDArray[np.uint8]:

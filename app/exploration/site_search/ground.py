@@ -32,7 +32,8 @@ class Ground:
     hazard : (rows, cols)
         Cells that are not known to be free: obstacles, and unexplored ones.
     passable : (rows, cols)
-        Cells whose centre keeps the safety distance from every hazard.
+        Cells whose centre keeps the safety distance from every hazard, and off vehicles that stand, unless those are
+        by the entry, where all come to be.
     """
 
     task: SearchTask
@@ -41,12 +42,10 @@ class Ground:
     _beside: dict[tuple[float, float], IntArray] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, task: SearchTask, taken: BoolArray | None = None) -> "Ground":
-        """Make it from what is known now; ``taken`` (rows, cols): cells that are hazards for another reason."""
+    def of(cls, task: SearchTask) -> "Ground":
+        """Make it from what is known now."""
         hazard = task.states != Cell.EXPLORED
-        if taken is not None:
-            hazard |= taken
-        return cls(task, hazard, _away_from(hazard, _within(_margin(task))))
+        return cls(task, hazard, _away_from(hazard, _within(_margin(task))) & ~_taken(task))
 
     @classmethod
     def for_legs(cls, task: SearchTask) -> "Ground":
@@ -67,12 +66,12 @@ class Ground:
     def clear(self, origin_m: FloatArray, ends_m: FloatArray) -> BoolArray:
         """Return which straight legs from (2,) to (n, 2) keep the safety distance from every hazard, all along.
 
-        They keep what is spared beside it, too, or where a vehicle stands without that as much as it has. Where it
-        stands closer than the safety distance it may only get away.
+        They keep what is spared beside it, too, or where a vehicle stands without that as much as it has, and off
+        vehicles that stand. Where it is closer to something than that it may only get away.
         """
         grid = self.task.grid
         corner = np.array([grid.west_m, grid.south_m])
-        return _clear(
+        return _off_standing(self.task, origin_m, ends_m) & _clear(
             self.hazard,
             (np.asarray(origin_m, dtype=np.float64) - corner) / grid.cell_m,
             np.ascontiguousarray((np.asarray(ends_m, dtype=np.float64) - corner) / grid.cell_m),
@@ -188,6 +187,28 @@ class Ground:
             return origin_m.copy()
         last = reachable[-1]
         return np.asarray(origin_m + leg[last] * min(1.0, step_m / max(float(length[last]), 1e-12)))
+
+
+def _taken(task: SearchTask) -> BoolArray:
+    """Return the cells (rows, cols) that are too near to vehicles that stand, those by the entry aside."""
+    taken = np.zeros(task.grid.blueprint.shape, dtype=np.bool_)
+    for place_m in task.standing_m:
+        if np.hypot(*(place_m - task.entry_m)) > 2.0 * task.apart_m:
+            taken |= np.hypot(*np.moveaxis(task.grid.centres_m - place_m, -1, 0)) < task.apart_m
+    return taken
+
+
+def _off_standing(task: SearchTask, origin_m: FloatArray, ends_m: FloatArray) -> BoolArray:
+    """Return which legs from (2,) to (n, 2) keep off vehicles that stand, or lead away from them all along."""
+    keeps = np.ones(len(ends_m), dtype=np.bool_)
+    legs_m = np.asarray(ends_m, dtype=np.float64) - origin_m
+    length2 = np.maximum(np.einsum("ij,ij->i", legs_m, legs_m), 1e-12)
+    for place_m in task.standing_m:
+        away_m = place_m - origin_m
+        part = np.clip(legs_m @ away_m / length2, 0.0, 1.0)
+        nearest_m = np.hypot(*(part[:, None] * legs_m - away_m).T)
+        keeps &= (nearest_m >= task.apart_m) | (nearest_m >= np.hypot(*away_m) - 1e-9)
+    return keeps
 
 
 def _margin(task: SearchTask) -> float:

@@ -41,7 +41,12 @@ class SearchHooks:
 
     def task(self, step: int) -> SearchTask | None:
         """Return what the planner of a search is to see when a step is decided."""
-        return None if self._course is None else self._course.task(step)
+        if self._course is None:
+            return None
+        # Who lies in the water, or goes home, is in the way of those that search on.
+        apart = [m for m in self._live.team if m.withdrawal is not None and m.report is not None]
+        places_m = [member.place_m(self._live.frame) for member in apart]
+        return self._course.task(step, np.array(places_m).reshape(-1, 2))
 
     def barred(self) -> list[Member]:
         """Return the vehicles under way that have something on their way by what is known now."""

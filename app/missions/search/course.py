@@ -59,11 +59,15 @@ class Course:
         """How fast the team gets on."""
         return min(self.spec.speed_mps, self.travelled_m / self.travelled_s)
 
-    def task(self, step: int) -> SearchTask:
-        """Return what planners are to see when ``step`` is decided: the way that is left by time and by steps."""
+    def task(self, step: int, standing_m: FloatArray) -> SearchTask:
+        """Return what planners are to see when ``step`` is decided: the way that is left by time and by steps.
+
+        ``standing_m`` (k, 2): where vehicles are that take no part now.
+        """
         by_time_m = self.search.left_s() * (1.0 - RESERVE) * self.pace_mps
         by_steps_m = (self.spec.steps - step + 1) * self.spec.limits.max_step_m * SPARE_STEPS
-        return self.search.task(min(by_time_m, by_steps_m), spare_m=self.search.spare_m)
+        task = self.search.task(min(by_time_m, by_steps_m), spare_m=self.search.spare_m)
+        return replace(task, standing_m=standing_m, apart_m=self.spec.limits.min_separation_m)
 
     def unseen(self, team: Sequence[Member]) -> list[str]:
         """Return the vehicles whose own place nobody has looked at yet: where to go from there is not known."""

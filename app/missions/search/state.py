@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 
-from app.arrays import BoolArray, FloatArray
+from app.arrays import FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid
 from app.exploration.site_search import SearchTask
 from app.exploration.site_search.base import HOME_STEPS
@@ -162,8 +162,8 @@ class Search:
         off_m, apart_m
             Places (2,) to go round, and how far from them.
         """
-        if off_m:
-            return self._ground_for_ways(self._about(off_m, apart_m)).way(here_m, end_m)
+        if len(off_m):
+            return Ground.of(self._task_of_ways(np.array(off_m), apart_m)).way(here_m, end_m)
         return self._seen_ground.way(here_m, end_m)
 
     def way_towards_m(self, here_m: FloatArray, end_m: FloatArray) -> FloatArray | None:
@@ -180,23 +180,14 @@ class Search:
         """
         return self._seen_ground.may_be_open(en_m)
 
-    def _ground_for_ways(self, taken: BoolArray | None = None) -> Ground:
-        return Ground.of(self.task(0.0, spare_m=self.spare_m), taken)
+    def _task_of_ways(self, off_m: FloatArray, apart_m: float) -> SearchTask:
+        return replace(self.task(0.0, spare_m=self.spare_m), standing_m=off_m, apart_m=apart_m)
 
     @property
     def _seen_ground(self) -> Ground:
         if self._ways is None:
-            self._ways = self._ground_for_ways()
+            self._ways = Ground.of(self.task(0.0, spare_m=self.spare_m))
         return self._ways
-
-    def _about(self, places_m: Sequence[FloatArray], apart_m: float) -> BoolArray:
-        """Return the cells (rows, cols) that legs keep off as off hazards, to be ``apart_m`` off places."""
-        grid = self._grid
-        rows, cols = np.indices(grid.evidence.shape)
-        east_m, north_m = grid.west_m + grid.cell_m * (cols + 0.5), grid.south_m + grid.cell_m * (rows + 0.5)
-        within_m = max(apart_m - self.spec.safety_m, 0.0) + grid.cell_m
-        near = [np.hypot(east_m - east, north_m - north) <= within_m for east, north in places_m]
-        return np.asarray(np.any(near, axis=0), dtype=np.bool_)
 
     @property
     def figures(self) -> Figures:

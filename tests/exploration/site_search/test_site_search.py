@@ -238,6 +238,34 @@ def test_who_meet_before_a_lane_that_leads_home_go_one_after_the_other(apart_m: 
     assert np.hypot(*(positions[:, :2] - world.entry_m).T).max() <= 6.0 * robots
 
 
+@pytest.mark.parametrize("name", sorted(SEARCHERS))
+@given(seed=st.integers(0, 5000))
+@settings(max_examples=2, deadline=None)
+def test_vehicles_that_stand_are_gone_round(name: str, seed: int) -> None:
+    world, rng = site(seed), np.random.default_rng([seed, 4])
+    standing = np.array([[14.0, 6.0], *rng.uniform(12.0, 36.0, (3, 2))])
+    positions = np.array([[*CORNER, 0.0]])
+    grid = look(OccupancyGrid.from_blueprint(world.known, 1.0), world, CORNER)
+    planner, left_m = create_planner(name, PlannerOptions(candidates=16), SCANNER), 60.0
+    for step in range(1, 70):
+        task = replace(task_of(world, grid, left_m), standing_m=standing, apart_m=4.0)
+        proposal = planner.propose(situation(task, positions, step), np.random.default_rng([seed, step]))
+        leg = positions[0] + np.linspace(0.0, 1.0, 50)[:, None] * (proposal.positions[0] - positions[0])
+        away_m = np.hypot(*np.moveaxis(leg[:, None, :2] - standing, -1, 0))
+        assert away_m.min() >= 4.0 - 1e-6
+        left_m -= max(float(np.hypot(*(leg[-1, :2] - leg[0, :2]))), 1.0)
+        positions = proposal.positions
+        grid = look(grid, world, positions[0, :2])
+    assert np.hypot(*(positions[0, :2] - CORNER)) <= 3.0
+
+
+def test_who_stands_too_near_to_another_may_get_away_from_it() -> None:
+    _, task = explored(3)
+    ground = Ground.of(replace(task, standing_m=np.array([[5.5, 4.5]]), apart_m=4.0))
+    ends = np.array([[3.5, 4.5], [6.5, 4.5], [4.5, 5.5]])
+    np.testing.assert_array_equal(ground.clear(CORNER, ends), [True, False, True])
+
+
 def test_who_is_back_stays_where_it_is_while_another_is_at_the_entry() -> None:
     nothing = np.zeros((SIDE, SIDE), dtype=np.bool_)
     world = ObstacleWorld("open", nothing, nothing, 1.0, CORNER, np.full(2, 30.0), CORNER)

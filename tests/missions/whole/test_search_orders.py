@@ -94,6 +94,24 @@ async def test_nobody_goes_to_a_recovery_point_that_nobody_has_looked_at(service
     assert not any(AGROUND in line for line in await said(live))
 
 
+async def test_nobody_runs_into_who_is_held(service: MissionService) -> None:
+    boats = [{"name": name, "kind": "sim", "depth_m": 0} for name in "ab"]
+    limits = {"max_step_m": 3.0, "min_depth_m": 0.0, "min_altitude_m": 0.1, "min_separation_m": 4.0}
+    live = await flying(service, 8, vehicles=boats, limits=limits, search={"simulated_obstacles": []})
+    await hold(live, "a", "Ana")
+    held = live.team.members["a"]
+    await until(lambda: held.waits_m is not None, "it waits")
+    began = live.header.step
+    apart_m = []
+
+    def flown() -> bool:
+        apart_m.append(float(np.hypot(*(place_m(live, "a") - place_m(live, "b")))))
+        return live.header.step >= began + 40 or live.header.state is not MissionState.RUNNING
+
+    await until(flown, "the other searches on")
+    assert min(apart_m) > 2.5
+
+
 async def test_the_checklist_says_when_there_is_no_room_at_the_recovery_point(service: MissionService) -> None:
     for point, free in ((lon_lat(14.0, 5.0), True), (lon_lat(28.0, 5.0), False)):
         live = await service.get((await service.create(search_spec(recovery={"point": point}))).id)
