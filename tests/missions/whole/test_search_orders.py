@@ -8,6 +8,7 @@ from app.arrays import FloatArray
 from app.exploration.site_search.ground import Ground
 from app.missions.fleet.interface import ScanReport
 from app.missions.fleet.links.sim import AGROUND
+from app.missions.flight.search_hooks import SearchHooks
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
 from app.missions.operations.scans import report_of_posted
@@ -101,6 +102,13 @@ async def test_nobody_runs_into_who_is_held(service: MissionService) -> None:
     await hold(live, "a", "Ana")
     held = live.team.members["a"]
     await until(lambda: held.waits_m is not None, "it waits")
+
+    async def never(*_: object) -> bool:
+        return False
+
+    task = SearchHooks(live, 1.0, never).task(live.header.step)
+    assert task is not None
+    np.testing.assert_allclose(task.standing_m, [place_m(live, "a")], atol=1.0)
     began = live.header.step
     apart_m = []
 
