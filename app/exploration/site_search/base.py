@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -42,13 +42,30 @@ class Scene:
 
     @classmethod
     def of(cls, team: Situation) -> "Scene":
-        """Make it. Raises ValueError when the situation is not that of a search."""
+        """Make it. Raises ValueError when the situation is not that of a search.
+
+        Where somebody has no way home that keeps what is spared beside the safety distance, nothing is spared: what was
+        wide enough on the way in may look narrower since.
+        """
         task = team.search
         if task is None:
             raise ValueError("search: the situation holds no search task; this planner is for missions of that kind")
+        scene = cls._made(team, task)
+        if task.spare_m > 0.0 and scene.cut_off:
+            narrow = cls._made(team, replace(task, spare_m=0.0))
+            scene = narrow if narrow.cut_off < scene.cut_off else scene
+        return scene
+
+    @classmethod
+    def _made(cls, team: Situation, task: SearchTask) -> "Scene":
         ground = Ground.of(task)
         home = ground.distances(ground.places(task.entry_m[None]))
         return cls(team, task, ground, home, _with_spare(team, task, ground.metres(home)))
+
+    @property
+    def cut_off(self) -> int:
+        """How many vehicles have no way home that is known."""
+        return sum(not np.isfinite(self.ground.way_m(here, self.home)) for here in self.team.positions[:, :2])
 
     @property
     def step_m(self) -> float:

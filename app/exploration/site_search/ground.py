@@ -212,8 +212,8 @@ def _off_standing(task: SearchTask, origin_m: FloatArray, ends_m: FloatArray) ->
 
 
 def _margin(task: SearchTask) -> float:
-    """Return how far places to go to are from hazards, in cells."""
-    return (task.safety_m + task.spare_m) / task.grid.cell_m
+    """Return how far places to go to are from hazards, in cells: as far as legs to them are."""
+    return (task.safety_m + task.spare_m) / task.grid.cell_m + SLACK
 
 
 @cache

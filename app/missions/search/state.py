@@ -1,7 +1,7 @@
 """What a running search knows: the occupancy of the site from every accepted scan."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -162,16 +162,23 @@ class Search:
         off_m, apart_m
             Places (2,) to go round, and how far from them.
         """
-        if len(off_m):
-            return Ground.of(self._task_of_ways(np.array(off_m), apart_m)).way(here_m, end_m)
-        return self._seen_ground.way(here_m, end_m)
+        if not len(off_m):
+            return self._way_m(lambda ground: ground.way(here_m, end_m))
+        ways = (Ground.of(self._task_of_ways(np.array(off_m), apart_m, spare_m)) for spare_m in (self.spare_m, 0.0))
+        return next((way for ground in ways if (way := ground.way(here_m, end_m)) is not None), None)
+
+    def _way_m(self, found: Callable[[Ground], FloatArray | None]) -> FloatArray | None:
+        """Return a way that keeps what is spared beside the safety distance, or where none does one that does not."""
+        way_m = found(self._seen_ground)
+        return found(Ground.of(self.task(0.0))) if way_m is None and self.spare_m > 0.0 else way_m
 
     def way_towards_m(self, here_m: FloatArray, end_m: FloatArray) -> FloatArray | None:
         """Return the corners (n, 2) of a way to a place (2,), or as near to it as ways lead by what is known now.
 
         Every leg of it is clear. None: nothing nearer than where it begins is known to be free.
         """
-        return self._seen_ground.way_towards(here_m, end_m)
+        whole = self.way_m(here_m, end_m)
+        return self._way_m(lambda ground: ground.way_towards(here_m, end_m)) if whole is None else whole
 
     def may_be_open(self, en_m: FloatArray) -> bool:
         """Return whether a place (2,) is on the site and keeps the safety distance from what is known to stand there.
@@ -180,8 +187,8 @@ class Search:
         """
         return self._seen_ground.may_be_open(en_m)
 
-    def _task_of_ways(self, off_m: FloatArray, apart_m: float) -> SearchTask:
-        return replace(self.task(0.0, spare_m=self.spare_m), standing_m=off_m, apart_m=apart_m)
+    def _task_of_ways(self, off_m: FloatArray, apart_m: float, spare_m: float) -> SearchTask:
+        return replace(self.task(0.0, spare_m=spare_m), standing_m=off_m, apart_m=apart_m)
 
     @property
     def _seen_ground(self) -> Ground:

@@ -266,6 +266,27 @@ def test_who_stands_too_near_to_another_may_get_away_from_it() -> None:
     np.testing.assert_array_equal(ground.clear(CORNER, ends), [True, False, True])
 
 
+@pytest.mark.parametrize("name", sorted(SEARCHERS))
+def test_a_lane_without_room_to_spare_still_leads_home(name: str) -> None:
+    solid = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    solid[12:16, :] = True
+    solid[12:16, 19:22] = False
+    world = ObstacleWorld("lane", solid, solid, 1.0, np.array([20.5, 5.5]), np.array([20.5, 30.5]), CORNER)
+    grid = OccupancyGrid.from_blueprint(world.known, 1.0)
+    for place in ((20.5, 5.5), (20.5, 10.5), (20.5, 14.5), (20.5, 18.5), (20.5, 23.5)):
+        grid = look(grid, world, np.array(place))
+    position = np.array([[20.5, 22.5, 0.0]])
+    planner, left_m = create_planner(name, PlannerOptions(candidates=16), SCANNER), 30.0
+    for step in range(1, 40):
+        task = replace(task_of(world, grid, left_m), spare_m=0.8)
+        proposed = planner.propose(situation(task, position, step), np.random.default_rng([5, step])).positions
+        leg = position[0] + np.linspace(0.0, 1.0, 50)[:, None] * (proposed[0] - position[0])
+        assert world.clearance_m(leg[:, :2]).min() >= 1.0 - 1e-6
+        left_m -= max(float(np.linalg.norm(proposed - position)), 1.0)
+        position = proposed
+    assert np.hypot(*(position[0, :2] - world.entry_m)) <= 3.0
+
+
 def test_who_is_back_stays_where_it_is_while_another_is_at_the_entry() -> None:
     nothing = np.zeros((SIDE, SIDE), dtype=np.bool_)
     world = ObstacleWorld("open", nothing, nothing, 1.0, CORNER, np.full(2, 30.0), CORNER)
