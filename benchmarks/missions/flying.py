@@ -5,7 +5,7 @@ processes of their own. Of the tracks as they were stored is told, by vehicle an
 the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
 ``waiting_pct``, the part of the time spent in them; ``loops_under_way``, those until its last leg was reached, after
 which a vehicle waits for the others; ``loops_giving_way``, those of them that it flew to let another one pass;
-``loops_of_legs``, those that have whole legs in them, where its planned way crosses itself;
+``loops_of_legs``, those that have legs in them, where its planned way crosses itself;
 ``survey_minutes``, how long each vehicle surveyed by its clock, of which a mission has so many; and how many legs were
 not reached. ``--slow-decisions 5`` makes each decision take that many
 seconds of the vehicles' time more. Printed is one JSON object; ``--write`` puts it into a page.
@@ -50,7 +50,7 @@ MOST_FLOWN = 0.9
 """A vehicle that flew less than this part of its legs is not at the end of the last one."""
 RESAMPLED_M = 1.0
 LEGS_OF_LOOP_M = 2.0 * CLOSED_M
-"""A closed way with so much of legs in it, from end to end, is one that was planned: who waits turns about one end."""
+"""A closed way in which so much of legs is flown to their ends is one that was planned: who waits is nearer to one."""
 GIVING_WAY_S = (-15.0, 70.0)
 """When a vehicle flies a circle to let another one pass, from when that was seen in the log on."""
 PORTS_APART = 10
@@ -264,7 +264,8 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
             begins_s, ends_s = times[k], times[min(end, len(times) - 1)]
             lets_pass = any(at + GIVING_WAY_S[0] <= ends_s and begins_s <= at + GIVING_WAY_S[1] for at in gives_way_s)
             giving_way += end <= end_m and lets_pass
-            of_legs += end <= end_m and not lets_pass and way_m(ends[passed[k] : passed[end]]) >= LEGS_OF_LOOP_M
+            on_legs_m = way_m(np.vstack([path[k], ends[passed[k] : passed[end]]]))
+            of_legs += end <= end_m and not lets_pass and on_legs_m >= LEGS_OF_LOOP_M
             loops, k = loops + 1, end
         k += 1
     spent = np.diff(times)
