@@ -89,7 +89,9 @@ class MissionSpec(Model):
     limits: Limits = Field(default_factory=Limits)
     planner: PlannerSpec = Field(default_factory=PlannerSpec)
     recovery: Recovery | None = Field(
-        default=None, description="Where vehicles come home to, and when; null: they stop where they are"
+        default=None,
+        description="Where vehicles come home to, and when; null: they stop where they are, in a search they come to its "
+        "entry",
     )
     failsafes: dict[Failsafe, Response] = Field(
         default_factory=dict,

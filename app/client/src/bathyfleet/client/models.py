@@ -1001,7 +1001,7 @@ class MissionSpec(Model):
     limits: Limits | None = None
     planner: PlannerSpec | None = None
     recovery: Recovery | None = None
-    """Where vehicles come home to, and when; null: they stop where they are"""
+    """Where vehicles come home to, and when; null: they stop where they are, in a search they come to its entry"""
     failsafes: dict[Failsafe, Response] | None = None
     """What is done when something fails, where it is not what `bathyfleet failsafes` lists"""
     surface_policy: SurfacePolicy | None = None

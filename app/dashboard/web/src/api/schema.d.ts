@@ -3851,7 +3851,7 @@ export interface components {
             cell_m: number;
             limits?: components["schemas"]["Limits"];
             planner?: components["schemas"]["PlannerSpec"];
-            /** @description Where vehicles come home to, and when; null: they stop where they are */
+            /** @description Where vehicles come home to, and when; null: they stop where they are, in a search they come to its entry */
             recovery?: components["schemas"]["Recovery"] | null;
             /**
              * Failsafes
@@ -4065,7 +4065,7 @@ export interface components {
                 cell_m: number;
                 limits?: components["schemas"]["Limits"];
                 planner?: components["schemas"]["PlannerSpec"];
-                /** @description Where vehicles come home to, and when; null: they stop where they are */
+                /** @description Where vehicles come home to, and when; null: they stop where they are, in a search they come to its entry */
                 recovery?: components["schemas"]["Recovery"] | null;
                 /**
                  * Failsafes
