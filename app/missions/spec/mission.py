@@ -90,8 +90,8 @@ class MissionSpec(Model):
     planner: PlannerSpec = Field(default_factory=PlannerSpec)
     recovery: Recovery | None = Field(
         default=None,
-        description="Where vehicles come home to, and when; null: they stop where they are, in a search they come to its "
-        "entry",
+        description="Where vehicles come home to, and when; null: they stop where they are, in a search they come to "
+        "its entry",
     )
     failsafes: dict[Failsafe, Response] = Field(
         default_factory=dict,
