@@ -54,6 +54,9 @@ class EnergyRange:
         home_m = self._home_m(member)
         if home_m is None or member.report is None:
             return None
+        # Before the first step what finds ways may have to be compiled, and nobody has gone anywhere.
+        if self._live.search is not None and self._live.search.began_at is None:
+            return None
         here_m = member.place_m(self._live.frame)
         from_m, way_m = self._found.get(member.name, (None, None))
         if from_m is None or float(np.hypot(*(here_m - from_m))) > MOVED_M:
