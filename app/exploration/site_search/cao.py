@@ -11,9 +11,10 @@ from app.exploration.cao.estimator import Estimator
 from app.exploration.core.search_task import SearchTask
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.site_search.base import Scene, SearchPlanner, hold
+from app.exploration.site_search.base import SearchPlanner, hold
 from app.exploration.site_search.criteria import Standstill, Supervisor, Weights, terms
 from app.exploration.site_search.gains import gains
+from app.exploration.site_search.scene import Scene
 
 WINDOW = 30
 """Steps to which theta is fitted unless the options say otherwise (``L + T_h`` of eq. 19)."""

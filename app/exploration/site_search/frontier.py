@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray, IntArray
-from app.exploration.site_search.base import Scene, SearchPlanner, hold
+from app.exploration.site_search.base import SearchPlanner, hold
 from app.exploration.site_search.gains import Gains, take
 from app.exploration.site_search.goal_parts import GoalPart, goal_left, parts_left
 from app.exploration.site_search.ground import UNREACHED, Ground
+from app.exploration.site_search.scene import Scene
 
 ELSEWHERE = 0.02
 """Worth of a cell outside the goal area while something in it is left to see; within it 1."""

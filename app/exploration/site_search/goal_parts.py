@@ -7,7 +7,7 @@ from scipy.ndimage import label
 
 from app.arrays import BoolArray, FloatArray
 from app.estimation import Cell
-from app.exploration.site_search.base import Scene
+from app.exploration.site_search.scene import Scene
 
 MOST_PARTS, LEAST_CELLS = 6, 3
 """So many parts, the largest ones, are told of, each of so many cells at least."""

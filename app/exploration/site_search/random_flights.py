@@ -6,7 +6,8 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.planner.base import vehicle_rng
-from app.exploration.site_search.base import Scene, SearchPlanner, hold
+from app.exploration.site_search.base import SearchPlanner, hold
+from app.exploration.site_search.scene import Scene
 
 EXPONENT = 2.0
 """Of the distribution of flights' lengths: the one that finds most where targets are sparse."""

@@ -87,7 +87,11 @@ class TeamSteps:
             self._maps.begin()
             decision = await self._travel()
             if await self._lookout.is_over(taken, asyncio.get_running_loop().time() - started_s):
-                return "everybody is back at the entry"
+                if not live.team.held:
+                    return "everybody is back at the entry"
+                # Those that are back have nothing to do; who is held is not left at sea.
+                await self._waiting.until(lambda: not live.team.held, None)
+                decision = None
         return "every step is done"
 
     async def _decide_to_fly(self) -> Decision | None:

@@ -10,9 +10,9 @@ import numpy as np
 from app.arrays import FloatArray
 from app.estimation.occupancy import Cell, OccupancyGrid
 from app.exploration.site_search import SearchTask
-from app.exploration.site_search.base import HOME_STEPS
 from app.exploration.site_search.criteria import in_contact
 from app.exploration.site_search.ground import Ground
+from app.exploration.site_search.scene import HOME_STEPS
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
 from app.missions.fleet.interface import ScanReport

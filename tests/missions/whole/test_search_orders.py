@@ -109,15 +109,24 @@ async def test_nobody_runs_into_who_is_held(service: MissionService) -> None:
     task = SearchHooks(live, 1.0, never).task(live.header.step)
     assert task is not None
     np.testing.assert_allclose(task.standing_m, [place_m(live, "a")], atol=1.0)
-    began = live.header.step
     apart_m = []
+    assert live.search is not None
+    entry_m = live.search.site.entry_m
 
-    def flown() -> bool:
+    def back() -> bool:
         apart_m.append(float(np.hypot(*(place_m(live, "a") - place_m(live, "b")))))
-        return live.header.step >= began + 40 or live.header.state is not MissionState.RUNNING
+        return live.search is not None and live.search.figures.explored_part > 0.6 and is_at_entry("b")
 
-    await until(flown, "the other searches on")
+    def is_at_entry(name: str) -> bool:
+        return bool(np.hypot(*(place_m(live, name) - entry_m)) <= 9.0)
+
+    await until(back, "the other has searched, and is back")
     assert min(apart_m) > 2.5
+    # Nobody is left at sea: the search is over when both are back.
+    await service.send_on(live, "a", "Ana")
+    done = await until_state(service, live.id, MissionState.FINISHED)
+    assert done.reason == "everybody is back at the entry"
+    assert all(np.hypot(*(place_m(live, name) - entry_m)) <= 18.0 for name in "ab")
 
 
 async def test_the_checklist_says_when_there_is_no_room_at_the_recovery_point(service: MissionService) -> None:
