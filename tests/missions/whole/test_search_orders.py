@@ -122,7 +122,11 @@ async def test_nobody_runs_into_who_is_held(service: MissionService) -> None:
 
     await until(back, "the other has searched, and is back")
     assert min(apart_m) > 2.5
-    # Nobody is left at sea: the search is over when both are back.
+    # Nobody is left at sea: the search is over when both are back, however long that is.
+    assert held.report is not None
+    later_s = held.report.time_s + 120.0
+    await until(lambda: held.report is not None and held.report.time_s > later_s, "two minutes have passed")
+    assert live.header.state is MissionState.RUNNING
     await service.send_on(live, "a", "Ana")
     done = await until_state(service, live.id, MissionState.FINISHED)
     assert done.reason == "everybody is back at the entry"
