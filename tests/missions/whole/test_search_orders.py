@@ -6,7 +6,7 @@ from shapely.geometry import LineString, Point, box
 
 from app.arrays import FloatArray
 from app.exploration.site_search.ground import Ground
-from app.missions.fleet.interface import ScanReport
+from app.missions.fleet.interface import ScanReport, WaypointStatus
 from app.missions.fleet.links.sim import AGROUND
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.live.mission import LiveMission
@@ -182,6 +182,22 @@ async def test_who_gives_way_goes_only_where_somebody_has_looked(
     for order in scene.ordered:
         here_m, there_m = place_m(live, order.vehicle), np.array(scene.where_m(order))
         assert np.hypot(*(there_m - here_m)) < 0.5 or live.search.clear(here_m, there_m)
+
+
+async def test_nobody_waits_for_a_boat_that_stands_far_enough_from_its_way(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    boats = [{"name": name, "kind": "sim", "depth_m": 0} for name in "ab"]
+    limits = {"max_step_m": 8.0, "min_depth_m": 0.0, "min_altitude_m": 0.1, "min_separation_m": 4.0}
+    live = await service.get((await service.create(search_spec(vehicles=boats, limits=limits))).id)
+    scene = PlacedVehicles(live, service.hub, monkeypatch)
+    assert live.search is not None
+    for east in (3.0, 8.0, 13.0, 18.0):
+        live.search.see([_all_round(east, 14.0)])
+    scene.put("a", (10.0, 12.0, 0.0), (10.0, 12.0, 0.0)).status = WaypointStatus.REACHED
+    scene.put("b", (3.0, 16.5, 0.0), (20.0, 16.5, 0.0))
+    await scene.giving_way.look()
+    assert scene.ordered == []
 
 
 def _look_round(east: float, north: float, ranges_m: list[float | None]) -> ScanReport:

@@ -142,7 +142,9 @@ class GivingWay:
         return [np.array([east, north, lead.depth_m])] if away_m > 2.0 * self._circle_m(member) else []
 
     def _circle_m(self, member: Member) -> float:
-        """Return how wide the circles are in which a vehicle waits."""
+        """Return how wide the circles are in which a vehicle waits; in searches most stand still."""
+        if self._live.search is not None:
+            return member.capabilities.circles_m
         return max(member.capabilities.circles_m, turn_radius_m(self._live.spec, member.spec))
 
     def _age_s(self, member: Member) -> float:
