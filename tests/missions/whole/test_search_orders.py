@@ -17,7 +17,9 @@ from app.missions.running.homecoming import call_home, hold
 from app.missions.search.scan_schema import Scan
 from app.missions.search.state import Search
 from app.missions.service import MissionService
+from app.missions.spec.failsafes import Response
 from app.missions.states import MissionState
+from app.missions.team import Withdrawal
 from app.missions.views.mission import CheckStatus
 from tests.support.missions.harbour import act, until_state, view_of
 from tests.support.missions.placed import PlacedVehicles
@@ -174,8 +176,11 @@ async def test_who_gives_way_goes_only_where_somebody_has_looked(
         sine = np.abs(np.cos(np.radians(np.arange(0, 360, 2))))
         walls = half_m / np.maximum(sine, 1e-6)
         live.search.see([_look_round(east, 12.0, [float(away) if away < 9.0 else None for away in walls])])
-    scene.put("a", (3.0, 12.0, 0.0), (20.0, 12.0, 0.0))
+    goes_home = scene.put("a", (3.0, 12.0, 0.0), (20.0, 12.0, 0.0))
     scene.put("b", (24.0, 12.0, 0.0), (2.0, 12.0, 0.0))
+    await scene.giving_way.look()
+    assert scene.ordered == []  # as long as both search on their legs are decided together, to be apart
+    goes_home.withdrawal = Withdrawal(Response.RETURN, "called home")
     await scene.giving_way.look()
     aside_m = [abs(scene.where_m(order)[1] - 12.0) for order in scene.ordered]
     assert all(away_m < 1.0 for away_m in aside_m) if half_m < 3.0 else max(aside_m) > 2.0
@@ -194,7 +199,8 @@ async def test_nobody_waits_for_a_boat_that_stands_far_enough_from_its_way(
     assert live.search is not None
     for east in (3.0, 8.0, 13.0, 18.0):
         live.search.see([_all_round(east, 14.0)])
-    scene.put("a", (10.0, 12.0, 0.0), (10.0, 12.0, 0.0)).status = WaypointStatus.REACHED
+    stands = scene.put("a", (10.0, 12.0, 0.0), (10.0, 12.0, 0.0))
+    stands.status, stands.withdrawal = WaypointStatus.REACHED, Withdrawal(Response.HOLD, "held")
     scene.put("b", (3.0, 16.5, 0.0), (20.0, 16.5, 0.0))
     await scene.giving_way.look()
     assert scene.ordered == []

@@ -172,8 +172,12 @@ class GivingWay:
         """Yield pairs that are about to pass too close to each other."""
         least_m = self._live.spec.limits.min_separation_m
         for one, other in combinations(near, 2):
-            if self._too_close(one, other, least_m):
+            if not self._decided_together(one.member, other.member) and self._too_close(one, other, least_m):
                 yield one, other
+
+    def _decided_together(self, one: Member, other: Member) -> bool:
+        """Whether two search on: their legs are of one step, decided to be apart, and each waits for the other's."""
+        return self._live.search is not None and one.withdrawal is None and other.withdrawal is None
 
     def _too_close(self, one: _Imminent, other: _Imminent, least_m: float) -> bool:
         """Whether two will be closer than that in a moment, and closer than they are now."""
@@ -271,7 +275,9 @@ class GivingWay:
             waited_s = now_s - giving.since_s
             on = self._going_on(member)
             least_m = CLEAR * self._live.spec.limits.min_separation_m
-            clear = not any(self._too_close(on, that, least_m) for other, that in near.items() if other != name)
+            others = (that for that in near.values() if that.member is not member)
+            meets = (that for that in others if not self._decided_together(member, that.member))
+            clear = not any(self._too_close(on, that, least_m) for that in meets)
             if clear or waited_s * self._time_scale >= PATIENCE_S:
                 near[name] = on
                 await self._asides.lead_on(member)
