@@ -314,5 +314,10 @@ async def test_a_team_that_moves_as_one_takes_no_orders(service: MissionService)
     live = await flying(service, survey("a", "b", limits=LIMITS | {"com_range_m": 500.0}), step=1)
     with pytest.raises(ConflictError, match="move as one team"):
         await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(10.0, 10.0)), "Ana")
+    # Both may be held: the mission waits for them.
     await hold(live, "a", "Ana")
+    await hold(live, "b", "Ana")
+    step = live.header.step
+    await service.send_on(live, "b", "Ana")
+    await until_step(service, live.id, step + 2)
     await act(service, live.id, "abort")

@@ -163,19 +163,24 @@ async def test_who_is_called_home_in_a_search_comes_to_its_entry(service: Missio
     assert not any(AGROUND in line for line in words)
 
 
+async def placed_boats(service: MissionService, monkeypatch: pytest.MonkeyPatch) -> tuple[PlacedVehicles, Search]:
+    """Return two boats of a search, a and b, that keep 4 m apart, and what it knows."""
+    boats = [{"name": name, "kind": "sim", "depth_m": 0} for name in "ab"]
+    limits = {"max_step_m": 8.0, "min_depth_m": 0.0, "min_altitude_m": 0.1, "min_separation_m": 4.0}
+    live = await service.get((await service.create(search_spec(vehicles=boats, limits=limits))).id)
+    assert live.search is not None
+    return PlacedVehicles(live, service.hub, monkeypatch), live.search
+
+
 @pytest.mark.parametrize("half_m", [2.5, 9.0], ids=["in a lane", "where there is room"])
 async def test_who_gives_way_goes_only_where_somebody_has_looked(
     service: MissionService, monkeypatch: pytest.MonkeyPatch, half_m: float
 ) -> None:
-    boats = [{"name": name, "kind": "sim", "depth_m": 0} for name in "ab"]
-    limits = {"max_step_m": 8.0, "min_depth_m": 0.0, "min_altitude_m": 0.1, "min_separation_m": 4.0}
-    live = await service.get((await service.create(search_spec(vehicles=boats, limits=limits))).id)
-    scene = PlacedVehicles(live, service.hub, monkeypatch)
-    assert live.search is not None
+    scene, search = await placed_boats(service, monkeypatch)
     for east in (3.0, 8.0, 13.0, 18.0, 23.0):
         sine = np.abs(np.cos(np.radians(np.arange(0, 360, 2))))
         walls = half_m / np.maximum(sine, 1e-6)
-        live.search.see([_look_round(east, 12.0, [float(away) if away < 9.0 else None for away in walls])])
+        search.see([_look_round(east, 12.0, [float(away) if away < 9.0 else None for away in walls])])
     goes_home = scene.put("a", (3.0, 12.0, 0.0), (20.0, 12.0, 0.0))
     scene.put("b", (24.0, 12.0, 0.0), (2.0, 12.0, 0.0))
     await scene.giving_way.look()
@@ -185,20 +190,16 @@ async def test_who_gives_way_goes_only_where_somebody_has_looked(
     aside_m = [abs(scene.where_m(order)[1] - 12.0) for order in scene.ordered]
     assert all(away_m < 1.0 for away_m in aside_m) if half_m < 3.0 else max(aside_m) > 2.0
     for order in scene.ordered:
-        here_m, there_m = place_m(live, order.vehicle), np.array(scene.where_m(order))
-        assert np.hypot(*(there_m - here_m)) < 0.5 or live.search.clear(here_m, there_m)
+        here_m, there_m = place_m(scene.live, order.vehicle), np.array(scene.where_m(order))
+        assert np.hypot(*(there_m - here_m)) < 0.5 or search.clear(here_m, there_m)
 
 
 async def test_nobody_waits_for_a_boat_that_stands_far_enough_from_its_way(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    boats = [{"name": name, "kind": "sim", "depth_m": 0} for name in "ab"]
-    limits = {"max_step_m": 8.0, "min_depth_m": 0.0, "min_altitude_m": 0.1, "min_separation_m": 4.0}
-    live = await service.get((await service.create(search_spec(vehicles=boats, limits=limits))).id)
-    scene = PlacedVehicles(live, service.hub, monkeypatch)
-    assert live.search is not None
+    scene, search = await placed_boats(service, monkeypatch)
     for east in (3.0, 8.0, 13.0, 18.0):
-        live.search.see([_all_round(east, 14.0)])
+        search.see([_all_round(east, 14.0)])
     stands = scene.put("a", (10.0, 12.0, 0.0), (10.0, 12.0, 0.0))
     stands.status, stands.withdrawal = WaypointStatus.REACHED, Withdrawal(Response.HOLD, "held")
     scene.put("b", (3.0, 16.5, 0.0), (20.0, 16.5, 0.0))
