@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from app.arrays import FloatArray
+from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decisions.decision import Decision, Leg, Place, planned_way_m
+from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, planned_way_m
 from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
@@ -25,6 +26,7 @@ from app.missions.flight.legs.exchange import LegExchange
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
+from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
@@ -339,7 +341,7 @@ class OwnLegs:
         [planned] = [leg for leg in decision.legs if leg.vehicle == name]
         start = np.append(decision.origin_m[name], planned.target_m[2])
         others = [leg for leg in decision.legs if leg.vehicle != name and not leg.refusal]
-        for target in ways_aside(start, planned.target_m, self._constraints.for_plans, decision.bottom):
+        for target in self._ways_aside(start, planned, decision.bottom):
             legs = [*others, replace(planned, target_m=target)]
             tried = replace(decision, legs=legs)
             close = too_close(tried, self._live, self._spec)
@@ -347,6 +349,13 @@ class OwnLegs:
                 left = [replace(leg, refusal=close.get(leg.vehicle, "")) for leg in legs]
                 return replace(tried, legs=left, notes=[*decision.notes, f"{name} goes aside to let others pass"])
         return None
+
+    def _ways_aside(self, start: FloatArray, planned: Leg, bottom: Bottom) -> FloatArray:
+        """Return where a vehicle may go in place of the end of its leg, (k, 3); who comes in comes in elsewhere."""
+        if not planned.comes_in:
+            return ways_aside(start, planned.target_m, self._constraints.for_plans, bottom)
+        entries = free_space.ways_in(self._constraints, start[:2], INSET_M)
+        return np.array([np.append(entry, planned.target_m[2]) for entry in entries]).reshape(-1, 3)
 
     def _place(self, member: Member, *, moving: bool) -> Place:
         left_m = planned_way_m(self._spec, member.way_left_m(self._spec)) if self._wants_legs(member) else 0.0

@@ -147,6 +147,14 @@ def way_in(
     return next((entry for entry in entries if not barred(constraints, place, entry)), None)
 
 
+def ways_in(constraints: Constraints, place: FloatArray, inset_m: float) -> list[FloatArray]:
+    """Return all places of the area, (n of (2,)), that a vehicle outside may go straight to, the nearest first.
+
+    Parameters as in :func:`way_in`.
+    """
+    return [entry for entry in _entries(constraints, place, inset_m) if not barred(constraints, place, entry)]
+
+
 def barred(constraints: Constraints, place: FloatArray, goal: FloatArray, room_m: float = 0.0) -> bool:
     """Return whether a keep-out zone that a vehicle is not in lies between it and a goal, both (2,).
 

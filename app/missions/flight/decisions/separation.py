@@ -6,7 +6,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.constraints import Constraints
+from app.exploration.core.constraints import TOLERANCE_M, Constraints, Limit
 from app.exploration.motion.timeline import Approach, Timeline, closest_approach, speed_over_ground_mps
 from app.missions.flight.decisions.decision import Decision, turn_radius_m
 from app.missions.flight.steering import steered_motion
@@ -20,6 +20,9 @@ from app.missions.team import OUT_OF_REACH, Member
 DIRECTIONS = 16
 PARTS = (1.0, 0.5)
 """Of the longest leg."""
+
+WHERE = (Limit.AREA, Limit.KEEP_OUT)
+"""What the end of a leg can break by where it is."""
 
 
 def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[str, str]:
@@ -94,8 +97,12 @@ def passes_above(member: Member, live: LiveMission, spec: MissionSpec) -> str:
     return ""
 
 
-def ways_aside(start: FloatArray, target: FloatArray, constraints: Constraints, bottom: Bottom) -> FloatArray:
+def ways_aside(
+    start: FloatArray, target: FloatArray, constraints: Constraints, bottom: Bottom, *, or_nearer: bool = False
+) -> FloatArray:
     """Return where a vehicle may go in place of its target, (k, 3): in all directions, the nearest to the target first.
+
+    All lie inside the area and outside zones, wherever the vehicle is.
 
     Parameters
     ----------
@@ -103,12 +110,17 @@ def ways_aside(start: FloatArray, target: FloatArray, constraints: Constraints, 
         East, north and depth of travel.
     bottom
         Pessimistic sea floor.
+    or_nearer
+        Have a vehicle that cannot get there in one leg come nearer to where it may be.
     """
     course = np.arange(0.0, 2 * np.pi, 2 * np.pi / DIRECTIONS)
     unit = np.column_stack([np.sin(course), np.cos(course), np.zeros(DIRECTIONS)])
     reach_m = constraints.max_step_m * (1 - 1e-9)
     ends = np.concatenate([start + part * reach_m * unit for part in PARTS])
-    free = ends[constraints.feasible(start[None], ends[:, None], bottom)]
+    beyond_m = constraints.excess(start[None], ends[:, None], bottom)[:, 0, WHERE]
+    begins_m = constraints.excess(start[None], start[None, None], bottom)[0, 0, WHERE]
+    allowed = ((beyond_m <= TOLERANCE_M) | (or_nearer & (begins_m > reach_m))).all(axis=1)
+    free = ends[allowed & constraints.feasible(start[None], ends[:, None], bottom)]
     return np.asarray(free[np.argsort(np.hypot(*(free - target)[:, :2].T), kind="stable")])
 
 

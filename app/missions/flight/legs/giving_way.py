@@ -233,9 +233,8 @@ class GivingWay:
         constraints, home_m = self._constraints, home_of(member.spec, member.slot, self._live.spec)
         if member.withdrawal is not None and home_m is not None:
             constraints = homeward_ground(constraints, home_m)
-        aside = ways_aside(
-            np.append(here_m, depth_m), np.append(member.target_m, depth_m), constraints, self._committing.bottom
-        )
+        here, target = np.append(here_m, depth_m), np.append(member.target_m, depth_m)
+        aside = ways_aside(here, target, constraints, self._committing.bottom, or_nearer=True)
         places_m = [here_m, *aside[:, :2]]
         if self._asides.may_stand_elsewhere(member):
             # For long, maybe: rather where its circles stay inside, but first of all apart from others.
