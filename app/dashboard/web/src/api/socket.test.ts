@@ -5,7 +5,6 @@ import type { LiveMessage } from "./types";
 /** Stands for the browser's socket, which vitest's Node does not connect anywhere; the flow tests use the real one. */
 class Line {
   static opened: Line[] = [];
-  onopen: (() => void) | null = null;
   onclose: ((event: { code: number; reason: string }) => void) | null = null;
   onmessage: ((raw: { data: string }) => void) | null = null;
   closed = false;
@@ -20,6 +19,7 @@ class Line {
 }
 
 const newest = () => Line.opened.at(-1) as Line;
+const TOLD = { data: '{"type":"vehicles","time":"","vehicles":[]}' };
 
 describe("the live socket", () => {
   let statuses: SocketStatus["kind"][];
@@ -46,16 +46,23 @@ describe("the live socket", () => {
     vi.useRealTimers();
   });
 
+  it("is open once it has told what is there", () => {
+    expect(statuses).toEqual(["connecting"]);
+    newest().onmessage?.(TOLD);
+    newest().onmessage?.(TOLD);
+    expect(statuses).toEqual(["connecting", "open"]);
+    expect(messages).toHaveLength(2);
+  });
+
   it("does not ask again where it is not let in", () => {
-    newest().onopen?.();
     newest().onclose?.({ code: 4401, reason: "the session has ended" });
     vi.advanceTimersByTime(60_000);
     expect(Line.opened).toHaveLength(1);
-    expect(statuses).toEqual(["connecting", "open", "refused"]);
+    expect(statuses).toEqual(["connecting", "refused"]);
   });
 
   it("connects again after the connection closed", () => {
-    newest().onopen?.();
+    newest().onmessage?.(TOLD);
     newest().onclose?.({ code: 1006, reason: "" });
     vi.advanceTimersByTime(600);
     expect(Line.opened).toHaveLength(2);
@@ -63,9 +70,8 @@ describe("the live socket", () => {
   });
 
   it("drops a connection that fell silent", () => {
-    newest().onopen?.();
     vi.advanceTimersByTime(4000);
-    newest().onmessage?.({ data: '{"type":"vehicles","time":"","vehicles":[]}' });
+    newest().onmessage?.(TOLD);
     vi.advanceTimersByTime(4000);
     expect(newest().closed).toBe(false);
     vi.advanceTimersByTime(1500);
@@ -83,7 +89,7 @@ describe("the live socket", () => {
     const old = newest();
     old.onclose?.({ code: 1006, reason: "" });
     vi.advanceTimersByTime(600);
-    old.onmessage?.({ data: '{"type":"vehicles","time":"","vehicles":[]}' });
+    old.onmessage?.(TOLD);
     old.onclose?.({ code: 1006, reason: "" });
     expect(messages).toHaveLength(0);
     expect(Line.opened).toHaveLength(2);

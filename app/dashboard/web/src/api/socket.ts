@@ -2,6 +2,7 @@ import type { LiveMessage } from "./types";
 
 export type SocketStatus =
   | { kind: "connecting" }
+  /** What is there now was told; what changes will be. */
   | { kind: "open" }
   | { kind: "waiting"; attempt: number; retryAt: number }
   /** The service does not let this viewer in; asking again would change nothing. */
@@ -59,6 +60,7 @@ export class LiveSocket {
   #connect(): void {
     this.hooks.onStatus({ kind: "connecting" });
     const socket = new WebSocket(this.url);
+    let told = false;
     this.#socket = socket;
     this.#restartWatch();
     socket.onmessage = (raw: MessageEvent<string>) => {
@@ -66,9 +68,8 @@ export class LiveSocket {
       if (this.#attempt > 0) this.#attempt = 0;
       this.#restartWatch();
       this.hooks.onMessage(JSON.parse(raw.data) as LiveMessage);
-    };
-    socket.onopen = () => {
-      if (this.#socket === socket) this.hooks.onStatus({ kind: "open" });
+      if (!told) this.hooks.onStatus({ kind: "open" });
+      told = true;
     };
     socket.onclose = ({ code, reason }: CloseEvent) => {
       if (this.#socket !== socket) return;
