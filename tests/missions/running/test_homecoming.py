@@ -210,6 +210,43 @@ async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: Mission
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.parametrize("stopped_by", ["a pause", "a restart"])
+async def test_who_waited_before_the_mission_was_stopped_waits_in_circles_after_it(
+    harbour: Harbour, stopped_by: str
+) -> None:
+    service = harbour.service
+    vehicles = [
+        {"name": name, "kind": "sim", "start": lon_lat(east_m, 60.0)} for name, east_m in (("a", 35.0), ("b", 85.0))
+    ]
+    mission = await service.create(sim_spec(vehicles=vehicles, side_m=120.0, steps=4))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 1)
+    live = await service.get(mission.id)
+    await hold(live, "b", "Ana")
+    team = live.team.members
+    await until(lambda: all(member.waits_m is not None for member in team.values()), "one is held, one is done")
+    if stopped_by == "a pause":
+        await act(service, mission.id, "pause")
+        await act(service, mission.id, "resume")
+    else:
+        service = await harbour.reopen()
+        live = await service.get(mission.id)
+    team = live.team.members
+
+    def circle() -> bool:
+        waiting = all(member.engaged and member.waits_m is not None for member in team.values())
+        return waiting and all(member.report is not None for member in team.values())
+
+    await until(circle, "both are told to wait")
+    for member in team.values():
+        began_m = member.place_m(live.frame)
+        await until(
+            lambda member=member, began_m=began_m: math.dist(member.place_m(live.frame), began_m) > 3.0,
+            f"the motor of {member.name} runs",
+        )
+    await act(service, mission.id, "abort")
+
+
 async def test_vehicles_that_fly_in_steps_of_the_whole_team_come_home_too(service: MissionService) -> None:
     spec = recovered("a", "b", point=OUTSIDE, steps=1000, limits={"max_step_m": 8.0, "com_range_m": 500.0})
     mission = await service.create(spec)

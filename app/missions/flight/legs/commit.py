@@ -250,9 +250,10 @@ class LegCommit:
     def holding(self, member: Member) -> WaypointOrder | None:
         """Return an order that keeps a vehicle circling near where it is; None where there is no room for that.
 
-        In a search it stays where it is: what is beside it may not be known.
+        One that has no order, as after a pause, circles as deep as it is. In a search it stays where it is: what is
+        beside it may not be known.
         """
-        if member.report is None or member.order is None:
+        if member.report is None:
             return None
         if self._live.search is not None:
             return self.waiting_at(member, member.place_m(self._live.frame))
@@ -261,24 +262,43 @@ class LegCommit:
         if centre_m is None:
             return None
         ways = [*self._turning(member, inside, centre_m), disc(centre_m, free_space.CIRCLE_M)]
-        wanted_m = member.order.position.depth_m
+        order = self._present_order(member, member.report.position)
+        wanted_m = order.position.depth_m
         if member.withdrawal is not None and member.withdrawal.below:
             wanted_m = self._depth_below_m(member, wanted_m)
-        return self._waiting(member.order, centre_m, self._depth_m(member, wanted_m, ways))
+        return self._waiting(order, centre_m, self._depth_m(member, wanted_m, ways))
 
     def waiting_below(self, member: Member) -> WaypointOrder | None:
-        """Return an order that keeps a vehicle where it is, as deep as it is; None where it has no order to change."""
-        if member.report is None or member.order is None:
+        """Return an order that keeps a vehicle where it is, as deep as it is; None where that is not known."""
+        if member.report is None:
             return None
-        return self._waiting(member.order, member.place_m(self._live.frame), self._depth_below_m(member, 0.0))
+        order = self._present_order(member, member.report.position)
+        return self._waiting(order, member.place_m(self._live.frame), self._depth_below_m(member, 0.0))
 
     def waiting_at(self, member: Member, place_m: FloatArray) -> WaypointOrder | None:
-        """Return an order to wait at a place (2,), as deep as it goes now; None where it has no order to change."""
-        if member.report is None or member.order is None:
+        """Return an order to wait at a place (2,), as deep as it goes now; None where nobody knows where it is."""
+        if member.report is None:
             return None
+        order = self._present_order(member, member.report.position)
         ways = self._turning(member, member.place_m(self._live.frame), place_m)
-        depth_m = self._depth_m(member, member.order.position.depth_m, ways)
-        return self._waiting(member.order, place_m, depth_m)
+        return self._waiting(order, place_m, self._depth_m(member, order.position.depth_m, ways))
+
+    def _present_order(self, member: Member, here: Position) -> WaypointOrder:
+        """Return the order that a vehicle has, or one to where it is."""
+        if member.order is not None:
+            return member.order
+        spec = self._live.spec
+        if member.capabilities.keeps_depth:
+            here = replace(here, depth_m=member.cruise_depth_m(spec.limits))
+        return WaypointOrder(
+            mission_id=self._live.id,
+            step=NO_LEG,
+            vehicle=member.name,
+            position=here,
+            speed_mps=spec.speed_of(member.spec),
+            arrival_radius_m=spec.arrival_radius_m,
+            min_altitude_m=spec.limits.min_altitude_m,
+        )
 
     def _waiting(self, order: WaypointOrder, place_m: FloatArray, depth_m: float) -> WaypointOrder:
         place = self._position(float(place_m[0]), float(place_m[1]), depth_m)

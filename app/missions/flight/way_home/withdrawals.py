@@ -66,6 +66,8 @@ class Withdrawals:
         self._stranded: set[str] = set()
         self._lay: dict[str, frozenset[str]] = {}
         """Who lay at rest when each vehicle was led home: its way leads past those."""
+        self._held: set[str] = set()
+        """Vehicles that were told to wait where they are since they can be reached."""
         self._ending: set[str] = set()
         """Vehicles that are just being stopped where they were to go."""
         self._below_since_s: dict[str, float] = {}
@@ -124,15 +126,12 @@ class Withdrawals:
             await self._begin(member, withdrawal)
         if withdrawal.response is Response.STOP:
             await self._end(member, withdrawal, f"{member.name} is stopped")
+        elif withdrawal.response is Response.HOLD:
+            await self._hold(member)
         elif withdrawal.response is Response.RETURN and (why := self._barred(member)):
             self._dispatch.give_up_legs(member, why)
             await self._go_home(member, withdrawal)
-        elif (
-            not member.present
-            or withdrawal.response is Response.HOLD
-            or await self._waits_below(member, withdrawal)
-            or member.ordered
-        ):
+        elif not member.present or await self._waits_below(member, withdrawal) or member.ordered:
             return
         elif member.ahead:
             await self._dispatch.begin()
@@ -217,7 +216,14 @@ class Withdrawals:
         words = f"{member.name} {does[withdrawal.response]}: {withdrawal.why}"
         facts = {"response": withdrawal.response, "energy_left_pct": energy_left_pct(member)}
         await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name, **facts)
-        if withdrawal.response is Response.HOLD and member.present:
+        self._held.discard(member.name)
+
+    async def _hold(self, member: Member) -> None:
+        """Have a vehicle wait near where it is: once, and again when it was away since, or was stopped."""
+        if not member.present:
+            self._held.discard(member.name)
+        elif member.name not in self._held:
+            self._held.add(member.name)
             await self._dispatch.hold(member)
 
     async def _surface(self, member: Member, withdrawal: Withdrawal) -> None:
