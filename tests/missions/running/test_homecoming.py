@@ -238,12 +238,12 @@ async def test_who_waited_before_the_mission_was_stopped_waits_in_circles_after_
         return waiting and all(member.report is not None for member in team.values())
 
     await until(circle, "both are told to wait")
-    for member in team.values():
-        began_m = member.place_m(live.frame)
-        await until(
-            lambda member=member, began_m=began_m: math.dist(member.place_m(live.frame), began_m) > 3.0,
-            f"the motor of {member.name} runs",
-        )
+    began_m = {member.name: member.place_m(live.frame) for member in team.values()}
+
+    def under_way() -> bool:
+        return all(math.dist(member.place_m(live.frame), began_m[member.name]) > 3.0 for member in team.values())
+
+    await until(under_way, "their motors run")
     await act(service, mission.id, "abort")
 
 
