@@ -343,6 +343,22 @@ const WIDTH_PX = 230;
 function More({ of, children }: { of: string; children: ComponentChildren }) {
   const open = useSignal(false);
   const menu = useRef<HTMLDivElement>(null);
+  const place = () => {
+    const at = menu.current?.previousElementSibling?.getBoundingClientRect(); // its button's
+    if (!at) return;
+    const left = Math.max(0, Math.min(at.left, window.innerWidth - WIDTH_PX));
+    menu.current?.style.setProperty("--left", `${left}px`);
+    menu.current?.style.setProperty("--bottom", `${window.innerHeight - at.top + GAP_PX}px`);
+  };
+  useEffect(() => {
+    if (!open.value) return;
+    // Its card grows and moves as the vehicle tells more: it would come to lie over the stop.
+    let frame = requestAnimationFrame(function follow() {
+      place();
+      frame = requestAnimationFrame(follow);
+    });
+    return () => cancelAnimationFrame(frame);
+  }, [open.value]);
   useEffect(() => {
     const box = menu.current;
     // What was chosen is on its way.
@@ -352,14 +368,9 @@ function More({ of, children }: { of: string; children: ComponentChildren }) {
     box?.addEventListener("click", fold);
     return () => box?.removeEventListener("click", fold);
   }, []);
-  const flip = (event: MouseEvent) => {
-    const button = (event.currentTarget as HTMLElement).getBoundingClientRect();
-    const box = menu.current;
-    if (!box) return;
-    const left = Math.max(0, Math.min(button.left, window.innerWidth - WIDTH_PX));
-    box.style.setProperty("--left", `${left}px`);
-    box.style.setProperty("--bottom", `${window.innerHeight - button.top + GAP_PX}px`);
-    box.togglePopover();
+  const flip = () => {
+    place();
+    menu.current?.togglePopover();
   };
   return (
     <>
