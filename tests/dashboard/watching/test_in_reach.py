@@ -50,6 +50,19 @@ def expect_on_top(page: Page, name: str, *, moved: bool = False) -> None:
     )
 
 
+def expect_menu_at_its_button(page: Page, name: str) -> None:
+    """Also after the row of cards was moved below it."""
+    page.wait_for_function(
+        """name => {
+            const of = part => document.querySelector(`[data-testid="${part}-${name}"]`).getBoundingClientRect();
+            const [button, menu] = [of("more"), of("more-orders")];
+            const left = Math.max(0, Math.min(button.left, innerWidth - 230));
+            return Math.abs(menu.left - left) < 2 && menu.bottom <= button.top && menu.bottom > button.top - 10;
+        }""",
+        arg=name,
+    )
+
+
 def expect_orders_in_one_row(page: Page, name: str) -> None:
     """On narrow screens: what is seldom needed is in a menu, which covers no stop. Elsewhere it is beside them."""
     if page.viewport_size in (size_of("wide"), size_of("tablet")):
@@ -64,6 +77,9 @@ def expect_orders_in_one_row(page: Page, name: str) -> None:
     for order in ("hold", "go", "skip", "repeat"):
         expect_on_top(page, f"{order}-{name}")
     expect_on_top(page, f"abort-{name}", moved=True)
+    expect_menu_at_its_button(page, name)
+    by_id(page, f"card-{name}").evaluate("card => { card.parentElement.scrollLeft -= 40; }")
+    expect_menu_at_its_button(page, name)
     expect_on_top(page, "abort")
     by_id(page, f"go-{name}").click()
     expect(by_id(page, f"hold-{name}")).to_be_hidden()

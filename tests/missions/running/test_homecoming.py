@@ -15,7 +15,9 @@ from app.missions.flown import Phase
 from app.missions.operations.history import events_after
 from app.missions.recovery.berths import home_of
 from app.missions.running.homecoming import call_home, hold
+from app.missions.safety.free_space import CIRCLE_M
 from app.missions.service import MissionService
+from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleKind, VehicleSpec
 from app.missions.states import Action, MissionState
@@ -224,7 +226,12 @@ async def test_who_waited_before_the_mission_was_stopped_waits_in_circles_after_
     live = await service.get(mission.id)
     await hold(live, "b", "Ana")
     team = live.team.members
-    await until(lambda: all(member.waits_m is not None for member in team.values()), "one is held, one is done")
+
+    def waiting() -> bool:
+        done = not team["a"].ordered and team["a"].way_left_m(live.spec) == 0.0
+        return done and all(member.present and member.waits_m is not None for member in team.values())
+
+    await until(waiting, "one is held, one is done")
     if stopped_by == "a pause":
         await act(service, mission.id, "pause")
         await act(service, mission.id, "resume")
@@ -232,18 +239,26 @@ async def test_who_waited_before_the_mission_was_stopped_waits_in_circles_after_
         service = await harbour.reopen()
         live = await service.get(mission.id)
     team = live.team.members
-
-    def circle() -> bool:
-        waiting = all(member.engaged and member.waits_m is not None for member in team.values())
-        return waiting and all(member.report is not None for member in team.values())
-
-    await until(circle, "both are told to wait")
+    await until(waiting, "both are told to wait")
+    assert team["a"].withdrawal is None
+    assert team["b"].withdrawal is not None
+    assert team["b"].withdrawal.response is Response.HOLD
+    area = Polygon(live.spec.local_area())
+    centres_m = {member.name: member.waits_m for member in team.values() if member.waits_m is not None}
+    assert all(area.contains(Point(centre_m)) for centre_m in centres_m.values())
+    circles = {v.name: v.waiting_circle for v in (await view_of(service, mission.id)).vehicles}
+    assert None not in circles.values()
     began_m = {member.name: member.place_m(live.frame) for member in team.values()}
 
     def under_way() -> bool:
         return all(math.dist(member.place_m(live.frame), began_m[member.name]) > 3.0 for member in team.values())
 
     await until(under_way, "their motors run")
+
+    def on_circles() -> bool:
+        return all(math.dist(team[name].place_m(live.frame), at_m) < 2.0 * CIRCLE_M for name, at_m in centres_m.items())
+
+    await until(on_circles, "they go round where they were told to wait")
     await act(service, mission.id, "abort")
 
 

@@ -21,7 +21,7 @@ DIRECTIONS = 16
 PARTS = (1.0, 0.5)
 """Of the longest leg."""
 
-WHERE = (Limit.AREA, Limit.KEEP_OUT)
+LIMITS_OF_PLACES = (Limit.AREA, Limit.KEEP_OUT)
 """What the end of a leg can break by where it is."""
 
 
@@ -102,7 +102,7 @@ def ways_aside(
 ) -> FloatArray:
     """Return where a vehicle may go in place of its target, (k, 3): in all directions, the nearest to the target first.
 
-    All lie inside the area and outside zones, wherever the vehicle is.
+    All lie inside the area and outside zones, wherever the vehicle is; but for ``or_nearer``.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def ways_aside(
     unit = np.column_stack([np.sin(course), np.cos(course), np.zeros(DIRECTIONS)])
     reach_m = constraints.max_step_m * (1 - 1e-9)
     ends = np.concatenate([start + part * reach_m * unit for part in PARTS])
-    beyond_m = constraints.excess(start[None], ends[:, None], bottom)[:, 0, WHERE]
-    begins_m = constraints.excess(start[None], start[None, None], bottom)[0, 0, WHERE]
+    beyond_m = constraints.excess(start[None], ends[:, None], bottom)[:, 0, LIMITS_OF_PLACES]
+    begins_m = constraints.excess(start[None], start[None, None], bottom)[0, 0, LIMITS_OF_PLACES]
     allowed = ((beyond_m <= TOLERANCE_M) | (or_nearer & (begins_m > reach_m))).all(axis=1)
     free = ends[allowed & constraints.feasible(start[None], ends[:, None], bottom)]
     return np.asarray(free[np.argsort(np.hypot(*(free - target)[:, :2].T), kind="stable")])

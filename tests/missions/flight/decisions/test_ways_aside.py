@@ -11,8 +11,6 @@ from app.missions.safety.free_space import ways_in
 
 AREA = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
 ZONE = np.array([[40.0, 40.0], [60.0, 40.0], [60.0, 60.0], [40.0, 60.0]])
-
-
 LIMITS = Constraints(AREA, keep_out=(ZONE,), max_step_m=8.0)
 
 
