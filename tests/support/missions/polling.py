@@ -29,6 +29,8 @@ class PollingVehicle:
     told_to_stop: bool = False
     waits: bool = False
     """Stays where it is and asks for nothing."""
+    waits_after_step: int | None = None
+    """Does so once it has flown this step."""
     gives_up: bool = False
     """Asks for its waypoint, too, while its batch is not taken, and forgets the batch."""
     asks: bool = False
@@ -103,11 +105,15 @@ class PollingVehicle:
             items.append(self.measurement())
         await self.post(api, mission_id, items or [self.measurement()])
 
+    def _waits_after_its_step(self) -> bool:
+        last = self.waits_after_step
+        return last is not None and bool(self.steps_seen) and self.steps_seen[-1] >= last
+
     async def run(self, api: httpx.AsyncClient, mission_id: str) -> None:
         """Take part until told to stop."""
         await self.post(api, mission_id, [self.measurement()])
         while not self.told_to_stop:
-            while self.waits:  # noqa: ASYNC110 - whoever set it takes it back
+            while self.waits or self._waits_after_its_step():  # noqa: ASYNC110 - whoever set it takes it back
                 await asyncio.sleep(RETRY_S)
             waypoint = await self.next_waypoint(api, mission_id)
             if waypoint is not None:
