@@ -52,13 +52,18 @@ def test_a_mission_from_the_form_to_its_abort(watched: Watched, service: Service
     expect(by_id(page, "step")).not_to_have_text("0")
     # Where a vehicle is now the map is known in a moment. It moves, and so does what is below the pointer.
     known, deadline_s = re.compile(r"\d+\.\d\d m ± \d+\.\d\d m"), time.monotonic() + PATIENCE_S
-    readout = by_id(page, "readout")
+    readout, at = by_id(page, "readout"), (0.0, 0.0)
     while not known.search(" ".join(readout.all_text_contents())):
         assert time.monotonic() < deadline_s, "no depth is told where a vehicle is"
         box = by_id(page, "vehicle-mark-sim-1").bounding_box()
         assert box is not None
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.move(*at)
         page.wait_for_timeout(250)
+    # It goes on telling where the pointer rests, whatever comes and goes below it.
+    page.wait_for_function("([x, y]) => !document.elementFromPoint(x, y).closest('.maplibregl-marker')", arg=list(at))
+    page.wait_for_timeout(250)
+    expect(readout).to_contain_text(known)
     expect_colours(page)
 
     by_id(page, "pause").click()

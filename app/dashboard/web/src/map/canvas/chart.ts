@@ -150,7 +150,11 @@ export class Chart {
       },
     );
     map.on("mousemove", (e) => hooks.onCursor([e.lngLat.lng, e.lngLat.lat]));
-    map.on("mouseout", () => hooks.onCursor(null));
+    map.on("mouseout", (e) => {
+      // Onto a vehicle's mark, which may have come below a pointer at rest, is not off the map.
+      const to = e.originalEvent.relatedTarget;
+      if (!(to instanceof Node && map.getCanvasContainer().contains(to))) hooks.onCursor(null);
+    });
     map.on("click", (e) => {
       hooks.onCursor([e.lngLat.lng, e.lngLat.lat]);
       const spot = this.#spotAt(e.point.x, e.point.y);
