@@ -52,8 +52,10 @@ ESCORT_SHARE = 0.4
 """Part of the communication range within which linked vehicles come along with one that visits a landmark."""
 APART = 1.2
 """Least distances by which they stay away from it and from each other."""
-BARRED_LOOKS = 3
-"""Steps in which a visitor came no closer after which its team climbs first."""
+BARRED_LOOKS = 1
+"""Steps in which a visitor came no closer after which its team climbs rather than stay below what rises before it."""
+GETS_ON = 0.1
+"""Part of its way by which a vehicle has to come nearer to get on at all."""
 
 
 class PcaoPlanner(PlannerBase):
@@ -95,7 +97,8 @@ class PcaoPlanner(PlannerBase):
         else:
             self._watch(team, left, unit)
             self._visit(team, unit, way)
-        if not self._surveys and self._together(team) and self._visits.target[0] >= 0:
+        apart = alone(here, limits.com_range_m).any()
+        if not self._surveys and self._together(team) and self._visits.target[0] >= 0 and not apart:
             positions = self._escort(team, bottom, way, left, unit)
         else:
             lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
@@ -197,16 +200,19 @@ class PcaoPlanner(PlannerBase):
         """Return where a linked team goes (n, 3) while one of it visits a landmark by its move of ``way`` (n, 3).
 
         The others visit what is left within their links to it where all may; else they come close to it, or follow it,
-        which no border bars. A team that comes no nearer is barred by what rises before it: then all climb first.
+        which no border bars. A team that comes no nearer is barred by what rises before it: then all climb until the
+        visitor gets on.
         """
-        here, step = team.positions, team.constraints.max_step_m * (1.0 - 1e-9)
+        here, step, visitor = team.positions, team.constraints.max_step_m * (1.0 - 1e-9), int(self._visits.visitor[0])
         wishes = [self._escorted(team, bottom, way, self._nearby_moves(team, way, left, unit))]
         for part in (1.0, *SLOWER):
             wishes.append(self._escorted(team, bottom, part * way, {}))
             wishes.append(self._escorted(team, bottom, part * way, self._following_moves(team, part * way)))
         up = [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
-        barred = BARRED_LOOKS <= self._visits.looks[0] < 2 * BARRED_LOOKS
-        positions, _ = settle(team, bottom, np.stack([*up, *wishes] if barred else [*wishes, *up]))
+        flat, first = way[visitor, :2], wishes
+        if self._visits.looks[0] >= BARRED_LOOKS and np.hypot(*flat) > 0.0:
+            first = [wish for wish in wishes if (wish - here)[visitor, :2] @ flat >= GETS_ON * (flat @ flat)]
+        positions, _ = settle(team, bottom, np.stack([*first, *up, *wishes]))
         return positions
 
     def _escorted(self, team: Situation, bottom: Bottom, way: FloatArray, moves: dict[int, FloatArray]) -> FloatArray:
@@ -267,10 +273,10 @@ class PcaoPlanner(PlannerBase):
         limits, here = team.constraints, team.positions
         ties = (limits.com_range_m, limits.max_step_m * (1.0 - 1e-9), lead)
         if alone(here, limits.com_range_m).any():  # lifted by its altimeter, or pushed by a current
-            back = [self._clear(team, bottom, here + f * (here.mean(axis=0) - here)) for f in GATHERING]
-            ok = limits.feasible(here, np.stack(back), bottom)
+            back = self._gathering(team, bottom)
+            ok = limits.feasible(here, back, bottom)
             if ok.any():
-                return back[int(np.argmax(ok))]
+                return np.asarray(back[int(np.argmax(ok))])
         wish = linked(here, here + way, *ties)
         if not self._surveys and limits.feasible(here, wish[None], bottom)[0]:
             return wish
@@ -281,6 +287,24 @@ class PcaoPlanner(PlannerBase):
         slower = [self._clear(team, bottom, linked(here, here + f * way, *ties)) for f in SLOWER]
         positions, _ = settle(team, bottom, np.stack([self._round_limits(team, bottom, wish), wish, *slower]))
         return positions
+
+    def _gathering(self, team: Situation, bottom: Bottom) -> FloatArray:
+        """Return how vehicles that lost each other may approach, (k, n, 3), best first.
+
+        Where what rises between them holds one back, all climb first.
+        """
+        here, step = team.positions, team.constraints.max_step_m * (1.0 - 1e-9)
+        middle = here.mean(axis=0)
+        back = [self._clear(team, bottom, here + part * (middle - here)) for part in GATHERING]
+        if self._surveys:
+            return np.stack(back)
+        away = np.hypot(*(middle - here)[:, :2].T)
+        nearer = [
+            wish
+            for part, wish in zip(GATHERING, back, strict=True)
+            if (away - np.hypot(*(middle - wish)[:, :2].T) >= GETS_ON * part * away).all()
+        ]
+        return np.stack([*nearer, *(here - [0.0, 0.0, part * step] for part in (1.0, 0.5)), *back])
 
     def _clear(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
         """Return the wishes (..., n, 3) clear of the bottom, at the depths wished for; in surveys at the cruise's."""

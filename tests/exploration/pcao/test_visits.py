@@ -96,6 +96,12 @@ def test_a_team_over_sand_waves_leaves_next_to_nothing() -> None:
     assert run.remaining_pct <= 1.0
 
 
+@pytest.mark.parametrize(("family", "seed"), [("dunes", 6), ("moraine", 6)])
+def test_a_linked_team_climbs_over_what_bars_one_of_it_or_parts_it(family: str, seed: int) -> None:
+    run = run_explore(ExploreScenario(unseen_floor(family, seed), seed=seed), "pcao", PlannerOptions())
+    assert run.remaining_pct <= 1.0
+
+
 def test_a_team_beside_a_border_is_not_held_by_it() -> None:
     beside = np.array([[10.0, 0.1, 2.0], [14.0, 8.0, 2.0]])
     belief = replace(make_belief(), accurate=np.ones(625, dtype=np.bool_))
