@@ -97,8 +97,8 @@ class PcaoPlanner(PlannerBase):
         else:
             self._watch(team, left, unit)
             self._visit(team, unit, way)
-        apart = alone(here, limits.com_range_m).any()
-        if not self._surveys and self._together(team) and self._visits.target[0] >= 0 and not apart:
+        visiting = not self._surveys and self._together(team) and self._visits.target[0] >= 0
+        if visiting and not alone(here, limits.com_range_m).any():
             positions = self._escort(team, bottom, way, left, unit)
         else:
             lead = self._leader(team.vehicles, np.linalg.norm(vectors[:, 0], axis=1))
@@ -208,11 +208,11 @@ class PcaoPlanner(PlannerBase):
         for part in (1.0, *SLOWER):
             wishes.append(self._escorted(team, bottom, part * way, {}))
             wishes.append(self._escorted(team, bottom, part * way, self._following_moves(team, part * way)))
-        up = [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
-        flat, first = way[visitor, :2], wishes
-        if self._visits.looks[0] >= BARRED_LOOKS and np.hypot(*flat) > 0.0:
-            first = [wish for wish in wishes if (wish - here)[visitor, :2] @ flat >= GETS_ON * (flat @ flat)]
-        positions, _ = settle(team, bottom, np.stack([*first, *up, *wishes]))
+        flat, tries = way[visitor, :2], [*wishes, *climbs(here, step)]
+        if self._visits.looks[0] >= BARRED_LOOKS and flat.any():
+            nearer = [wish for wish in wishes if (wish - here)[visitor, :2] @ flat >= GETS_ON * (flat @ flat)]
+            tries = [*nearer, *climbs(here, step), *wishes]
+        positions, _ = settle(team, bottom, np.stack(tries))
         return positions
 
     def _escorted(self, team: Situation, bottom: Bottom, way: FloatArray, moves: dict[int, FloatArray]) -> FloatArray:
@@ -304,7 +304,7 @@ class PcaoPlanner(PlannerBase):
             for part, wish in zip(GATHERING, back, strict=True)
             if (away - np.hypot(*(middle - wish)[:, :2].T) >= GETS_ON * part * away).all()
         ]
-        return np.stack([*nearer, *(here - [0.0, 0.0, part * step] for part in (1.0, 0.5)), *back])
+        return np.stack([*nearer, *climbs(here, step), *back])
 
     def _clear(self, team: Situation, bottom: Bottom, wish: FloatArray) -> FloatArray:
         """Return the wishes (..., n, 3) clear of the bottom, at the depths wished for; in surveys at the cruise's."""
@@ -407,6 +407,11 @@ def towards(at: FloatArray, goal: FloatArray, depth: float, looks: int, step: fl
     flat = flat * min(1.0, step / max(float(np.hypot(*flat)), 1e-12))
     down = visiting_depth(at, goal, depth, looks, step, unit) - at[2]
     return within(np.append(flat, np.clip(down, -step, step)), step)
+
+
+def climbs(here: FloatArray, step: float) -> list[FloatArray]:
+    """Return where vehicles at ``here`` (n, 3) are after they all climbed, by a step or half of it."""
+    return [here - [0.0, 0.0, part * step] for part in (1.0, 0.5)]
 
 
 def within(move: FloatArray, step: float) -> FloatArray:
