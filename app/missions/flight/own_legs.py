@@ -49,6 +49,9 @@ MOST_AHEAD = 20
 PATIENCE = 1
 """How often a vehicle waits for others to pass before it goes aside."""
 
+NOT_WAITED_FOR = 3
+"""A vehicle that misses so many legs in a row is no longer waited for when the others have flown their ways."""
+
 LEAST_WAY_M = 1.0
 """A vehicle with less way left is done, and where a mission lasts so many minutes one with less than it arrives in."""
 
@@ -136,6 +139,8 @@ class OwnLegs:
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
+                for member in self._flown_out():
+                    self._live.withdraw(member, Response.RETURN, "it has flown its way")
                 getting = self._who_gets_legs()
                 if getting:
                     await self._decide(getting)
@@ -144,13 +149,14 @@ class OwnLegs:
         finally:
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
-        left = any(self._wants_legs(member) for member in self._live.team.surveying)
-        if left and self._done:
+        left = [m for m in self._live.team.surveying if self._wants_legs(m) or m.ordered or m.ahead]
+        if self._done and any(self._wants_legs(member) for member in left):
             return self._all_seen() if self._measured else "nobody can fly a further line"
         team = self._live.team
         if any(m.withdrawal is not None and m.name not in self._sent_home and self._has_way(m) for m in team):
             return "nobody surveys any more"
-        return "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
+        words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
+        return f"{words} but {', '.join(m.name for m in left)}" if left else words
 
     def _all_seen(self) -> str:
         but = f" but {self._left_pct:.1f} % of the area, which lines do not see" if self._left_pct >= TOLD_PCT else ""
@@ -175,6 +181,7 @@ class OwnLegs:
                 or self._orders.waiting
                 or self._over()
                 or self._nobody_to_lead
+                or bool(self._flown_out())
                 or sending.done()
             ),
             soon_s if later_s is None else min(later_s, soon_s),
@@ -288,14 +295,26 @@ class OwnLegs:
 
     def _call_home(self, done: frozenset[str] | set[str]) -> None:
         """Send vehicles home that have flown all that is planned for them and can fly no further line."""
-        for member in self._live.team.surveying:
-            idle = member.present and not member.ahead and not member.ordered
-            if member.name in done and idle and self._spec.recovery_of(member.spec) is not None:
+        for member in self._live.team.present:
+            idle = not member.ahead and not member.ordered
+            if member.name in done and idle and self._spec.ends_at_home(member.spec):
                 energy_m = self._range.beyond_m(member)
                 lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
                 words = "its energy lasts for its way home" if lasts else "what is left of its way is for going home"
                 self._live.withdraw(member, Response.RETURN, f"{words} and for no further line")
                 self._sent_home.add(member.name)
+
+    def _flown_out(self) -> list[Member]:
+        """Return the vehicles that have flown their way and go home: none of them waits at sea for the others."""
+        return [
+            member
+            for member in self._live.team.present
+            if not self._has_way(member)
+            and not member.ahead
+            and not member.ordered
+            and member.asked is None
+            and self._spec.ends_at_home(member.spec)
+        ]
 
     def _has_leg(self, name: str, number: int) -> bool:
         member = self._live.team.get(name)
@@ -436,13 +455,21 @@ class OwnLegs:
         ]
         if not left:
             return bool(list(self._live.team)) and not any(self._has_way(m) for m in self._live.team.held)
-        somebody_is_done = any(m.present for m in team if m not in left)
-        if any(m.present and not (somebody_is_done and m.misses) for m in left):
+        somebody_is_done = self._somebody_is_home or any(m.present for m in team if m not in left)
+        if any(m.present and not (somebody_is_done and m.misses >= NOT_WAITED_FOR) for m in left):
             return False
         if not somebody_is_done and any(self._wants_legs(m) for m in left):
             return False
         patience_s = self._spec.step_deadline_s / self._time_scale
         return all(m.present or self._absent_s(m) >= patience_s for m in left)
+
+    @property
+    def _somebody_is_home(self) -> bool:
+        """Whether a vehicle has flown its way and is home, or on its way there."""
+        return any(
+            m.withdrawal is not None and m.withdrawal.response is Response.RETURN and not self._has_way(m)
+            for m in self._live.team
+        )
 
     def _absent_s(self, member: Member) -> float:
         """Return for how long a vehicle has been out of reach, as far as anybody looked, on the wall clock."""
@@ -463,5 +490,7 @@ class OwnLegs:
     @property
     def _nobody_to_lead(self) -> bool:
         team = self._live.team
-        everybody_left = not list(team)
-        return everybody_left or (not team.present and any(self._wants_legs(member) for member in team.surveying))
+        if not list(team):
+            return True
+        somebody_wants_legs = any(self._wants_legs(member) for member in team.surveying)
+        return not team.present and not self._somebody_is_home and somebody_wants_legs

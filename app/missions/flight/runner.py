@@ -39,7 +39,6 @@ from app.missions.flight.way_home.onboard_way import OnboardWays
 from app.missions.flight.way_home.withdrawals import Withdrawals
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
-from app.missions.spec.recovery import Homecoming
 from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
@@ -152,8 +151,7 @@ class Runner:
     def _call_home(self, why: str) -> None:
         """Send everybody home at the mission's end who has a recovery point, unless the mission wants it otherwise."""
         for member in self._live.team:
-            recovery = self._live.spec.recovery_of(member.spec)
-            if recovery is not None and recovery.on_finish is Homecoming.RETURN:
+            if self._live.spec.ends_at_home(member.spec):
                 self._live.withdraw(member, Response.RETURN, why)
 
     async def _recover(self) -> bool:

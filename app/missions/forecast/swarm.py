@@ -141,6 +141,7 @@ class Swarm:
         self.clock_s, self.distance_m = np.zeros(n), np.zeros(n)
         self.legs = np.full(n, first_step - 1)
         self._held = np.zeros(n, dtype=bool)
+        self._ends_at_home = np.array([spec.ends_at_home(member.spec) for member in members])
         if spec.budget.steps is not None:
             self._most_m = np.full(n, max(spec.steps - first_step + 1, 0) * spec.limits.max_step_m)
         else:
@@ -163,8 +164,12 @@ class Swarm:
         self._most_m[i], self.left_m[i] = self._counted_m[i], 0.0
 
     def circled_m(self, ended_s: FloatArray) -> FloatArray:
-        """Return how far each comes, (vehicles,), that goes on in circles from when it ended until the last one has."""
-        way_m: FloatArray = self.distance_m + (ended_s.max() - ended_s) * self._speed_mps
+        """Return how far each comes, (vehicles,), until the last one has ended.
+
+        From when it ended on it goes on in circles, unless it has flown its way and goes home then.
+        """
+        circles = ~self._ends_at_home | (self.left_m > least_way_m(self._spec))
+        way_m: FloatArray = self.distance_m + circles * (ended_s.max() - ended_s) * self._speed_mps
         return way_m
 
     def due(self, *, apart: bool) -> BoolArray:

@@ -133,7 +133,7 @@ class SwathFlight:
 
     @property
     def circled_m(self) -> FloatArray:
-        """How far each has come, (vehicles,), if it goes on in circles until the last one is done, as at sea."""
+        """How far each has come, (vehicles,), until the last one is done; who waits for that circles, as at sea."""
         return self.swarm.circled_m(np.array([clock_s[-1] for clock_s in self.clocks_s]))
 
     def fly(self, over: Callable[[], bool]) -> bool:

@@ -336,6 +336,11 @@ class MissionSpec(Model):
         of_all = {} if self.recovery is None else self.recovery.model_dump(exclude={"point"})
         return Recovery(point=vehicle.recovery_point, **of_all)
 
+    def ends_at_home(self, vehicle: VehicleSpec) -> bool:
+        """Whether a vehicle goes home when it has flown its way, rather than wait for the others and stop at sea."""
+        recovery = self.recovery_of(vehicle)
+        return recovery is not None and recovery.on_finish is Homecoming.RETURN
+
     def allowance(self, vehicle: VehicleSpec | str) -> Allowance:
         """Return what a vehicle may fly in the whole mission."""
         return self.budget.allowance(self.speed_of(vehicle))

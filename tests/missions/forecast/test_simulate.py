@@ -25,7 +25,7 @@ from app.missions.team import CommittedLeg, Member, Team
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
 from tests.support.missions.harbour import act, sim_spec, until_state
-from tests.support.missions.specs import make_spec
+from tests.support.missions.specs import lon_lat, make_spec
 from tests.support.waiting import until
 
 NONE = np.zeros((0, 4))
@@ -277,6 +277,16 @@ def test_who_is_done_circles_until_the_last_one_is() -> None:
     swarm = Swarm(spec, team_of(spec), np.array([[2.0, 2.0], [7.0, 2.0]]))
     swarm.fly(0, np.array([2.0, 30.0, 2.0]))
     assert swarm.flown(1).distance_m[1] == pytest.approx(float(swarm.distance_m[0]))
+
+
+def test_who_goes_home_when_its_way_is_flown_does_not_circle() -> None:
+    spec = sim_spec(budget={"minutes": 10}, recovery={"point": lon_lat(15.0, 4.0)})
+    swarm = Swarm(spec, team_of(spec), np.array([[2.0, 2.0], [7.0, 2.0]]))
+    swarm.fly(0, np.array([2.0, 30.0, 2.0]))
+    circled_m = swarm.flown(1).distance_m[1]
+    assert circled_m == pytest.approx(float(swarm.distance_m[0])), "who has way left waits for its next leg"
+    swarm.end(1)
+    assert swarm.flown(1).distance_m[1] == 0.0
 
 
 def test_one_in_ten_figures_like_those_of_eleven_floors_lies_below_their_range_and_one_above() -> None:

@@ -66,6 +66,51 @@ async def test_at_the_end_of_a_mission_everybody_goes_home(service: MissionServi
     assert not await words_of(service, mission, "boundary")
 
 
+def unlike(**changes: Any) -> MissionSpec:
+    """A mission of a fast vehicle and a slow one, equally far."""
+    speeds = {"fast": 2.0, "slow": 0.7}
+    vehicles = [{"name": name, "kind": "sim", "speed_mps": speed} for name, speed in speeds.items()]
+    limits = {"max_step_m": 20.0, "min_separation_m": 0.0}
+    shape = {"side_m": 100.0, "limits": limits, "budget": {"km_per_vehicle": 0.15}, "vehicles": vehicles}
+    return recovered(point=lon_lat(50.0, -20.0), **(shape | changes))
+
+
+async def test_who_has_flown_its_way_goes_home_while_others_survey(service: MissionService) -> None:
+    mission = await service.create(unlike())
+    await act(service, mission.id, "start")
+    fast, slow = (await service.get(mission.id)).team
+    await until(lambda: fast.is_home, "the fast one is home")
+    assert slow.surveys, "the slow one goes on"
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert {waypoint.status for waypoint in ended.waypoints} == {"reached"}, "what was flown is not given up"
+    told = [words for words in await words_of(service, mission, "recovery") if "goes home" in words]
+    assert told == ["fast goes home: it has flown its way", "slow goes home: everybody has flown its way"]
+
+
+async def test_who_is_to_stop_in_the_end_waits_for_the_others(service: MissionService) -> None:
+    mission = await service.create(unlike(recovery={"on_finish": "stop"}))
+    await act(service, mission.id, "start")
+    fast, slow = (await service.get(mission.id)).team
+    await until(lambda: fast.waits_m is not None, "the fast one has flown its way")
+    assert fast.surveys
+    await until_state(service, mission.id, MissionState.FINISHED)
+    assert not [words for words in await words_of(service, mission, "recovery") if "goes home" in words]
+
+
+async def test_who_is_lost_keeps_no_mission_open_whose_others_are_home(service: MissionService) -> None:
+    mission = await service.create(unlike(step_deadline_s=30.0))
+    await act(service, mission.id, "start")
+    fast, _ = (await service.get(mission.id)).team
+    await until(lambda: fast.is_home, "the fast one is home")
+    link = service.hub._links[VehicleKind.SIM]
+    assert isinstance(link, SimFleetLink)
+    link.silence("slow")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert ended.reason == "everybody has flown its way but slow"
+    assert {vehicle.name: vehicle.phase for vehicle in ended.vehicles}["fast"] is Phase.HOME
+    assert "slow did not come home: it cannot be reached" in await words_of(service, mission, "recovery")
+
+
 async def test_a_mission_may_want_its_vehicles_to_stop_where_they_are(service: MissionService) -> None:
     mission = await service.create(recovered("a", point=OUTSIDE, steps=2, recovery={"on_finish": "stop"}))
     await act(service, mission.id, "start")

@@ -179,9 +179,13 @@ class Dispatch:
     def give_up_legs(self, member: Member, reason: str) -> list[FloatArray]:
         """End the leg that a vehicle flies, and those after it; returns where they were to end, each (2,)."""
         ends = [member.target_m] if member.ordered and member.target_m is not None else []
-        misses = member.misses
-        self.settle(member, WaypointStatus.MISSED, reason)
-        member.misses = misses  # it would have got there
+        if member.ordered:
+            misses = member.misses
+            self.settle(member, WaypointStatus.MISSED, reason)
+            member.misses = misses  # it would have got there
+        else:
+            member.set_order(None)  # it has flown what it had
+            member.status = None
         return self._note_given_up(member, [*ends, *self._spare(member, ends, reason)])
 
     def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:
