@@ -59,7 +59,7 @@ class BottomPoint:
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """Where a vehicle shall go. Equal ``mission_id`` and ``step`` make two waypoints the same order.
+    """Where a vehicle shall go. Only equal waypoints are the same order: places to wait share a ``step``.
 
     ``lead_lat_deg``, ``lead_lon_deg``: a point on the leg's line beyond the waypoint, where it may be sent in order
     to pass the waypoint straight. DUNE flies straight to a reference only until some 7 m before it, and circles

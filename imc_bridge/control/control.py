@@ -165,11 +165,7 @@ class Control(ABC):
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
         current = self._order
-        if (
-            current is not None
-            and (current.waypoint.mission_id, current.waypoint.step) == (waypoint.mission_id, waypoint.step)
-            and current.status is not WaypointStatus.REFUSED
-        ):
+        if current is not None and current.waypoint == waypoint and current.status is not WaypointStatus.REFUSED:
             return
         self._order = self._make_order(waypoint)
         self.node.ordered_depth_m = waypoint.depth_m

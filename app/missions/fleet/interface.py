@@ -332,6 +332,8 @@ class LinkCapabilities:
     """They are led in steps of the whole team: nobody is sent on before all have told what they measured."""
     keeps_way_home: bool = False
     """They can keep a way home on board, which they take by themselves when nobody is heard any more."""
+    stays_put: bool = False
+    """Where they are to wait they are told to stop: they cannot be sent to a place for that."""
     circles_m: float = 0.0
     """From this distance on they circle about a waypoint in place of going straight to it, unless they can hover."""
 
@@ -376,7 +378,7 @@ class FleetLink(ABC):
 
     * ``order`` replaces the vehicle's current waypoint, returns without waiting for the vehicle, and is followed by
       ``WaypointReport`` events (sent, acknowledged, reached) or by one with status ``refused`` and a reason.
-      Repeating an order (same mission and step) is harmless.
+      Repeating an equal order is harmless. Places to wait share a step: a later one replaces the one before.
     * ``stop`` makes the vehicle stop following, whatever it was doing, and is safe to repeat; it waits at most
       ``timeout_s`` (wall clock) for the vehicle's acknowledgement and never raises for a silent vehicle.
     * ``close`` stops every engaged vehicle first.

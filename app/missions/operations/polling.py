@@ -6,7 +6,9 @@ from collections.abc import Callable
 from app.missions.errors import ConflictError, VehicleNotFoundError
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.live.mission import LiveMission
+from app.missions.spec.failsafes import Response
 from app.missions.states import MissionState
+from app.missions.team import Member, Withdrawal
 from app.missions.views.mission import WaypointView
 
 
@@ -15,7 +17,7 @@ async def waypoint(
 ) -> WaypointView | None:
     """Return a vehicle's waypoint when it is newer than ``after_step``, waiting for it; None when none came.
 
-    A polling vehicle acknowledges the waypoint by this. Raises ConflictError when it must stop.
+    A polling vehicle acknowledges the waypoint by this. Raises ConflictError when it must stop, or stay where it is.
     """
     member = live.team.get(vehicle)
     if member is None:
@@ -30,7 +32,7 @@ async def waypoint(
     def newer() -> WaypointView | None:
         shown = live.waypoints.of(vehicle)
         ready = shown is not None and shown.step > after and shown.status is not WaypointStatus.PLANNED
-        return shown if ready and member.order is not None else None
+        return shown if ready and member.ordered else None
 
     def must_stop() -> bool:
         waits = live.header.state is MissionState.READY or (
@@ -39,7 +41,7 @@ async def waypoint(
         return not waits or live.team.get(vehicle) is None
 
     def settled() -> bool:
-        return newer() is not None or must_stop()
+        return newer() is not None or must_stop() or _staying(member) is not None
 
     if link is not None:
         link.has_waypoint(vehicle, after)
@@ -50,6 +52,10 @@ async def waypoint(
         state = live.header.state if live.team.get(vehicle) is not None else "without this vehicle"
         state = "ending" if state is MissionState.RUNNING else state
         raise ConflictError(f"the mission is {state}: stop and hold", "ask again after it was started or resumed")
+    if (withdrawal := _staying(member)) is not None:
+        if link is not None and (withdrawal.over or withdrawal.response is Response.STOP):
+            link.told_to_stop(vehicle, live.id)
+        raise ConflictError(f"{vehicle!r} stays where it is ({withdrawal.why}): stop and hold", "ask again later")
     found = newer()
     if found is not None and link is not None:
         link.has_waypoint(vehicle, found.step)
@@ -60,6 +66,14 @@ async def waypoint(
     lats, lons = live.frame.to_geographic(way_m[:, 0], way_m[:, 1])
     way = [(float(lon), float(lat)) for lat, lon in zip(lats, lons, strict=True)]
     return found.model_copy(update={"way_home": way})
+
+
+def _staying(member: Member) -> Withdrawal | None:
+    """Return why a vehicle is to stay where it is: it is held, waits on its way home, or is where that led."""
+    found = member.withdrawal
+    if found is None or found.over or found.below or found.response in (Response.HOLD, Response.STOP):
+        return found
+    return None
 
 
 async def _wait_watching(live: LiveMission, condition: Callable[[], bool], timeout_s: float) -> None:

@@ -301,6 +301,16 @@ async def test_a_new_order_replaces_the_old(bench: Bench) -> None:
     assert distance_m(bench, order) <= ARRIVAL_M + 10.0
 
 
+async def test_a_second_place_to_wait_replaces_the_first(bench: Bench) -> None:
+    """Waits are no legs: all of them have the same number."""
+    await bench.link.engage(bench.name)
+    await bench.give(bench.order(0, 50, 25))
+    await until(lambda: A in bench.statuses(0), "it is on its way to the first")
+    second = bench.order(0, 50, 75)
+    await bench.give(second)
+    await until(lambda: distance_m(bench, second) <= ARRIVAL_M + 10.0, "it waits at the second")
+
+
 async def test_a_stop_is_acknowledged_and_can_be_repeated(bench: Bench) -> None:
     assert (await bench.link.stop(bench.name)).vehicle == bench.name  # before anything
     await bench.link.engage(bench.name)

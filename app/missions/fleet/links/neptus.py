@@ -198,11 +198,10 @@ class NeptusFleetLink(VisitedLink):
                 reason,
                 "Make First Depth in the panel smaller, or the area without that place",
             )
-        same = craft.order is not None and (craft.order.mission_id, craft.order.step) == (order.mission_id, order.step)
-        if not same or craft.status is None:
+        if craft.order != order or craft.status is None:
             craft.order, craft.published = order, False
             self._report(craft, WaypointStatus.SENT)
-        elif craft.status is not None:
+        else:
             self._report(craft, craft.status)
         self._publish_soon(fleet)
 

@@ -12,6 +12,7 @@ from typing import Self
 
 from app.missions.fleet.interface import (
     EventSink,
+    LinkCapabilities,
     LinkState,
     Position,
     StopReceipt,
@@ -37,6 +38,7 @@ class RestFleetLink(VisitedLink):
     """The fleet interface for vehicles that poll."""
 
     kind = "rest"
+    capabilities = LinkCapabilities(stays_put=True)
 
     def __init__(self, *, lost_after_s: float = 30.0) -> None:
         super().__init__(lost_after_s)

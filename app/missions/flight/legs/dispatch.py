@@ -128,6 +128,8 @@ class Dispatch:
 
     async def stay(self, member: Member, order: WaypointOrder) -> None:
         """Send a vehicle where it is to stay; that is no leg."""
+        if member.capabilities.stays_put:
+            return  # it is told when it asks
         try:
             await self._hub.order(member.key, order)
         except VehicleRefusedError as error:

@@ -288,6 +288,7 @@ class Withdrawals:
         self._rising_since_s.pop(member.name, None)
         self._stranded.discard(member.name)
         member.flown.phase = phase_of(withdrawal)
+        self._live.publish_summary()  # who waits for a waypoint is told to stop
         try:
             stop = await self._hub.stop(member.key)
             await self._keep(member, withdrawal)
