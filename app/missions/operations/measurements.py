@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from functools import partial
 
@@ -259,7 +259,8 @@ async def _hear(live: LiveMission, items: Sequence[Measurement], *, only_unknown
         if link is not None and not (only_unknown and live.hub.info(member.key).report is not None):
             links[name] = link
     fresh = [item for item in items if item.vehicle in links]
-    await each_of(fresh, lambda item: links[item.vehicle].heard(_vehicle_report(item)))
+    reports = await made_of(fresh, _vehicle_reports, fresh)
+    await each_of(reports, lambda report: links[report.vehicle].heard(report))
 
 
 def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
@@ -392,6 +393,27 @@ def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometr
     return Position(*footprint(state, beam, range_m)), geometry
 
 
+def _vehicle_reports(items: Sequence[Measurement]) -> list[VehicleReport]:
+    """Return what items tell of their vehicles, in the order of their times; beams of one time make one report."""
+    found: dict[tuple[str, float], VehicleReport] = {}
+    for item in sorted(items, key=lambda item: item.time_s):
+        report = _vehicle_report(item)
+        other = found.get((item.vehicle, item.time_s))
+        if other is not None:
+            heights = [one.altitude_m for one in (other, report) if one.altitude_m is not None]
+            report = replace(report, altitude_m=min(heights, default=None))
+        found[item.vehicle, item.time_s] = report
+    return list(found.values())
+
+
+def _altitude_m(item: Measurement) -> float | None:
+    """Return how far below a vehicle its beam met the bottom; None where it has none, or none that looks down."""
+    if item.range_m is None:
+        return None
+    below_m = _footprint(item, item.range_m)[0].depth_m - item.depth_m
+    return below_m if below_m > 0.0 else None
+
+
 def _vehicle_report(item: Measurement) -> VehicleReport:
     return VehicleReport(
         vehicle=item.vehicle,
@@ -399,7 +421,7 @@ def _vehicle_report(item: Measurement) -> VehicleReport:
         position=Position(item.lat_deg, item.lon_deg, item.depth_m),
         heading_rad=None if item.heading_deg is None else math.radians(item.heading_deg),
         speed_mps=item.speed_mps,
-        altitude_m=item.range_m,
+        altitude_m=_altitude_m(item),
         battery_pct=item.battery_pct,
         position_sd_m=item.position_sd_m,
     )

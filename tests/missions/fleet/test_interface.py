@@ -410,6 +410,24 @@ async def test_a_polling_vehicle_that_is_silent_too_long_counts_as_lost_and_come
     await link.close()
 
 
+async def test_a_position_of_before_moves_nobody_back_unless_the_clock_was_set_back() -> None:
+    link = RestFleetLink(lost_after_s=0.2)
+    events: list[FleetEvent] = []
+    await link.start(events.append)
+    here = Position(LAT, LON, 1.0)
+    for time_s in (100.0, 50.0, 101.0):
+        link.heard(VehicleReport("r", time_s, here))
+    assert [e.time_s for e in events if isinstance(e, VehicleReport)] == [100.0, 101.0]
+
+    def told_it_is_50() -> bool:
+        link.heard(VehicleReport("r", 50.0, here))
+        report = link.vehicles()[0].report
+        return report is not None and report.time_s == 50.0
+
+    await until(told_it_is_50, "nothing newer comes: the clock was set back")
+    await link.close()
+
+
 async def test_a_stranger_that_is_told_to_stop_is_not_taken_up() -> None:
     link = RestFleetLink()
     await link.start(lambda _event: None)

@@ -90,7 +90,7 @@ async def test_who_has_flown_its_way_goes_home_while_others_survey(service: Miss
 async def test_who_is_to_stop_in_the_end_waits_for_the_others(service: MissionService) -> None:
     mission = await service.create(unlike(recovery={"on_finish": "stop"}))
     await act(service, mission.id, "start")
-    fast, slow = (await service.get(mission.id)).team
+    fast, _ = (await service.get(mission.id)).team
     await until(lambda: fast.waits_m is not None, "the fast one has flown its way")
     assert fast.surveys
     await until_state(service, mission.id, MissionState.FINISHED)

@@ -30,6 +30,8 @@ EARTH_RADIUS_M = 6_371_000.0
 @dataclass
 class _Poller(Visitor):
     heard_s: float = 0.0
+    newest_heard_s: float = -math.inf
+    """When its newest position came, the event loop's time."""
     stopping: bool = False
     told: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -117,9 +119,16 @@ class RestFleetLink(VisitedLink):
         return StopReceipt(vehicle, acknowledged=True, detail="told at its poll")
 
     def heard(self, report: VehicleReport) -> None:
-        """Take a position that a vehicle posted."""
+        """Take a position that a vehicle posted, unless a newer one is known: it may post what it kept under water.
+
+        One whose clock was set back is believed after ``lost_after_s``.
+        """
         poller = self._touch(report.vehicle)
-        poller.report = report
+        now_s = asyncio.get_running_loop().time()
+        is_older = poller.report is not None and report.time_s < poller.report.time_s
+        if is_older and now_s - poller.newest_heard_s < self._lost_after_s:
+            return
+        poller.report, poller.newest_heard_s = report, now_s
         self._sink(report)
         self._check_arrival(poller)
 
