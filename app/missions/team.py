@@ -341,6 +341,11 @@ class Team:
         return member
 
     @property
+    def specs(self) -> list[VehicleSpec]:
+        """How those that take part are described."""
+        return [member.spec for member in self.members.values()]
+
+    @property
     def current_mps(self) -> tuple[float, float]:
         """Velocity of the water, east and north: what vehicles tell of it, on average."""
         told = [m.report.current_mps for m in self if m.report is not None and m.report.current_mps is not None]

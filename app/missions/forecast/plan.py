@@ -316,7 +316,7 @@ def _way(spec: MissionSpec, constraints: Constraints, member: Member, corners: F
     along = _along(corners)
     turn_s, clock_s = _turns_s(spec, member, corners), _clock_s(spec, member, corners)
     circles_s = len(turn_s) * 2.0 * np.pi * radius_m / speed
-    home_m = home_of(member.spec, member.slot, spec)
+    home_m = home_of(member.spec, member.slot, spec, spec.vehicles)
     ways_home = None if home_m is None else WaysHome(constraints, home_m)
 
     def home_from(place_m: FloatArray) -> FloatArray | None:

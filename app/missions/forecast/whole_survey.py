@@ -84,7 +84,7 @@ def whole_way(
     full_s = full_battery_s(spec, member)
     if full_s is None:
         return WholeWay(distance_m * drawn_out, seconds, None)
-    home_m = home_of(member.spec, member.slot, spec)
+    home_m = home_of(member.spec, member.slot, spec, spec.vehicles)
     ways_home = None if home_m is None else WaysHome(constraints, home_m)
     speed_mps = spec.speed_of(member.spec)
 

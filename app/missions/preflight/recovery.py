@@ -42,9 +42,9 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
     slots = [member.slot for member in live.team if member.spec.recovery_point is None]
     if recovery is None or not slots:
         return
-    reach_m = farthest_m(live.spec, slots)
+    reach_m = farthest_m(live.spec, slots, live.team.specs)
     if len(slots) > 1 and reach_m > recovery.radius_m:
-        apart_m = berth_spacing_m(live.spec)
+        apart_m = berth_spacing_m(live.spec, live.team.specs)
         yield CheckView(
             id="recovery.room",
             title="Room at the recovery point",
@@ -56,7 +56,7 @@ def _room(live: LiveMission) -> Iterator[CheckView]:
 
 
 def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
-    home_m = home_of(member.spec, member.slot, live.spec)
+    home_m = home_of(member.spec, member.slot, live.spec, live.team.specs)
     if home_m is None:
         return
     name, title = f"recovery.{member.name}", f"Way home of {member.name}"

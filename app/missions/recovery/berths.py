@@ -24,8 +24,11 @@ def layer_of(name: str, cruise_m: dict[str, float], spacing_m: float) -> DepthLa
     return DepthLayer(tuple(cruise_m[one] for one in order), order.index(name), spacing_m)
 
 
-def home_of(vehicle: VehicleSpec, slot: int, spec: MissionSpec) -> FloatArray | None:
-    """Return where a vehicle comes home to, (2,): its own berth about the recovery point; None where it has none."""
+def home_of(vehicle: VehicleSpec, slot: int, spec: MissionSpec, team: Sequence[VehicleSpec]) -> FloatArray | None:
+    """Return where a vehicle comes home to, (2,): its own berth about the recovery point; None where it has none.
+
+    ``team`` are all that take part now, those that joined later too.
+    """
     recovery = spec.recovery_of(vehicle)
     if recovery is None:
         return None
@@ -33,8 +36,8 @@ def home_of(vehicle: VehicleSpec, slot: int, spec: MissionSpec) -> FloatArray | 
     # A point of its own is nobody else's.
     if vehicle.recovery_point is not None:
         return point_m
-    sharing = sum(other.recovery_point is None for other in spec.vehicles)
-    return berth_m(point_m, slot, sharing, berth_spacing_m(spec))
+    sharing = sum(other.recovery_point is None for other in team)
+    return berth_m(point_m, slot, sharing, berth_spacing_m(spec, team))
 
 
 def point_of(recovery: Recovery, spec: MissionSpec) -> FloatArray:
@@ -70,10 +73,10 @@ def berth_m(home_m: FloatArray, slot: int, sharing: int, spacing_m: float) -> Fl
     return np.asarray(home_m + spacing_m * _places(slot + 1)[slot])
 
 
-def berth_spacing_m(spec: MissionSpec) -> float:
-    """Return how far apart vehicles wait: what two of them need to stay in their places, and the separation."""
-    sharing = [vehicle for vehicle in spec.vehicles if vehicle.recovery_point is None]
-    room_m = max((room_of_m(vehicle, spec) for vehicle in sharing or spec.vehicles), default=HOME_RADIUS_M)
+def berth_spacing_m(spec: MissionSpec, team: Sequence[VehicleSpec]) -> float:
+    """Return how far apart a team waits: what two of it need to stay in their places, and the separation."""
+    sharing = [vehicle for vehicle in team if vehicle.recovery_point is None]
+    room_m = max((room_of_m(vehicle, spec) for vehicle in sharing or team), default=HOME_RADIUS_M)
     return 2.0 * room_m + spec.limits.min_separation_m
 
 
@@ -111,8 +114,9 @@ def _places(count: int) -> FloatArray:
     return places
 
 
-def farthest_m(spec: MissionSpec, slots: Sequence[int]) -> float:
-    """Return how far from a shared recovery point the farthest of these vehicles may be while it waits."""
-    spacing_m, room_m = berth_spacing_m(spec), 0.5 * (berth_spacing_m(spec) - spec.limits.min_separation_m)
+def farthest_m(spec: MissionSpec, slots: Sequence[int], team: Sequence[VehicleSpec]) -> float:
+    """Return how far from a shared recovery point the farthest of a team's vehicles, by slot, may be while it waits."""
+    spacing_m = berth_spacing_m(spec, team)
+    room_m = 0.5 * (spacing_m - spec.limits.min_separation_m)
     places = [berth_m(np.zeros(2), slot, len(slots), spacing_m) for slot in slots]
     return max((float(np.hypot(*place)) for place in places), default=0.0) + room_m

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.missions.recovery.berths import berth_m, berth_spacing_m, farthest_m, is_home, layer_of, room_of_m
+from app.missions.recovery.berths import berth_m, berth_spacing_m, farthest_m, home_of, is_home, layer_of, room_of_m
 from app.missions.spec.mission import MissionSpec
 from tests.support.missions.harbour import sim_spec
+from tests.support.missions.specs import lon_lat
 
 HOME_M = np.array([3.0, 4.0])
 
@@ -41,12 +42,23 @@ def test_vehicles_that_drift_about_their_berths_stay_a_separation_apart() -> Non
     spec = spec_of("imc", "imc", "imc")
     room_m, separation_m = room_of_m(spec.vehicles[0], spec), spec.limits.min_separation_m
     assert room_m >= 10.0, "DUNE's StationKeeping takes no less"
-    assert berth_spacing_m(spec) - 2 * room_m == pytest.approx(separation_m)
+    assert berth_spacing_m(spec, spec.vehicles) - 2 * room_m == pytest.approx(separation_m)
 
 
 @pytest.mark.parametrize(("kinds", "within"), [(("imc",) * 3, True), (("sim",) * 6, True), (("imc",) * 4, False)])
 def test_as_many_as_there_is_room_for_wait_within_25_m(kinds: tuple[str, ...], within: bool) -> None:
-    assert (farthest_m(spec_of(*kinds), range(len(kinds))) <= 25.0) is within
+    spec = spec_of(*kinds)
+    assert (farthest_m(spec, range(len(kinds)), spec.vehicles) <= 25.0) is within
+
+
+@pytest.mark.parametrize("declared", [0, 1])
+def test_berths_are_as_far_apart_for_vehicles_that_joined_later(declared: int) -> None:
+    recovery = {"point": lon_lat(50.0, 50.0)}
+    whole = spec_of("imc", "imc", "imc", recovery=recovery)
+    fewer = whole.model_copy(update={"vehicles": whole.vehicles[:declared]})
+    berths = [home_of(vehicle, slot, fewer, whole.vehicles) for slot, vehicle in enumerate(whole.vehicles)]
+    apart_m = min(float(np.hypot(*(a - b))) for a, b in combinations(berths, 2) if a is not None and b is not None)
+    assert apart_m >= berth_spacing_m(whole, whole.vehicles) * (1 - 1e-9)
 
 
 depths = st.lists(st.floats(1.0, 20.0), min_size=1, max_size=6).map(lambda d: {f"v{k}": x for k, x in enumerate(d)})

@@ -174,7 +174,7 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     await call_home(live, "a", "Ana")
     on_its_way = next(v for v in (await view_of(service, mission.id)).vehicles if v.name == "a")
     vehicle = live.team.members["a"]
-    berth_m = home_of(vehicle.spec, vehicle.slot, live.spec)
+    berth_m = home_of(vehicle.spec, vehicle.slot, live.spec, live.team.specs)
     assert berth_m is not None
     lat, lon = live.frame.to_geographic(*berth_m)
     assert on_its_way.way_home[-1] == pytest.approx((float(lon), float(lat)), abs=1e-6)

@@ -193,8 +193,9 @@ class LegCommit:
         depth_m = leg.position.depth_m
         here = np.append(member.place_m(self._live.frame), depth_m)[None]
         there = np.append(leg.target_m, depth_m)[None]
-        constraints = self._constraints
-        if member.withdrawal is not None and (home_m := home_of(member.spec, member.slot, self._live.spec)) is not None:
+        constraints, live = self._constraints, self._live
+        home_m = home_of(member.spec, member.slot, live.spec, live.team.specs)
+        if member.withdrawal is not None and home_m is not None:
             constraints = homeward_ground(constraints, home_m)
         # The corner of a way in round a zone may lie farther outside than its vehicle does.
         area = Polygon(constraints.area)

@@ -113,7 +113,7 @@ class EnergyRange:
         return None
 
     def _home_m(self, member: Member) -> FloatArray | None:
-        return home_of(member.spec, member.slot, self._live.spec)
+        return home_of(member.spec, member.slot, self._live.spec, self._live.team.specs)
 
     def _ways_to(self, home_m: FloatArray) -> tuple[WaysHome, WaysHome | None]:
         key = (float(home_m[0]), float(home_m[1]))

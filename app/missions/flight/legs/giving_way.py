@@ -230,7 +230,8 @@ class GivingWay:
             return []
         here_m = member.place_m(self._live.frame)
         depth_m = member.order.position.depth_m
-        constraints, home_m = self._constraints, home_of(member.spec, member.slot, self._live.spec)
+        constraints, live = self._constraints, self._live
+        home_m = home_of(member.spec, member.slot, live.spec, live.team.specs)
         if member.withdrawal is not None and home_m is not None:
             constraints = homeward_ground(constraints, home_m)
         here, target = np.append(here_m, depth_m), np.append(member.target_m, depth_m)

@@ -161,7 +161,8 @@ class KeepingOff:
 
     def _around(self, member: Member, here_m: FloatArray, end_m: FloatArray) -> Iterator[FloatArray]:
         """Yield places (2,) inside the area about a vehicle, the nearest to its leg's end first, that it can go to."""
-        constraints, home_m = self._constraints, home_of(member.spec, member.slot, self._live.spec)
+        constraints, live = self._constraints, self._live
+        home_m = home_of(member.spec, member.slot, live.spec, live.team.specs)
         if member.withdrawal is not None and home_m is not None:
             constraints = homeward_ground(constraints, home_m)
         course = np.arange(0.0, 2 * np.pi, 2 * np.pi / DIRECTIONS)

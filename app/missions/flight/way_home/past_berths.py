@@ -47,6 +47,6 @@ def _taken(member: Member, live: LiveMission) -> Iterator[FloatArray]:
         if other is member:
             continue
         lies = other.name in at_rest
-        place_m = other.place_m(live.frame) if lies else home_of(other.spec, other.slot, live.spec)
+        place_m = other.place_m(live.frame) if lies else home_of(other.spec, other.slot, live.spec, live.team.specs)
         if place_m is not None:
             yield place_m

@@ -237,7 +237,8 @@ class Withdrawals:
     async def _go_home(self, member: Member, withdrawal: Withdrawal) -> None:
         """Send a vehicle home from where it is, at its depth, and up there."""
         spec = self._live.spec
-        recovery, home_m = spec.recovery_of(member.spec), home_of(member.spec, member.slot, spec)
+        recovery = spec.recovery_of(member.spec)
+        home_m = home_of(member.spec, member.slot, spec, self._live.team.specs)
         here_m = member.place_m(self._live.frame)
         if recovery is None or home_m is None:
             await self._end(member, withdrawal, f"{member.name} has no recovery point and stops where it is")

@@ -40,7 +40,7 @@ async def team_over(service: MissionService, depth_m: float) -> tuple[LiveMissio
 
 def berth_m(live: LiveMission, name: str) -> FloatArray:
     member = live.team.members[name]
-    place_m = home_of(member.spec, member.slot, live.spec)
+    place_m = home_of(member.spec, member.slot, live.spec, live.team.specs)
     assert place_m is not None
     return place_m
 
