@@ -16,12 +16,15 @@ _PRIMARY = 0xFF
 """SQLite's codes carry details in their higher bits."""
 
 _SERVER = {
+    "25006": "the database's server takes no writes: see whether it is a standby, as after a change of servers",
+    "40": "the database's server ended a transaction because of others: it is tried again",
+    "55P03": "another program holds the database locked: end it",
     "08": "the connection to the database's server broke: see whether it runs and can be reached",
     "53": "the database's server lacks room or memory: free some space on its disk",
     "57": "the database's server is stopping or starting: wait for it, or start it",
     "58": "the disk of the database's server reports an error: see whether it is full or broken",
 }
-"""By class of SQLSTATE."""
+"""By SQLSTATE, or its class."""
 
 
 def trouble_of(error: BaseException) -> str:
@@ -35,6 +38,6 @@ def trouble_of(error: BaseException) -> str:
         return _SQLITE.get(code & _PRIMARY, "")
     state = getattr(cause, "sqlstate", None) or getattr(cause, "pgcode", None)
     if state:
-        return _SERVER.get(str(state)[:2], "")
+        return _SERVER.get(str(state), _SERVER.get(str(state)[:2], ""))
     lost = isinstance(error, InterfaceError) or (isinstance(error, DBAPIError) and error.connection_invalidated)
     return _SERVER["08"] if lost or isinstance(cause, ConnectionError | TimeoutError) else ""

@@ -81,3 +81,25 @@ async def test_a_server_that_ends_the_connection_is_told_of(database: Database) 
     with pytest.raises(DBAPIError) as caught:
         await cut_off()
     assert "database's server" in trouble_of(caught.value)
+
+
+@pytest.mark.parametrize("either_url", ["postgresql"], indirect=True)
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        ("40P01", "is tried again"),
+        ("40001", "is tried again"),
+        ("55P03", "holds the database locked"),
+        ("25006", "takes no writes"),
+        ("57P01", "stopping or starting"),
+        ("23505", ""),
+    ],
+)
+async def test_troubles_of_a_server_that_pass_are_waited_for(database: Database, state: str, words: str) -> None:
+    raised = f"DO $$ BEGIN RAISE EXCEPTION 'as told' USING ERRCODE = '{state}'; END $$"
+    with pytest.raises(DBAPIError) as caught:
+        async with database.writing() as session:
+            await session.execute(text(raised))
+    told = trouble_of(caught.value)
+    assert words in told
+    assert bool(told) is bool(words)

@@ -6,11 +6,13 @@ crash between any two moments loses nothing and repeats nothing but the sending,
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from concurrent.futures import Executor
 from functools import partial
+from typing import Any
 
 import numpy as np
+import structlog
 
 from app.arrays import FloatArray
 from app.exploration.planner.ordered import OrderedPlanner
@@ -43,6 +45,11 @@ from app.missions.team import SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.queries import missions as mission_queries
+
+BEGIN_ANEW_S = 1.0
+"""After how long a part of the flight that failed begins anew, on the wall clock."""
+
+log = structlog.get_logger(__name__)
 
 
 class Runner:
@@ -98,14 +105,17 @@ class Runner:
         live.flight_begins()
         metrics.RUNNING.inc()
         keepers = [
-            asyncio.create_task(self._engagement.keep()),
-            asyncio.create_task(keep_time(live)),
-            asyncio.create_task(keep_telemetry(live, self._time_scale)),
-            asyncio.create_task(self._watch.keep()),
-            asyncio.create_task(self._withdrawals.keep()),
-            asyncio.create_task(self._onboard.keep()),
-            asyncio.create_task(self._keeping_off.keep()),
-            asyncio.create_task(self._giving_way.keep()),
+            asyncio.create_task(kept_going(keep))
+            for keep in (
+                self._engagement.keep,
+                partial(keep_time, live),
+                partial(keep_telemetry, live, self._time_scale),
+                self._watch.keep,
+                self._withdrawals.keep,
+                self._onboard.keep,
+                self._keeping_off.keep,
+                self._giving_way.keep,
+            )
         ]
         try:
             resumed = await self._recover()
@@ -216,6 +226,16 @@ class Runner:
                 WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
             )
         del member.ahead[:first]
+
+
+async def kept_going(keep: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Run what has to go on as long as a mission is flown; where it fails that is logged, and it begins anew."""
+    while True:
+        try:
+            return await keep()
+        except Exception:
+            log.exception("a part of the flight failed and begins anew", part=repr(keep))
+        await asyncio.sleep(BEGIN_ANEW_S)
 
 
 def nearest_leg(place_m: FloatArray, ends_m: FloatArray) -> int:

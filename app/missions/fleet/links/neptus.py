@@ -90,21 +90,17 @@ class _Fleet:
     crafts: list[_Craft]
     host: str
     heard_s: float
-    """By the wall clock: the panel gives no times."""
+    """When its last step came, by the wall clock: the panel gives no times."""
+    last_s: float
+    """When anything was heard of its panel, the event loop's time: the wall clock may be set meanwhile."""
     time_step: int = 0
     pending: int | None = None
     """The step that the panel waits to be answered."""
     superseded: bool = False
     prior: Sequence[tuple[int, int, float]] = ()
     """Cells of a prior map that the mission will hear of when it has begun."""
-    polled_s: float = 0.0
     timer: asyncio.TimerHandle | None = field(default=None, repr=False)
     stay: asyncio.TimerHandle | None = field(default=None, repr=False)
-
-    @property
-    def last_s(self) -> float:
-        """When anything was heard of its panel, by the wall clock."""
-        return max(self.heard_s, self.polled_s)
 
     @property
     def waits(self) -> bool:
@@ -163,7 +159,7 @@ class NeptusFleetLink(VisitedLink):
                 kind=self.kind,
                 state=craft.state,
                 reason=self._reason(craft.state),
-                age_s=time.time() - fleet.last_s,
+                age_s=_loop_s() - fleet.last_s,
                 address=fleet.host,
                 report=craft.report,
                 details={"session": fleet.session, "time step": str(fleet.time_step)},
@@ -233,7 +229,7 @@ class NeptusFleetLink(VisitedLink):
             self._settings.first_depth_m + index * self._settings.depth_separation_m for index in range(len(vehicles))
         ]
         crafts = [_Craft(name, LinkState.HEARD, depth_m=depth) for name, depth in zip(vehicles, depths, strict=True)]
-        fleet = self._fleets[session] = _Fleet(session, crafts, host, time.time(), time_step)
+        fleet = self._fleets[session] = _Fleet(session, crafts, host, time.time(), _loop_s(), time_step)
         if time_step:
             self._await_orders(fleet, time_step)
             for craft in crafts:
@@ -248,7 +244,7 @@ class NeptusFleetLink(VisitedLink):
         fleet = self._fleets[session]
         while True:
             limit_s = min(POLLS_STOP_S, self._lost_after_s) if fleet.waits else self._lost_after_s
-            left_s = fleet.last_s + limit_s - time.time()
+            left_s = fleet.last_s + limit_s - _loop_s()
             if left_s <= 0:
                 return
             await asyncio.sleep(min(left_s, POLLS_STOP_S))
@@ -286,7 +282,7 @@ class NeptusFleetLink(VisitedLink):
             self._sink(sounding)
         for sounding in self._soundings(fleet, data.soundings, since_s, now_s):
             self._sink(sounding)
-        fleet.heard_s, fleet.time_step = now_s, data.time_step
+        fleet.heard_s, fleet.last_s, fleet.time_step = now_s, _loop_s(), data.time_step
         if not answered:
             self._await_orders(fleet, data.time_step)
         for craft in fleet.crafts:
@@ -310,7 +306,7 @@ class NeptusFleetLink(VisitedLink):
         fleet = self._fleets.get(session)
         if fleet is None:
             return
-        fleet.polled_s = time.time()
+        fleet.last_s = _loop_s()
         for craft in fleet.crafts:
             if craft.state is LinkState.LOST and fleet.time_step and not fleet.superseded:
                 self._set_state(craft, LinkState.READY)
@@ -430,5 +426,9 @@ class NeptusFleetLink(VisitedLink):
         return "connected; no step yet: press START in the panel" if state is LinkState.HEARD else ""
 
     def _silent(self) -> Iterable[Visitor]:
-        limit_s = time.time() - self._lost_after_s
+        limit_s = _loop_s() - self._lost_after_s
         return [craft for fleet in self._fleets.values() if fleet.last_s < limit_s for craft in fleet.crafts]
+
+
+def _loop_s() -> float:
+    return asyncio.get_running_loop().time()

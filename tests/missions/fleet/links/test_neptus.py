@@ -6,6 +6,7 @@ import io
 import json
 import math
 import socket
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -16,9 +17,10 @@ import numpy as np
 import pytest
 
 from app.api.accounts.tokens import Role, TokenStore
-from app.missions.fleet.links.neptus import GATHER_S, gateway_settings
+from app.missions.fleet.links.neptus import GATHER_S, NeptusFleetLink, gateway_settings
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.settings import NeptusSettings
+from app.missions.spec.vehicle import VehicleKind
 from app.missions.states import MissionState
 from tests.support.missions.harbour import act, view_of
 from tests.support.missions.stored_soundings import soundings_of
@@ -277,6 +279,20 @@ async def test_the_same_step_uploaded_twice_is_one_step(gateway: Gateway) -> Non
     assert (await asyncio.to_thread(panel.send)).startswith("226")
     assert await asyncio.to_thread(panel.read) == first
     assert (await gateway.mission()).progress.step == 1
+
+
+async def test_a_clock_that_is_set_loses_no_panel(gateway: Gateway, monkeypatch: pytest.MonkeyPatch) -> None:
+    panel = panel_of(gateway)
+    await asyncio.to_thread(panel.connect)
+    await panel.fly()
+    link, true_time = gateway.service.hub._links[VehicleKind.NEPTUS], time.time
+    assert isinstance(link, NeptusFleetLink)
+    monkeypatch.setattr(time, "time", lambda: true_time() + 100_000.0)
+    assert not list(link._silent())
+    assert max(info.age_s for info in link.vehicles() if info.age_s is not None) < 60.0
+    mission = await gateway.mission()
+    monkeypatch.undo()
+    await act(gateway.service, mission.id, "abort")
 
 
 OTHER_FILES = [
