@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import structlog
+from sqlalchemy.exc import SQLAlchemyError
 
 from app.compute.compute import Compute
 from app.exploration.planners import INSTALLED
@@ -18,7 +19,7 @@ from app.missions import states
 from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import MissionElsewhereError
+from app.missions.errors import MissionElsewhereError, MissionNotFoundError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
@@ -277,7 +278,13 @@ class MissionService:
     async def _summary(self, mission_id: str) -> MissionSummary | None:
         try:
             return (await self.get(mission_id)).summary()
-        except MissionElsewhereError:
+        except (MissionElsewhereError, MissionNotFoundError):
+            return None
+        except (SQLAlchemyError, OSError):
+            raise
+        except Exception:
+            # One that cannot be read, as when a newer version wrote it, hides no other.
+            log.exception("a mission cannot be listed", mission=mission_id)
             return None
 
     async def get(self, mission_id: str) -> LiveMission:

@@ -57,6 +57,13 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
             f"{vehicle.sensor} has no swath, and planner {spec.planner.name!r} plans by swaths",
             f"give it sensor {Sensor.MULTIBEAM}, or the mission another planner",
         )
+    if vehicle.recovery_point is not None:
+        name = f"{prefix}recovery_point"
+        try:
+            spec.check_recovery_point(name, vehicle.recovery_point)
+        except ValueError as error:
+            words = str(error).removeprefix(name).strip()
+            raise InvalidRequestError(name, words, "give [longitude, latitude] of a place near the area") from None
     taken = {name for target in spec.targets for name in (target.name, target.called)}
     if vehicle.name in taken:
         raise InvalidRequestError(

@@ -104,6 +104,8 @@ class Failover:
                 await self._stand_aside()
             except (SQLAlchemyError, OSError) as error:
                 log.error("cannot look after the other processes", error=str(error))
+            except Exception:
+                log.exception("cannot look after the other processes")
 
     async def _take_up(self, missions: Sequence[str]) -> None:
         """Take up missions at sea that nobody has, as far as this process may."""
@@ -112,6 +114,12 @@ class Failover:
             try:
                 await self._registry.get(mission_id)
             except MissionElsewhereError:
+                continue
+            except (MembershipLostError, SQLAlchemyError, OSError):
+                raise  # that concerns all of them
+            except Exception:
+                # One that cannot be read, as when a newer version wrote it, is not the others' trouble.
+                log.exception("a mission cannot be taken up", mission=mission_id)
                 continue
             log.warning("mission taken up", mission=mission_id)
 

@@ -60,7 +60,7 @@ class MissionRegistry:
         self._live: dict[str, LiveMission] = {}
         # As they were when they left memory.
         self._left: dict[str, MissionSummary] = {}
-        # Known to exist, whoever has them: missions are never deleted while a service runs.
+        # Known to exist, whoever has them; another process may have deleted one meanwhile.
         self._seen: set[str] = set()
         self._loading = asyncio.Lock()
 
@@ -172,6 +172,7 @@ class MissionRegistry:
             await session.execute(delete(MissionRow).where(MissionRow.id == live.id))
             await site_queries.forget_survey(session, live.id)
         self._left.pop(live.id, None)
+        self._seen.discard(live.id)
         if self._live.pop(live.id, None) is not None:
             live.abandon("the mission was deleted")
         if self._ownership is not None:

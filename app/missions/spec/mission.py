@@ -3,6 +3,7 @@
 The REST schema, the command line's help and the dashboard's forms are all made from these models.
 """
 
+from collections.abc import Sequence
 from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, Any, Self
@@ -57,6 +58,10 @@ class PlannerSpec(Model):
 
     name: str = Field(default=DEFAULT_PLANNER, description="One of the planners of GET /api/v1/planners")
     options: PlannerOptions = Field(default_factory=PlannerOptions, description="Its settings")
+
+
+HALF_ROUND_DEG = 180.0
+"""An area that is wider crosses the line at which longitudes begin anew."""
 
 
 class MissionSpec(Model):
@@ -210,6 +215,37 @@ class MissionSpec(Model):
             )
         object.__setattr__(self, "steps", steps)
         return self
+
+    @model_validator(mode="after")
+    def _everything_is_near_the_area(self) -> Self:
+        lons, _ = zip(*self.area.ring, strict=True)
+        if max(lons) - min(lons) > HALF_ROUND_DEG:
+            raise ValueError(
+                f"area reaches from longitude {min(lons)} to {max(lons)}: one that crosses 180 degrees cannot be "
+                "surveyed; give the part on each side of it as a mission of its own"
+            )
+        places = {f"keep_out.{index}": zone.ring for index, zone in enumerate(self.keep_out)}
+        if self.search is not None:
+            for name in ("obstacles", "simulated_obstacles"):
+                standing: list[PolygonGeometry] = getattr(self.search, name)
+                places |= {f"search.{name}.{index}": obstacle.ring for index, obstacle in enumerate(standing)}
+            if self.search.transmitter is not None:
+                places["search.transmitter"] = [self.search.transmitter]
+        if not places or self._is_near([place for ring in places.values() for place in ring]):
+            return self
+        name, place = next((name, ring[0]) for name, ring in places.items() if not self._is_near(ring))
+        raise ValueError(
+            f"{name} is at {list(place)}, nowhere near the area: give [longitude, latitude], in that order"
+        )
+
+    def _is_near(self, places: Sequence[tuple[float, float]]) -> bool:
+        """Whether places, [longitude, latitude], can be told in the mission's frame."""
+        lons, lats = zip(*places, strict=True)
+        try:
+            self.frame().to_local(np.array(lats), np.array(lons))
+        except ValueError:
+            return False
+        return True
 
     @model_validator(mode="after")
     def _recovery_points_are_near_and_clear(self) -> Self:

@@ -83,19 +83,12 @@ class FailsafeWatch:
         self._range.take_currents()
         news: list[tuple[str, list[Active]]] = []
         for member in self._live.team:
-            member.way_home_m = self._range.way(member)
-            member.way_left_alone_m = self._range.way_left_alone(member)
-            member.return_needs_s = self._range.needs_s(member)
-            member.drift_reserve_s = self._range.drift_reserve_s(member)
-            member.turn_back_m = self._range.turn_back(member)
-            over = member.withdrawal is not None and member.withdrawal.over
-            detected = {} if over else self._detected(member) | too_close.get(member.name, {})
-            # Who waits at the surface to be taken out of the water is in ships' way, too.
-            detected |= self._ships_of(member)
-            found = self._waiting_below(member, now_s, self._judge(member, now_s, detected))
-            member.failsafes = found
-            self._act(member, found)
-            news.append((member.name, found))
+            try:
+                self._look_at(member, now_s, too_close.get(member.name, {}))
+            except Exception:
+                # Whatever cannot be told of one keeps nobody from looking after the others.
+                log.exception("the failsafes of a vehicle could not be looked at", vehicle=member.name)
+            news.append((member.name, member.failsafes))
         lost = self._all_lost()
         news.append((TEAM, self._judges.setdefault(TEAM, FailsafeJudge()).judge(lost, now_s)))
         # What is done waits for no line of the log: the database may be slow, or full.
@@ -104,6 +97,20 @@ class FailsafeWatch:
             await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=name)
         for name, found in news:
             await self._tell(name, found)
+
+    def _look_at(self, member: Member, now_s: float, too_close: dict[Failsafe, str]) -> None:
+        """Tell what a vehicle's way home takes, and do what its failsafes ask for."""
+        member.way_home_m = self._range.way(member)
+        member.way_left_alone_m = self._range.way_left_alone(member)
+        member.return_needs_s = self._range.needs_s(member)
+        member.drift_reserve_s = self._range.drift_reserve_s(member)
+        member.turn_back_m = self._range.turn_back(member)
+        over = member.withdrawal is not None and member.withdrawal.over
+        detected = {} if over else self._detected(member) | too_close
+        # Who waits at the surface to be taken out of the water is in ships' way, too.
+        detected |= self._ships_of(member)
+        member.failsafes = self._waiting_below(member, now_s, self._judge(member, now_s, detected))
+        self._act(member, member.failsafes)
 
     def _judge(self, member: Member, now_s: float, detected: dict[Failsafe, str]) -> list[Active]:
         judge = self._judges.get(member.name)
