@@ -107,6 +107,9 @@ class BathymetricMap:
         mean.
     horizontal_sd_m
         Of each horizontal coordinate of a cell's soundings, NaN without any. None: it is not known.
+    shared_sd_m
+        The part of ``sd_m`` that a cell's soundings share, so that more of them do not average it out: NaN without any.
+        None: it is not known apart.
     """
 
     grid: Grid
@@ -122,6 +125,7 @@ class BathymetricMap:
     bound_sd_m: FloatArray | None = None
     precision: FloatArray | None = None
     horizontal_sd_m: FloatArray | None = None
+    shared_sd_m: FloatArray | None = None
 
     @property
     def planning_sd_m(self) -> FloatArray:

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from app.arrays import FloatArray
 from app.mapping.swath.density import DensityGrid
@@ -28,6 +30,7 @@ def swept(grid: Grid, mask: np.ndarray, seed: int = 0, number: int = 4000) -> tu
 
 
 def mapped(grid: Grid, mask: np.ndarray, soundings: FloatArray) -> BathymetricMap:
+    """The map of soundings (n, 4), or (n, 5) with what they share, or (n, 6) with the deviation of their places."""
     density = DensityGrid(grid, mask)
     density.add(*soundings.T)
     found = gridded_map(density)
@@ -58,6 +61,71 @@ def test_larger_cells_hold_what_their_soundings_make(times: int) -> None:
     assert np.isnan(made.depth_m[~made.sounded]).all(), "a cell without soundings has no depth"
     twice = coarsened(made, 2)
     np.testing.assert_allclose(twice.sd_m, coarsened(bathymetry, 2 * times).sd_m, rtol=1e-6)
+
+
+def slow_sd_m(soundings: FloatArray, times: int, rows: int, cols: int) -> FloatArray:
+    """The deviation of each larger cell, one sounding after the other; the smaller cells are squares of 1 m from 0, 0."""
+    found = np.full((rows, cols), np.nan)
+    for row in range(rows):
+        for col in range(cols):
+            here = [one for one in soundings if (one[0] // times, one[1] // times) == (col, row)]
+            if not here:
+                continue
+            weights = [1.0 / sd**2 for _, _, _, sd, _ in here]
+            mean = sum(weight * one[2] for weight, one in zip(weights, here, strict=True)) / sum(weights)
+            spread = sum(weight * (one[2] - mean) ** 2 for weight, one in zip(weights, here, strict=True))
+            shared = sum(weight * one[4] ** 2 for weight, one in zip(weights, here, strict=True))
+            found[row, col] = np.sqrt((1.0 + spread / len(here) + shared) / sum(weights))
+    return found
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    number=st.integers(1, 120),
+    times=st.sampled_from([1, 2, 3, 4, 8, 32]),
+    shared_m=st.floats(0.0, 1.0),
+)
+def test_what_a_cell_s_soundings_share_is_as_large_in_larger_cells(
+    seed: int, number: int, times: int, shared_m: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    east, north = rng.uniform(0.0, 11.0, number), rng.uniform(0.0, 9.0, number)
+    sd, shared = rng.uniform(0.05, 0.4, number), shared_m * rng.uniform(0.5, 1.5, number)
+    soundings = np.column_stack([east, north, 20.0 + 0.5 * east + rng.standard_normal(number), sd, shared])
+    made = coarsened(mapped(Grid(0.0, 0.0, 1.0, 9, 11), np.ones((9, 11), dtype=bool), soundings), times)
+    rows, cols = made.depth_m.shape
+    direct = mapped(made.grid, np.ones((rows, cols), dtype=bool), soundings)
+    np.testing.assert_allclose(made.sd_m, np.where(direct.sounded, direct.sd_m, np.nan), rtol=1e-6)
+    np.testing.assert_allclose(made.sd_m, slow_sd_m(soundings, times, rows, cols), rtol=1e-6)
+
+
+@pytest.mark.parametrize("times", [2, 4, 8])
+def test_uncertain_places_on_a_slope_are_as_uncertain_in_larger_cells(times: int) -> None:
+    rng = np.random.default_rng(0)
+    east, north = rng.uniform(0.0, 96.0, (2, 200_000))
+    same = np.ones(len(east))
+    soundings = np.column_stack([east, north, 10.0 + 0.4 * east, 0.1 * same, 0.05 * same, 1.5 * same])
+    made = coarsened(mapped(Grid(0.0, 0.0, 1.0, 96, 96), np.ones((96, 96), dtype=bool), soundings), times)
+    side = 96 // times
+    direct = mapped(made.grid, np.ones((side, side), dtype=bool), soundings)
+    # Beside the edge slopes are smoothed over fewer cells; where soundings lie in a cell makes a slope a little uneven.
+    inner = (slice(3, -3), slice(3, -3))
+    np.testing.assert_allclose(made.sd_m[inner], direct.sd_m[inner], rtol=0.02)
+    assert made.sd_m.min() > 0.4 * 1.5 * 0.6
+    assert made.horizontal_sd_m is not None
+    assert direct.horizontal_sd_m is not None
+    np.testing.assert_allclose(made.horizontal_sd_m, direct.horizontal_sd_m)
+
+
+def test_what_an_earlier_version_stored_is_not_averaged_at_all() -> None:
+    rng = np.random.default_rng(0)
+    east, north = rng.uniform(0.0, 32.0, (2, 20_000))
+    same = np.ones(len(east))
+    soundings = np.column_stack([east, north, 10.0 * same, 0.05 * same, 0.1 * same])
+    bathymetry = mapped(Grid(0.0, 0.0, 1.0, 32, 32), np.ones((32, 32), dtype=bool), soundings)
+    made = coarsened(replace(bathymetry, shared_sd_m=None), 8)
+    assert (made.sd_m >= 0.1).all()
+    np.testing.assert_allclose(coarsened(coarsened(replace(bathymetry, shared_sd_m=None), 2), 4).sd_m, made.sd_m)
 
 
 def test_errors_that_belong_together_are_not_averaged_away() -> None:

@@ -56,6 +56,7 @@ def fuse(measured: BathymetricMap, prior: BathymetricMap) -> BathymetricMap:
         bound_sd_m=_together(measured.claim_sd_m * distrust, prior.claim_sd_m),
         prior=prior.prior,
         precision=None,
+        shared_sd_m=None,
         model=f"{measured.model}; with imported soundings ({prior.model})",
     )
 

@@ -35,12 +35,13 @@ def gridded_map(density: DensityGrid) -> BathymetricMap | None:
     count = density.count
     with np.errstate(divide="ignore", invalid="ignore"):
         sd = np.hypot(sd, spread / np.sqrt(np.maximum(count, 1)))
-    sd, aside = np.hypot(sd, density.shared_sd_m), density.horizontal_sd_m
+    aside = density.horizontal_sd_m
     sounded = count > 0
     away, nearest = distance_transform_edt(~sounded, return_indices=True)
     away_m = away * density.grid.cell_m
     at = tuple(nearest)
-    sd = np.hypot(sd[at], aside[at] * gradient(depth[at], density.grid.cell_m))
+    shared = np.hypot(density.shared_sd_m[at], aside[at] * gradient(depth[at], density.grid.cell_m))
+    sd = np.hypot(sd[at], shared)
     depth = _inside(depth[at], mask)
     sd = _inside(np.hypot(sd, GUESS_GROWTH * away_m), mask)
     bound = np.where(away <= BRIDGED_CELLS, sd, np.inf)
@@ -61,6 +62,7 @@ def gridded_map(density: DensityGrid) -> BathymetricMap | None:
         bound_sd_m=_inside(bound, mask),
         precision=np.where(mask, density.precision, 0.0),
         horizontal_sd_m=np.where(sounded & mask, aside, np.nan) if np.nanmax(aside) > 0.0 else None,
+        shared_sd_m=np.where(sounded & mask, shared, np.nan),
     )
 
 

@@ -10,7 +10,7 @@ from app.mapping.types import BathymetricMap, Grid
 from app.missions.maps.builder import BuiltMap, Doubted, digest_of
 
 LAYERS = ("depth_m", "sd_m", "count", "sounded", "roughness")
-OPTIONAL = ("prior", "process_sd_m", "bound_sd_m", "precision", "horizontal_sd_m")
+OPTIONAL = ("prior", "process_sd_m", "bound_sd_m", "precision", "horizontal_sd_m", "shared_sd_m")
 FASTEST = 1
 """Depths hardly get smaller; what lies outside of the area does at any level."""
 

@@ -92,6 +92,8 @@ def test_what_soundings_share_is_not_averaged_out() -> None:
     assert np.allclose(bathymetry.sd_m, np.hypot(0.05 / np.sqrt(50), 0.06))
     assert bathymetry.horizontal_sd_m is not None
     assert np.allclose(bathymetry.horizontal_sd_m, 1.5)
+    assert bathymetry.shared_sd_m is not None
+    assert np.allclose(bathymetry.shared_sd_m, 0.06)
 
 
 def test_on_a_slope_an_uncertain_place_is_an_uncertain_depth() -> None:
@@ -101,6 +103,8 @@ def test_on_a_slope_an_uncertain_place_is_an_uncertain_depth() -> None:
     density.add(east, north, 10.0 + 0.3 * east, 0.05 * same, 0.0 * same, 1.5 * same)
     bathymetry = made(density)
     assert np.allclose(bathymetry.sd_m[5:-5, 5:-5], np.hypot(0.05, 0.3 * 1.5), rtol=1e-3)
+    assert bathymetry.shared_sd_m is not None
+    assert np.allclose(bathymetry.shared_sd_m[5:-5, 5:-5], 0.3 * 1.5, rtol=1e-3), "its soundings share the slope"
 
 
 def test_without_a_word_on_places_nothing_is_said_of_them() -> None:

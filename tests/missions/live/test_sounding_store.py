@@ -42,7 +42,8 @@ async def mapped(service: MissionService, count: int = 80) -> str:
 def test_a_map_comes_back_as_it_was_and_no_other() -> None:
     built = built_of(soundings(60)).newest
     assert built is not None
-    for bathymetry in (built.map, replace(built.map, prior=built.map.sounded, precision=built.map.sd_m**-2)):
+    layers = dict.fromkeys(("precision", "shared_sd_m", "horizontal_sd_m"), built.map.sd_m)
+    for bathymetry in (built.map, replace(built.map, prior=built.map.sounded, **layers)):
         content = pack(bathymetry, [(np.arange(4.0), "a fish")])
         again, doubted = unpack(content, built.digest, 60, thorough=True)
         for name in (*LAYERS, *OPTIONAL):
