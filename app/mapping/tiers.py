@@ -97,33 +97,43 @@ def tiers(bathymetry: BathymetricMap, cell_of_depth: float) -> list[Tier]:
 def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
     """Return the map of cells so many times as large, from the same corner; without soundings they have no depth.
 
-    Where the map has the precision of its cells, this is the very map that its soundings make in the larger ones.
-    Elsewhere the cells' errors belong together: their depths and deviations are averaged.
+    Where the map has the precision of its cells, this is the very map that its soundings make in the larger ones, but
+    for the slopes on which places are uncertain: they remain those of the smaller cells. What a cell's soundings share
+    is not averaged out; where the map does not tell it apart, as one that an earlier version stored, that is all but
+    the precision. Without precision the cells' errors belong together: their depths and deviations are averaged.
     """
     grid, precision = bathymetry.grid, bathymetry.precision
     fine = _sounded(bathymetry)
     found = _any(fine, times)
     count = _total(np.where(fine, bathymetry.count, 0), times).astype(np.int64)
     weight = np.where(fine, 1.0 if precision is None else precision, 0.0)
-    depth, sd = (np.where(fine, layer, 0.0) for layer in (bathymetry.depth_m, bathymetry.sd_m))
     total = np.where(found, _total(weight, times), np.nan)
-    mean = _total(weight * depth, times) / total
+
+    def mean(layer: FloatArray) -> FloatArray:
+        """Return the means weighted by the soundings' precision, where it is known."""
+        return np.asarray(_total(np.where(fine, weight * layer, 0.0), times) / total)
+
+    depth, horizontal = mean(bathymetry.depth_m), bathymetry.horizontal_sd_m
+    shared: FloatArray | None = None
     if precision is None:
-        deviation = _total(sd, times) / total
+        deviation = mean(bathymetry.sd_m)
     else:
-        # The map's deviation is that of the mean, and the spread that so many soundings do not average out.
+        # The map's deviation is that of the mean, the spread that so many soundings do not average out, and what
+        # they share.
         with np.errstate(divide="ignore"):
-            spread = np.maximum(sd**2 - 1.0 / precision, 0.0) * bathymetry.count
-        apart = depth - _finer(mean, times, fine)
-        variance = _total(np.where(fine, weight * (spread + apart**2), 0.0), times) / total
-        deviation = np.sqrt(1.0 / total + variance / np.maximum(count, 1))
+            beside = np.maximum(bathymetry.sd_m**2 - 1.0 / precision, 0.0)
+        alike = beside if bathymetry.shared_sd_m is None else bathymetry.shared_sd_m**2
+        spread = np.maximum(beside - alike, 0.0) * bathymetry.count
+        apart = bathymetry.depth_m - _finer(depth, times, fine)
+        shared = np.sqrt(mean(alike))
+        deviation = np.sqrt(1.0 / total + mean(spread + apart**2) / np.maximum(count, 1) + shared**2)
     area = np.isfinite(bathymetry.roughness)
     with np.errstate(invalid="ignore"):
         roughness = _total(np.nan_to_num(bathymetry.roughness), times) / _total(area, times)
     cell_m = grid.cell_m * times
     return BathymetricMap(
         grid=Grid(grid.west_m, grid.south_m, cell_m, *found.shape),
-        depth_m=mean,
+        depth_m=depth,
         sd_m=deviation,
         count=count,
         sounded=found,
@@ -131,6 +141,8 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
         correlation_length_m=max(bathymetry.correlation_length_m, 5.0 * cell_m),
         model=bathymetry.model,
         precision=None if precision is None else np.where(found, total, 0.0),
+        horizontal_sd_m=None if horizontal is None else np.sqrt(mean(horizontal**2)),
+        shared_sd_m=shared,
     )
 
 
@@ -140,6 +152,10 @@ def _sounded(bathymetry: BathymetricMap) -> BoolArray:
 
 def _only(bathymetry: BathymetricMap, cells: BoolArray) -> BathymetricMap:
     """Return a map with depths in some of its cells alone."""
+
+    def inside(layer: FloatArray | None) -> FloatArray | None:
+        return None if layer is None else np.where(cells, layer, np.nan)
+
     return replace(
         bathymetry,
         depth_m=np.where(cells, bathymetry.depth_m, np.nan),
@@ -148,6 +164,8 @@ def _only(bathymetry: BathymetricMap, cells: BoolArray) -> BathymetricMap:
         sounded=bathymetry.sounded & cells,
         roughness=np.where(cells, bathymetry.roughness, np.nan),
         precision=None if bathymetry.precision is None else np.where(cells, bathymetry.precision, 0.0),
+        horizontal_sd_m=inside(bathymetry.horizontal_sd_m),
+        shared_sd_m=inside(bathymetry.shared_sd_m),
     )
 
 
