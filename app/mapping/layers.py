@@ -1,7 +1,7 @@
 """The layers of a map, each declared once: files, tiles, REST and the dashboard show what stands in ``LAYERS``."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -13,7 +13,7 @@ from app.mapping.shoals import shoal_chance
 from app.mapping.swath.density import LEAST_SOUNDINGS
 from app.mapping.swath.gridded import area_of, is_of_swaths
 from app.mapping.tiers import asked_of, by_depth
-from app.mapping.types import BathymetricMap
+from app.mapping.types import CHARTED_SD, BathymetricMap
 
 INTERPOLATED, SOUNDED, PRIOR = 0, 1, 2
 """Values of the layer ``sounded``; the latter two are bits of the layer ``flags``, too."""
@@ -377,6 +377,11 @@ LAYERS = {
 
 
 def file_layers(source: LayerSource) -> list[Layer]:
-    """Return the layers that a file with every layer has; those that the mission has none of are left out."""
-    made = (kind.of(source) for kind in LAYERS.values() if kind.in_files)
-    return [layer for layer in made if layer is not None]
+    """Return the layers that a file with every layer has; those that the mission has none of are left out.
+
+    Their uncertainty is that of charted depths, as in every other file.
+    """
+    whole = replace(source, map=source.map.charted(source.common_sd_m), common_sd_m=0.0)
+    made = (kind.of(whole) for kind in LAYERS.values() if kind.in_files)
+    found = [layer for layer in made if layer is not None]
+    return [replace(layer, meaning=CHARTED_SD) if layer.name == "uncertainty" else layer for layer in found]

@@ -1,6 +1,6 @@
 """Grids, soundings and maps: the data that passes between mapping and its users."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,6 +8,9 @@ from app.arrays import BoolArray, FloatArray, IntArray
 
 SoundingRows = FloatArray
 """Soundings as rows, shape (n, 4): east, north, depth, standard deviation in metres."""
+
+CHARTED_SD = "one standard deviation of the depth, that of what all soundings share, such as the tide, included"
+"""What the deviations of :meth:`BathymetricMap.charted` are, as files say it."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,27 @@ class BathymetricMap:
     def claim_sd_m(self) -> FloatArray:
         """The deviation that claims are made by, (rows, cols)."""
         return self.sd_m if self.bound_sd_m is None else self.bound_sd_m
+
+    def charted(self, common_sd_m: float) -> "BathymetricMap":
+        """Return the map with the deviations of charted depths, as every file states them.
+
+        Parameters
+        ----------
+        common_sd_m
+            Standard deviation of what all soundings share, as an uncertain water level: no deviation of the map itself
+            holds it.
+        """
+
+        def whole(sd_m: FloatArray | None) -> FloatArray | None:
+            return None if sd_m is None else np.asarray(np.hypot(sd_m, common_sd_m))
+
+        return replace(
+            self,
+            sd_m=np.hypot(self.sd_m, common_sd_m),
+            process_sd_m=whole(self.process_sd_m),
+            bound_sd_m=whole(self.bound_sd_m),
+            shared_sd_m=whole(self.shared_sd_m),
+        )
 
     def known(self, accuracy_m: float) -> BoolArray:
         """Return which cells are known to an accuracy and supported by soundings, (rows, cols)."""

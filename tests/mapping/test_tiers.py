@@ -64,7 +64,7 @@ def test_larger_cells_hold_what_their_soundings_make(times: int) -> None:
 
 
 def slow_sd_m(soundings: FloatArray, times: int, rows: int, cols: int) -> FloatArray:
-    """The deviation of each larger cell, one sounding after the other; smaller cells are of 1 m, from 0, 0 on."""
+    """The deviation of each larger cell, one sounding after the other; the small cells are of 1 m, from 0, 0."""
     found = np.full((rows, cols), np.nan)
     for row in range(rows):
         for col in range(cols):

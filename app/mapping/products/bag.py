@@ -7,26 +7,32 @@ from pathlib import Path
 import h5py
 import numpy as np
 import rasterio
+from numpy.typing import NDArray
 from rasterio.crs import CRS
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.geotiff import north_up_transform
-from app.mapping.types import BathymetricMap
+from app.mapping.types import CHARTED_SD, BathymetricMap
 from app.mapping.water.vertical import VerticalDatum
 
 NODATA = 1_000_000.0
 """What the format prescribes for cells without a value."""
 
 
-def bag(bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: VerticalDatum, title: str) -> bytes:
+def bag(
+    bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: VerticalDatum, title: str, common_sd_m: float
+) -> bytes:
     """Return a BAG with elevation (positive up: minus the depth), its standard deviation and numbers of soundings.
 
-    The vertical datum stands in the metadata; the library would call it unknown.
+    The deviation includes ``common_sd_m``, that of what all soundings share. Cells without a sounding have their
+    predicted depths: the metadata tell how many. The vertical datum stands there, too; the library would call it
+    unknown.
     """
     grid = bathymetry.grid
+    count = np.where(np.isfinite(bathymetry.depth_m), bathymetry.count, 0).astype("<u4")
     layers = [
         np.where(np.isfinite(layer), layer, NODATA).astype(np.float32)[::-1]
-        for layer in (-bathymetry.depth_m, bathymetry.sd_m)
+        for layer in (-bathymetry.depth_m, bathymetry.charted(common_sd_m).sd_m)
     ]
     # HDF5 writes to real files only.
     with tempfile.TemporaryDirectory(prefix="bathyfleet-") as folder:
@@ -44,7 +50,7 @@ def bag(bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: Vertic
             nodata=NODATA,
             VAR_VERT_WKT=vertical_datum.crs.to_wkt("WKT1_GDAL"),
             VAR_ABSTRACT=f"{title}. Elevations are minus the depth below {vertical_datum.statement}. "
-            f"Uncertainty is one standard deviation. {bathymetry.model}",
+            f"Uncertainty is {CHARTED_SD}. {_predicted(bathymetry, count)} {bathymetry.model}",
             VAR_INDIVIDUAL_NAME="bathyfleet",
             VAR_PROCESS_STEP_DESCRIPTION=f"Made of soundings: {bathymetry.model}",
         ) as file:
@@ -52,7 +58,15 @@ def bag(bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: Vertic
                 file.write(layer, number)
         content = io.BytesIO(path.read_bytes())
     with h5py.File(content, "r+") as file:
-        count = np.where(np.isfinite(bathymetry.depth_m), bathymetry.count, 0).astype("<u4")
         numbers = file["BAG_root"].create_dataset("num_soundings", data=count, chunks=True, compression="gzip")
         numbers.attrs["min_num_soundings"], numbers.attrs["max_num_soundings"] = count.min(), count.max()
     return content.getvalue()
+
+
+def _predicted(bathymetry: BathymetricMap, count: NDArray[np.uint32]) -> str:
+    """Return a sentence on the cells that have a depth and no sounding."""
+    known = np.isfinite(bathymetry.depth_m)
+    predicted = int((known & (count == 0)).sum())
+    if not predicted:
+        return "Every cell with an elevation was sounded."
+    return f"In {predicted} of {int(known.sum())} cells with an elevation num_soundings is 0: there it is predicted."

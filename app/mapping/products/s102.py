@@ -153,7 +153,7 @@ def s102(
             instance = file.create_group(f"{name}/{name}.01")
             _write_place(instance, cells.grid)
             instance.create_group("Group_001")
-        sd_m = np.hypot(bathymetry.sd_m, survey.common_sd_m)
+        sd_m = bathymetry.charted(survey.common_sd_m).sd_m
         _write_depths(file[f"{CELLS}/{CELLS}.01/Group_001"], cells, bathymetry.depth_m, sd_m)
         _write_quality(file[QUALITY], bathymetry.sounded, cells, survey)
     return content.getvalue()

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.types import BathymetricMap, Soundings
+from app.mapping.types import CHARTED_SD, BathymetricMap, Soundings
 
 
 def map_xyz(
@@ -14,14 +14,15 @@ def map_xyz(
     frame: LocalFrame,
     *,
     vertical_datum: str,
+    common_sd_m: float,
     geographic: bool = False,
     sounded_only: bool = False,
 ) -> bytes:
     """Return the cells as XYZ text, south-west to north-east; cells without depth are left out.
 
-    Columns after a comment header: position, depth (positive down), standard deviation, count, sounded (1 or
-    0). Positions are cell centres: east and north of the local frame, or longitude and latitude when
-    ``geographic``.
+    Columns after a comment header: position, depth (positive down), standard deviation with ``common_sd_m`` of what all
+    soundings share, count, sounded (1 or 0). Positions are cell centres: east and north of the local frame, or
+    longitude and latitude when ``geographic``.
     """
     keep = np.isfinite(bathymetry.depth_m)
     if sounded_only:
@@ -30,14 +31,14 @@ def map_xyz(
     x, y, names, digits = _positions(east, north, frame, geographic)
     header = (
         f"{names} depth_m sd_m count sounded\n"
-        f"depth positive down, vertical datum: {vertical_datum}\n{_frame_line(frame, geographic)}"
+        f"depth positive down, vertical datum: {vertical_datum}\nsd_m: {CHARTED_SD}\n{_frame_line(frame, geographic)}"
     )
     rows = np.column_stack(
         [
             x,
             y,
             bathymetry.depth_m[keep],
-            bathymetry.sd_m[keep],
+            bathymetry.charted(common_sd_m).sd_m[keep],
             bathymetry.count[keep],
             bathymetry.sounded[keep],
         ]
@@ -54,7 +55,9 @@ def soundings_xyz(
     """
     x, y, names, digits = _positions(soundings.east_m, soundings.north_m, frame, geographic)
     header = (
-        f"{names} depth_m sd_m\ndepth positive down, vertical datum: {vertical_datum}\n{_frame_line(frame, geographic)}"
+        f"{names} depth_m sd_m\ndepth positive down, vertical datum: {vertical_datum}\n"
+        "sd_m: of each sounding by itself, without what all soundings share, such as the tide\n"
+        f"{_frame_line(frame, geographic)}"
     )
     rows = np.column_stack([x, y, soundings.depth_m, soundings.sd_m])
     return _text(rows, header if headed else "", [digits, digits, "%.3f", "%.3f"], " ")

@@ -51,11 +51,13 @@ def vr_bag(
     *,
     vertical_datum: VerticalDatum,
     title: str,
+    common_sd_m: float,
 ) -> bytes:
     """Return a BAG whose coarse cells are refined by what the shoalest sounded depth in each asks for.
 
-    Elevations are minus the depth. Cells without a sounding are empty, coarse and refined ones. The numbers of
-    soundings stand in the layer of samples, of one hypothesis each.
+    Elevations are minus the depth; their deviations include ``common_sd_m``, that of what all soundings share. Cells
+    without a sounding are empty, coarse and refined ones. The numbers of soundings stand in the layer of samples, of
+    one hypothesis each.
 
     Raises
     ------
@@ -69,9 +71,10 @@ def vr_bag(
     times = max(REFINED_CELLS, 2 ** int(number.max()))
     coarse = coarsened(bathymetry, times)
     shoalest = _least(np.where(np.isfinite(depth), number, np.iinfo(np.int64).max), times)
-    refinements, nodes, samples = _refine(bathymetry, times, shoalest, coarse.sounded)
+    refinements, nodes, samples = _refine(bathymetry, times, shoalest, coarse.sounded, common_sd_m)
 
-    content = io.BytesIO(bag(coarse, frame, vertical_datum=vertical_datum, title=title))
+    made = bag(coarse, frame, vertical_datum=vertical_datum, title=title, common_sd_m=common_sd_m)
+    content = io.BytesIO(made)
     with h5py.File(content, "r+") as file:
         root = file["BAG_root"]
         layer = root.create_dataset("varres_metadata", data=refinements, chunks=refinements.shape, compression="gzip")
@@ -92,7 +95,7 @@ def vr_bag(
 
 
 def _refine(
-    bathymetry: BathymetricMap, times: int, number: IntArray, refined: BoolArray
+    bathymetry: BathymetricMap, times: int, number: IntArray, refined: BoolArray, common_sd_m: float
 ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.void]]:
     """Return where the refinement of each coarse cell, (rows, cols), begins, and of all in a row the nodes and samples.
 
@@ -110,7 +113,7 @@ def _refine(
         found[f"sw_corner_{axis}"] = np.where(refined, 0.5 * cell_m, -1.0)
     nodes, samples = (np.zeros(int((sides**2).sum()), kind) for kind in (NODE, SAMPLES))
     for side in np.unique(sides[refined]).tolist():
-        tier = coarsened(bathymetry, times // side)
+        tier = coarsened(bathymetry, times // side).charted(common_sd_m)
         at = begins[sides == side][:, None] + np.arange(side**2)
         for row, name, layer in (
             (nodes, "depth", np.where(tier.sounded, -tier.depth_m, NODATA)),

@@ -190,7 +190,13 @@ def _netcdf(material: Material, options: ProductOptions) -> bytes:
 
 def _bag(material: Material, _: ProductOptions) -> bytes:
     facts = material.facts
-    return bag(material.snapshot.built.map, facts.frame, vertical_datum=facts.vertical_datum, title=facts.title)
+    return bag(
+        material.snapshot.built.map,
+        facts.frame,
+        vertical_datum=facts.vertical_datum,
+        title=facts.title,
+        common_sd_m=facts.common_sd_m,
+    )
 
 
 def _s102(material: Material, _: ProductOptions) -> bytes:
@@ -219,7 +225,14 @@ def _s102(material: Material, _: ProductOptions) -> bytes:
 def _vr_bag(material: Material, _: ProductOptions) -> bytes:
     facts, bathymetry = material.facts, material.snapshot.built.map
     share = _cell_of_depth(material)
-    return vr_bag(bathymetry, share, facts.frame, vertical_datum=facts.vertical_datum, title=facts.title)
+    return vr_bag(
+        bathymetry,
+        share,
+        facts.frame,
+        vertical_datum=facts.vertical_datum,
+        title=facts.title,
+        common_sd_m=facts.common_sd_m,
+    )
 
 
 def _tiers(material: Material, options: ProductOptions) -> bytes:
@@ -249,7 +262,14 @@ def _cell_of_depth(material: Material) -> float:
 
 
 def _map_xyz(material: Material, _: ProductOptions) -> bytes:
-    return map_xyz(material.snapshot.built.map, material.facts.frame, vertical_datum=material.datum, geographic=True)
+    facts = material.facts
+    return map_xyz(
+        material.snapshot.built.map,
+        facts.frame,
+        vertical_datum=material.datum,
+        common_sd_m=facts.common_sd_m,
+        geographic=True,
+    )
 
 
 def _map_geojson(material: Material, options: ProductOptions) -> bytes:

@@ -219,7 +219,8 @@ def _map_png(site: SiteMap) -> bytes:
 
 
 def _map_xyz(site: SiteMap) -> bytes:
-    return map_xyz(site.bathymetry, site.facts.frame, vertical_datum=site.datum.statement)
+    # What a survey's soundings share is in the deviations of a site already.
+    return map_xyz(site.bathymetry, site.facts.frame, vertical_datum=site.datum.statement, common_sd_m=0.0)
 
 
 def _changes_tif(change: SiteChange) -> bytes:

@@ -111,7 +111,7 @@ def test_netcdf_is_a_raster_to_gdal(bathymetry: BathymetricMap, tmp_path: Path) 
 
 def test_bag_states_its_datum_and_holds_elevations(bathymetry: BathymetricMap, tmp_path: Path) -> None:
     path = tmp_path / "map.bag"
-    path.write_bytes(bag(bathymetry, FRAME, vertical_datum=LAT, title=TITLE))
+    path.write_bytes(bag(bathymetry, FRAME, vertical_datum=LAT, title=TITLE, common_sd_m=0.0))
     with rasterio.open(path) as file:
         assert file.descriptions == ("elevation", "uncertainty", "num_soundings")
         np.testing.assert_array_equal(

@@ -106,7 +106,7 @@ def test_geotiff_lies_where_the_frame_says_below_the_stated_datum(bathymetry: Ba
 
 
 def test_xyz_holds_the_known_cells(bathymetry: BathymetricMap) -> None:
-    text = map_xyz(bathymetry, FRAME, vertical_datum=DATUM)
+    text = map_xyz(bathymetry, FRAME, vertical_datum=DATUM, common_sd_m=0.0)
     rows = np.loadtxt(io.BytesIO(text), comments="#")
     known = np.isfinite(bathymetry.depth_m)
     np.testing.assert_allclose(rows[:, 2], bathymetry.depth_m[known], atol=5e-4)
@@ -115,7 +115,7 @@ def test_xyz_holds_the_known_cells(bathymetry: BathymetricMap) -> None:
 
 
 def test_xyz_of_sounded_cells_only_in_degrees(bathymetry: BathymetricMap) -> None:
-    text = map_xyz(bathymetry, FRAME, vertical_datum=DATUM, geographic=True, sounded_only=True)
+    text = map_xyz(bathymetry, FRAME, vertical_datum=DATUM, geographic=True, sounded_only=True, common_sd_m=0.0)
     rows = np.loadtxt(io.BytesIO(text), comments="#")
     assert len(rows) == 30
     assert np.all(rows[:, 5] == 1)

@@ -43,7 +43,7 @@ def bathymetry() -> BathymetricMap:
 @pytest.fixture
 def path(bathymetry: BathymetricMap, tmp_path: Path) -> Path:
     made = tmp_path / "map.bag"
-    made.write_bytes(vr_bag(bathymetry, SHARE, FRAME, vertical_datum=LAT, title="Slope"))
+    made.write_bytes(vr_bag(bathymetry, SHARE, FRAME, vertical_datum=LAT, title="Slope", common_sd_m=0.0))
     return made
 
 
@@ -109,7 +109,7 @@ def test_a_map_smaller_than_a_coarse_cell_is_one_supergrid() -> None:
     density.add(np.array([1.0]), np.array([1.0]), np.array([12.5]), np.array([0.1]))
     small = gridded_map(density)
     assert small is not None
-    with h5py.File(io.BytesIO(vr_bag(small, SHARE, FRAME, vertical_datum=LAT, title="x"))) as file:
+    with h5py.File(io.BytesIO(vr_bag(small, SHARE, FRAME, vertical_datum=LAT, title="x", common_sd_m=0.0))) as file:
         nodes = file["BAG_root/varres_refinements"]["depth"][0]
     assert (len(nodes), nodes[0], np.unique(nodes[1:]).tolist()) == (REFINED_CELLS**2, -12.5, [NODATA])
 
@@ -121,4 +121,4 @@ def test_a_map_without_soundings_is_refused(bathymetry: BathymetricMap) -> None:
     assert alone is not None
     alone.sounded[:] = False
     with pytest.raises(ValueError, match="sounded"):
-        vr_bag(alone, SHARE, FRAME, vertical_datum=LAT, title="x")
+        vr_bag(alone, SHARE, FRAME, vertical_datum=LAT, title="x", common_sd_m=0.0)

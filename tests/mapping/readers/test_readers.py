@@ -66,8 +66,8 @@ def own_product(kind: str) -> bytes:
         created = __import__("datetime").datetime(2026, 1, 1)
         return netcdf(bathymetry, layers, FRAME, vertical_datum=datum, title="t", created=created)
     if kind == "bag":
-        return bag(bathymetry, FRAME, vertical_datum=datum, title="t")
-    return map_xyz(bathymetry, FRAME, vertical_datum="LAT", geographic=True)
+        return bag(bathymetry, FRAME, vertical_datum=datum, title="t", common_sd_m=0.0)
+    return map_xyz(bathymetry, FRAME, vertical_datum="LAT", geographic=True, common_sd_m=0.0)
 
 
 @pytest.mark.parametrize("kind", ["tif", "nc", "bag", "xyz"])

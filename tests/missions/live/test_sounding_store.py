@@ -42,8 +42,8 @@ async def mapped(service: MissionService, count: int = 80) -> str:
 def test_a_map_comes_back_as_it_was_and_no_other() -> None:
     built = built_of(soundings(60)).newest
     assert built is not None
-    sd_m = built.map.sd_m
-    full = replace(built.map, prior=built.map.sounded, precision=sd_m**-2, shared_sd_m=sd_m, horizontal_sd_m=sd_m)
+    sd = built.map.sd_m
+    full = replace(built.map, prior=built.map.sounded, precision=sd**-2, shared_sd_m=sd, horizontal_sd_m=2.0 * sd)
     for bathymetry in (built.map, full):
         content = pack(bathymetry, [(np.arange(4.0), "a fish")])
         again, doubted = unpack(content, built.digest, 60, thorough=True)
