@@ -17,6 +17,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.preflight.survey import preflight
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, MissionState, MoveRefusedError
+from app.missions.team import PART_DONE
 from app.missions.views.mission import CheckStatus, Level
 from app.storage.database import Database
 from app.storage.models import MissionRow
@@ -164,7 +165,7 @@ def _unfit(live: LiveMission, before: LiveMission, reason: str) -> str:
             continue
         if earlier.left_at is not None:
             return f"{member.name} left {before.spec.name!r}"
-        # At the end everybody is called home, for that reason.
-        if earlier.withdrawal is not None and earlier.withdrawal.why != reason:
+        # At the end everybody is called home for that reason; who has done its part goes before.
+        if earlier.withdrawal is not None and earlier.withdrawal.why not in (reason, *PART_DONE):
             return f"{member.name} did not fly {before.spec.name!r} to its end: {earlier.withdrawal.why}"
     return ""

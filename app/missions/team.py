@@ -34,6 +34,12 @@ SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointSta
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
 
 
+WAY_FLOWN = "it has flown its way"
+NO_FURTHER_LINE = "what is left of its way is for going home and for no further line"
+PART_DONE = (WAY_FLOWN, NO_FURTHER_LINE)
+"""Why vehicles go home that have done their part, while others still survey."""
+
+
 @dataclass(frozen=True, slots=True)
 class CommittedLeg:
     """A leg that is decided and written down, and not begun yet; ``number`` counts its vehicle's legs."""

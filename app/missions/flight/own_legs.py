@@ -29,7 +29,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
-from app.missions.team import Member
+from app.missions.team import NO_FURTHER_LINE, WAY_FLOWN, Member
 from app.missions.views.mission import Level
 
 AHEAD = 2
@@ -140,7 +140,7 @@ class OwnLegs:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
                 for member in self._flown_out():
-                    self._live.withdraw(member, Response.RETURN, "it has flown its way")
+                    self._live.withdraw(member, Response.RETURN, WAY_FLOWN)
                 getting = self._who_gets_legs()
                 if getting:
                     await self._decide(getting)
@@ -300,8 +300,8 @@ class OwnLegs:
             if member.name in done and idle and self._spec.ends_at_home(member.spec):
                 energy_m = self._range.beyond_m(member)
                 lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
-                words = "its energy lasts for its way home" if lasts else "what is left of its way is for going home"
-                self._live.withdraw(member, Response.RETURN, f"{words} and for no further line")
+                why = "its energy lasts for its way home and for no further line" if lasts else NO_FURTHER_LINE
+                self._live.withdraw(member, Response.RETURN, why)
                 self._sent_home.add(member.name)
 
     def _flown_out(self) -> list[Member]:

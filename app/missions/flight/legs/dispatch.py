@@ -185,9 +185,6 @@ class Dispatch:
             misses = member.misses
             self.settle(member, WaypointStatus.MISSED, reason)
             member.misses = misses  # it would have got there
-        else:
-            member.set_order(None)  # it has flown what it had
-            member.status = None
         return self._note_given_up(member, [*ends, *self._spare(member, ends, reason)])
 
     def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:

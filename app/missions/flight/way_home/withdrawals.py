@@ -271,7 +271,8 @@ class Withdrawals:
 
     def _waited_to_rise(self, member: Member) -> bool:
         """Whether a vehicle was sent up at home, and had time for that."""
-        if member.status is not WaypointStatus.REACHED:
+        sent_up = member.order is not None and member.order.position.depth_m <= DEEP_M
+        if member.status is not WaypointStatus.REACHED or not sent_up:
             return False
         now_s = asyncio.get_running_loop().time()
         return now_s - self._rising_since_s.setdefault(member.name, now_s) >= RISING_S / self._time_scale
