@@ -8,6 +8,7 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from imc_bridge.control.control import Phase
 from imc_bridge.control.controls import Crew
@@ -403,10 +404,17 @@ class Bridge:
             self._tell(PacketsDropped(lost))
         for node in self._registry:
             if node.is_vehicle and self._speaker.talks_to(node):
-                self._crew.tick(node, now)
+                self._alone(partial(self._crew.tick, node, now))
         self._registry.pass_time(now)
         for node in self._registry:
-            self._links.check(node, self._crew.get(node), now)
+            self._alone(partial(self._links.check, node, self._crew.get(node), now))
+
+    def _alone(self, work: Callable[[], None]) -> None:
+        """Do what concerns one vehicle: whatever goes wrong in it keeps the others' references from no tick."""
+        try:
+            work()
+        except Exception as error:
+            self._note_error(error)
 
     # Telling the user
 

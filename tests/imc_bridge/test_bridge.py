@@ -8,10 +8,12 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, Guidance, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
+from imc_bridge.control.controls import Crew
 from imc_bridge.control.plans import OPERATION_START, plan_control
 from imc_bridge.control.rates import DUNE_DEFAULTS
 from imc_bridge.network.codec import encode
 from imc_bridge.network.transport import Address
+from imc_bridge.nodes.node import Node
 from tests.support.imc.sea import Peer, Sea, open_sea
 from tests.support.ports import free_ports
 from tests.support.waiting import until
@@ -72,6 +74,24 @@ async def test_repeated_order_is_harmless_and_a_new_one_replaces_the_old() -> No
         await sea.reached(name, 1)
         assert sea.statuses(name, 0) == [S, A]
         assert sea.statuses(name, 1) == [S, A, R]
+
+
+async def test_what_goes_wrong_for_one_vehicle_keeps_no_reference_from_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with open_sea(vehicles=2) as sea:
+        first, second = await sea.ready()
+        await sea.bridge.engage(second)
+        tick = Crew.tick
+
+        def failing(crew: Crew, node: Node, now: float) -> None:
+            if node.name == first:
+                raise ValueError("a figure that nobody expected")
+            tick(crew, node, now)
+
+        monkeypatch.setattr(Crew, "tick", failing)
+        sea.bridge.goto(second, sea.waypoint(0, 50, 50, 1.0))
+        await sea.reached(second, 0)
+        assert set(sea.bridge.handler_errors) == {"ValueError"}
+        monkeypatch.undo()
 
 
 async def test_waypoint_close_by_counts_as_reached_where_the_vehicle_circles() -> None:

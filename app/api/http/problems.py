@@ -438,14 +438,27 @@ def _mission_problem(request: Request, error: Exception) -> Response:
     kind, detail, remedy = describe_mission_error(error)
     errors = []
     if isinstance(error, InvalidRequestError):
+        location, value = _sent_as(request, error.field)
         errors.append(
             FieldProblem(
-                location="body", field=error.field, value=None, message=_shortened(detail), expected=_shortened(remedy)
+                location=location,
+                field=error.field,
+                value=value,
+                message=_shortened(detail),
+                expected=_shortened(remedy),
             )
         )
     problem = make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
     later = isinstance(error, ImportUnavailableError | ProductUnavailableError)
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
+
+
+def _sent_as(request: Request, field: str) -> tuple[str, str | None]:
+    """Return where a field was sent, and its value where that can be told without the body."""
+    for location, sent in (("query", request.query_params), ("path", request.path_params)):
+        if field in sent:
+            return location, _shortened(str(sent[field]))
+    return "body", None
 
 
 def _edge_problem(request: Request, error: ProblemError) -> Response:

@@ -184,6 +184,15 @@ async def test_wrong_parameters_are_named(
     assert [(e["location"], e["field"]) for e in problem["errors"]] == [(location, field)]
 
 
+async def test_what_is_wrong_with_a_parameter_s_value_is_told_with_it(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    answer = await client.get(f"/missions/{mission['id']}/profile", params={"line": "8,91;8,92"})
+    [error] = assert_problem(answer, 422, "invalid-request")["errors"]
+    assert (error["location"], error["field"], error["value"]) == ("query", "line", "8,91;8,92")
+    assert "longitude,latitude" in error["expected"]
+
+
 async def test_an_unknown_planner_names_those_there_are(client: httpx.AsyncClient) -> None:
     answer = await client.post("/missions", json=mission_spec(planner={"name": "oracle-of-delphi"}))
     problem = assert_problem(answer, 422, "invalid-request")

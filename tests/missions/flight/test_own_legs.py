@@ -339,7 +339,8 @@ async def test_who_has_flown_everything_circles_inside_the_area(
         side_m=100.0,
         vehicles=vehicles,
         budget={"km_per_vehicle": 0.15},
-        limits={"max_step_m": 20.0},
+        # Nobody waits for the other to pass.
+        limits={"max_step_m": 20.0, "min_separation_m": 0.0},
         planner={"name": "lawnmower"},
     )
     mission = (await service.create(spec)).id
