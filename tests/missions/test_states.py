@@ -114,9 +114,9 @@ LINE = ring((0, 0), (10, 0), (30, 0), (0, 0))
         ({"area": rectangle(0, 0, 3, 30)}, "", "3.0 m x 30.0 m", "make cell_m smaller"),
         ({"area": rectangle(0, 0, 9000, 9000)}, "", "cells", "make cell_m larger or the area smaller"),
         (
-            {"area": {"type": "Polygon", "coordinates": [[[-179, 0], [179, 0], [179, 1], [-179, 0]]]}},
+            {"area": {"type": "Polygon", "coordinates": [[[-80, 0], [80, 0], [80, 1], [-80, 0]]]}},
             "",
-            "179.0",
+            "80.0",
             "within 200 km",
         ),
         ({"limits": {"min_depth_m": 5, "max_depth_m": 4}}, "limits", "max_depth_m is 4", "at least min_depth_m"),

@@ -26,6 +26,9 @@ from app.missions.fleet.links.visiting import VisitedLink, Visitor
 
 EARTH_RADIUS_M = 6_371_000.0
 
+KEPT_S = 86_400.0
+"""For how long vehicles may keep positions before they post them, at the most: older ones tell of another clock."""
+
 
 @dataclass
 class _Poller(Visitor):
@@ -121,12 +124,12 @@ class RestFleetLink(VisitedLink):
     def heard(self, report: VehicleReport) -> None:
         """Take a position that a vehicle posted, unless a newer one is known: it may post what it kept under water.
 
-        One whose clock was set back is believed after ``lost_after_s``.
+        One whose clock was set back is believed after ``lost_after_s``, and at once where that was by a day or more.
         """
         poller = self._touch(report.vehicle)
         now_s = asyncio.get_running_loop().time()
-        is_older = poller.report is not None and report.time_s < poller.report.time_s
-        if is_older and now_s - poller.newest_heard_s < self._lost_after_s:
+        older_s = 0.0 if poller.report is None else poller.report.time_s - report.time_s
+        if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
         poller.report, poller.newest_heard_s = report, now_s
         self._sink(report)
