@@ -438,12 +438,11 @@ def _mission_problem(request: Request, error: Exception) -> Response:
     kind, detail, remedy = describe_mission_error(error)
     errors = []
     if isinstance(error, InvalidRequestError):
-        location, value = _sent_as(request, error.field)
         errors.append(
             FieldProblem(
-                location=location,
+                location=_location_of(request, error.field),
                 field=error.field,
-                value=value,
+                value=None,  # it may name what is on this machine
                 message=_shortened(detail),
                 expected=_shortened(remedy),
             )
@@ -453,12 +452,11 @@ def _mission_problem(request: Request, error: Exception) -> Response:
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
 
 
-def _sent_as(request: Request, field: str) -> tuple[str, str | None]:
-    """Return where a field was sent, and its value where that can be told without the body."""
-    for location, sent in (("query", request.query_params), ("path", request.path_params)):
-        if field in sent:
-            return location, _shortened(str(sent[field]))
-    return "body", None
+def _location_of(request: Request, field: str) -> str:
+    """Return where a field was sent."""
+    if field in request.query_params:
+        return "query"
+    return "path" if field in request.path_params else "body"
 
 
 def _edge_problem(request: Request, error: ProblemError) -> Response:

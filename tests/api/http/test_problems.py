@@ -184,12 +184,12 @@ async def test_wrong_parameters_are_named(
     assert [(e["location"], e["field"]) for e in problem["errors"]] == [(location, field)]
 
 
-async def test_what_is_wrong_with_a_parameter_s_value_is_told_with_it(
+async def test_what_is_wrong_with_a_parameter_s_value_is_told_of_the_parameter(
     client: httpx.AsyncClient, mission: dict[str, Any]
 ) -> None:
     answer = await client.get(f"/missions/{mission['id']}/profile", params={"line": "8,91;8,92"})
     [error] = assert_problem(answer, 422, "invalid-request")["errors"]
-    assert (error["location"], error["field"], error["value"]) == ("query", "line", "8,91;8,92")
+    assert (error["location"], error["field"]) == ("query", "line")
     assert "longitude,latitude" in error["expected"]
 
 
