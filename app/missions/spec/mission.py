@@ -233,7 +233,7 @@ class MissionSpec(Model):
                 places["search.transmitter"] = [self.search.transmitter]
         if not places or self._is_near([place for ring in places.values() for place in ring]):
             return self
-        name, place = next((name, ring[0]) for name, ring in places.items() if not self._is_near(ring))
+        name, place = next((name, at) for name, ring in places.items() for at in ring if not self._is_near([at]))
         raise ValueError(
             f"{name} is at {list(place)}, nowhere near the area: give [longitude, latitude], in that order"
         )

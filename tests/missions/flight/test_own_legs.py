@@ -21,7 +21,7 @@ from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import NO_LEG, LegCommit
 from app.missions.flight.legs.exchange import LegExchange
-from app.missions.flight.own_legs import MOST_AHEAD, OwnLegs
+from app.missions.flight.own_legs import MOST_AHEAD, NOT_WAITED_FOR, OwnLegs
 from app.missions.flight.runner import nearest_leg
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
@@ -158,6 +158,16 @@ async def test_a_vehicle_that_does_not_move_keeps_nobody(service: MissionService
     assert order is not None
     assert order.step == 1
     await act(service, mission.id, "abort")
+
+
+async def test_a_vehicle_that_misses_a_leg_is_waited_for_until_it_has_missed_three(service: MissionService) -> None:
+    vehicles = [{"name": "a", "kind": "sim"}, {"name": "stuck", "kind": "rest"}]
+    mission = await service.create(sim_spec(steps=4, step_deadline_s=20, vehicles=vehicles, **APART))
+    await Rover(service, mission.id, "stuck").post()
+    await act(service, mission.id, "start")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert ended.reason == "every step is done but stuck"
+    assert (await service.get(mission.id)).team.named("stuck").misses == NOT_WAITED_FOR == 3
 
 
 async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionService, database: Database) -> None:
