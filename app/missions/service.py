@@ -19,7 +19,7 @@ from app.missions import states
 from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError
+from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
@@ -245,18 +245,8 @@ class MissionService:
         check_spec(spec, self.hub.kinds)
         await self.sites.check(spec)
         await self._succession.check(spec)
-        created = now()
-        row = MissionRow(
-            id=str(uuid.uuid4()),
-            name=spec.name,
-            state=MissionState.READY if spec.vehicles else MissionState.DRAFT,
-            reason="" if spec.vehicles else "no vehicle yet",
-            # Its steps follow from its budget.
-            spec=spec.model_dump(mode="json", exclude={"steps"}),
-            created_at=created,
-            updated_at=created,
-            elapsed_s=0.0,
-        )
+        row = _new_row(spec)
+        await self._registry.try_out(row)
         async with self._database.writing() as session:
             session.add(row)
             await session.flush()
@@ -288,7 +278,7 @@ class MissionService:
             return None
 
     async def get(self, mission_id: str) -> LiveMission:
-        """Return a mission. Raises MissionNotFoundError, MissionElsewhereError."""
+        """Return a mission. Raises MissionNotFoundError, MissionElsewhereError, MissionUnreadableError."""
         return await self._registry.get(mission_id)
 
     @property
@@ -302,7 +292,7 @@ class MissionService:
             return await mission_queries.oldest_first(session, mission_id)
 
     async def spec(self, mission_id: str) -> MissionSpec:
-        """Return what a mission is to do, whoever has it. Raises MissionNotFoundError."""
+        """Return what a mission is to do, whoever has it. Raises MissionNotFoundError, MissionUnreadableError."""
         return await self._registry.spec(mission_id)
 
     async def check_exists(self, mission_id: str) -> None:
@@ -362,6 +352,7 @@ class MissionService:
         check_spec(spec, self.hub.kinds)
         await self.sites.check(spec)
         await self._succession.check(spec, live.id, live.spec.after)
+        await self._registry.try_out(_new_row(spec))
         async with self._supervisor.acting(live.id):
             await describe_anew(live, spec, actor)
             await self._registry.forget(live, "the mission was described anew")
@@ -373,6 +364,22 @@ class MissionService:
         """Remove a mission in which nothing was measured. Raises ConflictError."""
         async with self._supervisor.acting(live.id):
             await self._registry.delete(live)
+
+    async def delete_stored(self, mission_id: str) -> None:
+        """Remove a mission by its id, also one that cannot be opened.
+
+        Raises
+        ------
+        MissionNotFoundError, MissionElsewhereError, ConflictError
+            The latter when something was measured in it.
+        """
+        try:
+            live = await self.get(mission_id)
+        except MissionUnreadableError:
+            async with self._supervisor.acting(mission_id):
+                await self._registry.delete_unreadable(mission_id)
+        else:
+            await self.delete(live)
 
     def doctor(self) -> DoctorView:
         """Return what keeps IMC vehicles from working with us, as far as listening tells."""
@@ -389,6 +396,22 @@ class MissionService:
             member = None if mission_id is None else (await self.get(mission_id)).vehicles.of(info)
             views.append(member or idle_vehicle_view(info))
         return views
+
+
+def _new_row(spec: MissionSpec) -> MissionRow:
+    """Return a new mission as it is stored."""
+    created = now()
+    return MissionRow(
+        id=str(uuid.uuid4()),
+        name=spec.name,
+        state=MissionState.READY if spec.vehicles else MissionState.DRAFT,
+        reason="" if spec.vehicles else "no vehicle yet",
+        # Its steps follow from its budget.
+        spec=spec.model_dump(mode="json", exclude={"steps"}),
+        created_at=created,
+        updated_at=created,
+        elapsed_s=0.0,
+    )
 
 
 async def _nobody(_password: str, _host: str, _own_user: bool) -> str | None:

@@ -28,6 +28,7 @@ from app.missions.errors import (
     MapNotReadyError,
     MissionElsewhereError,
     MissionNotFoundError,
+    MissionUnreadableError,
     PingsNotFoundError,
     PingsUnreadableError,
     ProductUnavailableError,
@@ -108,6 +109,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "too-many-requests": (429, "Too many requests"),
     "too-many-bytes": (429, "Too much is sent at once"),
     "internal": (500, "Something went wrong inside the service"),
+    "mission-unreadable": (500, "A stored mission cannot be opened"),
     "pings-unreadable": (500, "A file of pings is missing or damaged"),
     "too-many-connections": (503, "Too many requests at the same time"),
     "mission-elsewhere": (503, "Another process has the mission"),
@@ -412,6 +414,7 @@ def describe_mission_error(error: Exception) -> tuple[str, str, str]:
         (SoundingNotFoundError, "sounding-not-found"),
         (PingsNotFoundError, "pings-not-found"),
         (PingsUnreadableError, "pings-unreadable"),
+        (MissionUnreadableError, "mission-unreadable"),
         (TargetNotFoundError, "target-not-found"),
         (ImportNotFoundError, "import-not-found"),
         (AlarmNotFoundError, "alarm-not-found"),
@@ -494,6 +497,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(sqlite3.Error, _database_problem)
     for cls in (
         MissionNotFoundError,
+        MissionUnreadableError,
         VehicleNotFoundError,
         PingsNotFoundError,
         PingsUnreadableError,

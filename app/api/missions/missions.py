@@ -10,7 +10,7 @@ from app.api.bodies.json_route import JsonRoute
 from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.peer_lists import from_peers
-from app.api.schemas import API, ActionRequest, EndRequest, NoteRequest, VehicleName
+from app.api.schemas import API, ActionRequest, EndRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
 from app.missions.operations import history
 from app.missions.preflight.survey import preflight
@@ -119,12 +119,12 @@ async def describe_mission(
     status_code=204,
     responses=problems("mission-not-found", "conflict", "invalid-request"),
 )
-async def delete_mission(service: Service, operator: Operator, mission: Mission) -> None:
+async def delete_mission(mission_id: MissionId, service: Service, operator: Operator) -> None:
     """Remove a mission in which no step was taken and nothing measured, with its imports. The audit log keeps who did.
 
     Any other one is refused: what was measured is kept.
     """
-    await service.delete(mission)
+    await service.delete_stored(mission_id)
 
 
 _ACTION_PROBLEMS = body_problems("mission-not-found", "move-refused", "conflict")

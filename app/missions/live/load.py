@@ -56,7 +56,7 @@ async def take_up(
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
     loop = asyncio.get_running_loop()
-    spec = await loop.run_in_executor(executor, MissionSpec.model_validate, row.spec)
+    spec = await loop.run_in_executor(executor, stored_spec, row)
     table = None
     if tide is not None:
         table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
@@ -99,6 +99,15 @@ async def take_up(
             live.team.leave(member.name, vehicle.left_at)
     live.waypoints.show_rows(waypoints)
     return live
+
+
+def stored_spec(row: MissionRow) -> MissionSpec:
+    """Return what a stored mission is to do. Raises ValueError.
+
+    Blank names and those of several lines were taken once: such a mission is called by its words, or by its id.
+    """
+    name = " ".join(str(row.spec.get("name", "")).split())
+    return MissionSpec.model_validate(row.spec | {"name": name or row.id})
 
 
 async def _take_up_search(live: LiveMission, search: Search) -> None:

@@ -3,15 +3,24 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from functools import partial
 
 import structlog
+from pydantic import ValidationError
 from sqlalchemy import delete, select
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.compute.compute import Compute
-from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError
+from app.missions.errors import (
+    ConflictError,
+    InvalidRequestError,
+    MissionElsewhereError,
+    MissionNotFoundError,
+    MissionUnreadableError,
+)
 from app.missions.fleet.hub import FleetHub
-from app.missions.live.load import take_up
+from app.missions.live.load import stored_spec, take_up
 from app.missions.live.mission import LiveMission
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
@@ -22,7 +31,10 @@ from app.missions.views.mission import MissionSummary
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
+from app.storage.queries import missions as mission_queries
+from app.storage.queries import pings as ping_queries
 from app.storage.queries import sites as site_queries
+from app.storage.queries import soundings as sounding_queries
 
 ENDED_MISSIONS_IN_MEMORY = 8
 
@@ -95,17 +107,23 @@ class MissionRegistry:
         self._seen.add(mission_id)
 
     async def spec(self, mission_id: str) -> MissionSpec:
-        """Return what a mission is to do; it is not taken up. Raises MissionNotFoundError."""
+        """Return what a mission is to do; it is not taken up. Raises MissionNotFoundError, MissionUnreadableError."""
         if mission_id in self._live:
             return self._live[mission_id].spec
         async with self._database.reading() as session:
             row = await session.get(MissionRow, mission_id)
         if row is None:
             raise _not_found(mission_id)
-        return await asyncio.to_thread(MissionSpec.model_validate, row.spec)
+        with _opening(mission_id):
+            return await asyncio.to_thread(stored_spec, row)
 
     async def get(self, mission_id: str) -> LiveMission:
-        """Return a mission, taken up if need be. Raises MissionNotFoundError, MissionElsewhereError."""
+        """Return a mission, taken up if need be.
+
+        Raises
+        ------
+        MissionNotFoundError, MissionElsewhereError, MissionUnreadableError
+        """
         live = self._live.get(mission_id)
         if live is not None:
             return live
@@ -124,7 +142,8 @@ class MissionRegistry:
                 # Its last owner may have written until the moment it was taken.
                 async with database.reading() as session:
                     row = await session.get_one(MissionRow, mission_id)
-            live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+            with _opening(mission_id):
+                live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
             live.ships.traffic = self._traffic
             if self._compute is not None:
                 live.compute_by(self._compute)
@@ -139,6 +158,20 @@ class MissionRegistry:
                 self._maps.survey(live)
             await self._taken_up(live)
             return live
+
+    async def try_out(self, row: MissionRow) -> None:
+        """Open a mission as it is to be stored, and put it away. Raises InvalidRequestError where it cannot be opened.
+
+        ``row`` is not stored, and no other mission has its id.
+        """
+        try:
+            with _opening(row.id):
+                live = await take_up(self._database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+        except MissionUnreadableError as error:
+            log.exception("a mission is refused that could not be opened", name=row.name)
+            words = f"no mission can be made of it: {_reason(error.__cause__)}"
+            raise InvalidRequestError("body", words, "correct what it says") from error
+        live.abandon("it is not stored")
 
     async def _make_room(self) -> None:
         idle = [
@@ -158,25 +191,34 @@ class MissionRegistry:
         if live.header.state in AT_SEA:
             raise ConflictError(f"the mission is {live.header.state}", "finish or abort it first")
         counts = live.journal.counts
-        measured = counts.accepted + counts.rejected
-        pings = counts.pings + counts.rejected_pings
-        if live.header.step or measured or pings:
-            and_pings = f" and {pings} pings" if pings else ""
-            raise ConflictError(
-                f"the mission took {live.header.step} steps and has {measured} soundings{and_pings}: "
-                "what was measured is kept",
-                "leave it in the list; only missions in which nothing was measured can be deleted",
-            )
+        _refuse_measured(live.header.step, counts.accepted + counts.rejected, counts.pings + counts.rejected_pings)
         self._maps.forget(live.id)
         async with live.database.writing() as session:
-            await session.execute(delete(MissionRow).where(MissionRow.id == live.id))
-            await site_queries.forget_survey(session, live.id)
+            await _delete(session, live.id)
         self._left.pop(live.id, None)
         self._seen.discard(live.id)
         if self._live.pop(live.id, None) is not None:
             live.abandon("the mission was deleted")
         if self._ownership is not None:
             await self._ownership.release([live.id])
+
+    async def delete_unreadable(self, mission_id: str) -> None:
+        """Remove a mission that cannot be opened, whatever its state: nobody could end it. Raises ConflictError.
+
+        As with any other, what was measured is kept. The caller has tried to get it: then it is this process's.
+        """
+        database = self._database
+        if self._ownership is not None:
+            database = database.guarded(self._ownership.guard(mission_id))
+        async with database.writing() as session:
+            step = await mission_queries.last_step(session, mission_id)
+            counts = await sounding_queries.counts(session, mission_id)
+            pinged = await ping_queries.totals(session, mission_id)
+            _refuse_measured(0 if step is None else step.number, sum(counts.values()), pinged.pings + pinged.rejected)
+            await _delete(session, mission_id)
+        self._seen.discard(mission_id)
+        if self._ownership is not None:
+            await self._ownership.release([mission_id])
 
     async def forget(self, live: LiveMission, why: str) -> None:
         """Put a mission away that is stored otherwise now; who watches it is told to ask again."""
@@ -199,6 +241,42 @@ class MissionRegistry:
             live.abandon()
         self._live.clear()
         self._left.clear()
+
+
+@contextmanager
+def _opening(mission_id: str) -> Iterator[None]:
+    """Raise MissionUnreadableError for what is stored of a mission and makes no sense."""
+    try:
+        yield
+    except (ValueError, LookupError, TypeError) as error:
+        raise MissionUnreadableError(
+            f"mission {mission_id} cannot be opened as it is stored: {_reason(error)}",
+            "run the version that wrote it, or delete it: DELETE /api/v1/missions/{id}",
+        ) from error
+
+
+def _reason(error: BaseException | None) -> str:
+    """Return in one line why something makes no sense: of several faults the first."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors(include_url=False, include_input=False)[0]
+    field = ".".join(str(part) for part in first["loc"])
+    return f"{field}: {first['msg']}" if field else str(first["msg"])
+
+
+def _refuse_measured(steps: int, soundings: int, pings: int) -> None:
+    """Keep a mission in which something was done. Raises ConflictError."""
+    if steps or soundings or pings:
+        and_pings = f" and {pings} pings" if pings else ""
+        raise ConflictError(
+            f"the mission took {steps} steps and has {soundings} soundings{and_pings}: what was measured is kept",
+            "leave it in the list; only missions in which nothing was measured can be deleted",
+        )
+
+
+async def _delete(session: AsyncSession, mission_id: str) -> None:
+    await session.execute(delete(MissionRow).where(MissionRow.id == mission_id))
+    await site_queries.forget_survey(session, mission_id)
 
 
 def _not_found(mission_id: str) -> MissionNotFoundError:

@@ -16,7 +16,7 @@ from app.api.accounts.processes import comes_from_peer
 from app.api.maps.ogc.crs import Box
 from app.api.maps.ogc.parameters import MOST_LIMIT, ItemsQuery
 from app.api.state import EdgeState
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError
+from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.operations.maps.features import (
     Feature,
     Kind,
@@ -124,7 +124,7 @@ async def _all(request: Request, edge: EdgeState, kind: Kind, row: MissionRow) -
         if peer is not None:
             return await _of_peer(request, edge, peer, kind, row)
         return await features_of(await edge.service.get(row.id), edge.service.maps, kind, row)
-    except (MissionElsewhereError, MissionNotFoundError, httpx.HTTPError) as error:
+    except (MissionElsewhereError, MissionNotFoundError, MissionUnreadableError, httpx.HTTPError) as error:
         log.warning("features are left out", mission=row.id, kind=kind, error=str(error) or type(error).__name__)
         return []
 

@@ -20,7 +20,7 @@ from app.api.maps.wms.parameters import JSON, PNG, MapRequest
 from app.api.maps.wms.problems import NEW
 from app.api.state import EdgeState
 from app.mapping.coordinates.map_windows import WGS84, MapWindow
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError
+from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.maps.gis_layers import WEB_LAYERS, CellValues, Range, WebLayer
 from app.missions.operations.maps.map_pictures import MapPicture, PictureRequest
 from app.missions.running.ownership import Peer
@@ -95,7 +95,7 @@ async def _picture(
             answer = await _asked(request, edge, peer, row, query, wanted.window, wanted.range)
             return MapPicture(answer.content, answer.headers.get("etag", "").strip('"'))
         return await edge.service.map_pictures.picture(await edge.service.get(row.id), edge.service.maps, wanted)
-    except (MissionElsewhereError, MissionNotFoundError, httpx.HTTPError) as error:
+    except (MissionElsewhereError, MissionNotFoundError, MissionUnreadableError, httpx.HTTPError) as error:
         _leave_out(data, row, error)
         return None
 
@@ -119,7 +119,7 @@ async def _values(
             return await _values_of_peer(request, edge, peer, row, lat, lon)
         live = await edge.service.get(row.id)
         values = await edge.service.map_pictures.values(live, edge.service.maps, lat, lon)
-    except (MissionElsewhereError, MissionNotFoundError, httpx.HTTPError) as error:
+    except (MissionElsewhereError, MissionNotFoundError, MissionUnreadableError, httpx.HTTPError) as error:
         _leave_out(data, row, error)
         return None
     return None if values is None else Found(row.id, row.name, values)
