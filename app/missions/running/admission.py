@@ -1,4 +1,4 @@
-"""What a mission may not ask of this service: planners and vehicles that it does not have."""
+"""What a mission may not ask of this service: planners and vehicles that it does not have, limits that contradict."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
 
 
 def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
-    """Refuse a mission with a planner or a vehicle that cannot be had. Raises InvalidRequestError.
+    """Refuse a mission with a planner, a vehicle or limits that cannot be had. Raises InvalidRequestError.
 
     ``kinds`` are the kinds of vehicles that can be reached.
     """
@@ -27,8 +27,35 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
             f"{spec.limits.com_range_m:g} m is given, and planner {name!r} sends vehicles to lines of their own",
             "leave it out, or use another planner",
         )
+    check_limits(spec)
     for index, vehicle in enumerate(spec.vehicles):
         check_vehicle(vehicle, spec, kinds, f"vehicles.{index}.")
+
+
+def check_limits(spec: MissionSpec) -> None:
+    """Refuse limits that contradict each other. Raises InvalidRequestError.
+
+    Not a part of the description's own checks: a mission that was stored with such limits can still be opened.
+    """
+    limits = spec.limits
+    if spec.arrival_radius_m >= limits.max_step_m:
+        raise InvalidRequestError(
+            "arrival_radius_m",
+            f"arrival_radius_m is {spec.arrival_radius_m:g} m and limits.max_step_m is {limits.max_step_m:g} m: a leg "
+            "would count as flown where it begins",
+            "make arrival_radius_m smaller than limits.max_step_m",
+        )
+    # Vehicles that keep off each other by their depth may be as near as they like.
+    band_m = limits.max_depth_m - limits.min_depth_m
+    stacked = limits.min_vertical_separation_m <= min(band_m, limits.com_range_m or 0.0)
+    if limits.com_range_m is not None and limits.com_range_m <= limits.min_separation_m and not stacked:
+        raise InvalidRequestError(
+            "limits.com_range_m",
+            f"limits.com_range_m is {limits.com_range_m:g} m and limits.min_separation_m is "
+            f"{limits.min_separation_m:g} m: no two vehicles could keep to both, also not one above the other by "
+            f"limits.min_vertical_separation_m, {limits.min_vertical_separation_m:g} m",
+            "make limits.com_range_m larger than limits.min_separation_m",
+        )
 
 
 def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[VehicleKind], prefix: str = "") -> None:

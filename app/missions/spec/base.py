@@ -12,6 +12,16 @@ from app.arrays import FloatArray
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
 Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+ShownName = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=120,
+        # Something to be seen, in one line: names are subjects of messages and headings of reports.
+        pattern=r"^[^\r\n]*\S[^\r\n]*$",
+        description="Shown to people; need not be unique",
+    ),
+]
 
 MAX_POSITIONS = 1000
 

@@ -18,7 +18,7 @@ from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
-from app.missions.spec.base import Model, PolygonGeometry, cell_count
+from app.missions.spec.base import Model, PolygonGeometry, ShownName, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.limits import Limits
@@ -67,12 +67,7 @@ HALF_ROUND_DEG = 180.0
 class MissionSpec(Model):
     """A mission as an operator describes it."""
 
-    name: str = Field(
-        min_length=1,
-        max_length=120,
-        description="Shown to people; need not be unique",
-        examples=["Leixoes quay"],
-    )
+    name: ShownName = Field(examples=["Leixoes quay"])
     kind: MissionKind = Field(
         default=MissionKind.SURVEY,
         description="survey: map the sea floor; search: look for something in a partly known site, see `search`",
@@ -119,7 +114,11 @@ class MissionSpec(Model):
     )
     speed_mps: Speed = Field(default=1.3, description="Speed asked of vehicles that have none of their own")
     arrival_radius_m: float = Field(
-        default=3.0, gt=0, le=100, description="Horizontal distance at which a waypoint counts as reached"
+        default=3.0,
+        gt=0,
+        le=100,
+        description="Horizontal distance at which a waypoint counts as reached. Unless given, at most half of "
+        "limits.max_step_m",
     )
     step_deadline_s: float = Field(
         default=60.0,
@@ -214,6 +213,12 @@ class MissionSpec(Model):
                 f"steps is {self.steps} but budget, {self.budget.model_dump_json()}, comes to {steps}: give one of them"
             )
         object.__setattr__(self, "steps", steps)
+        return self
+
+    @model_validator(mode="after")
+    def _arrives_within_a_step(self) -> Self:
+        if "arrival_radius_m" not in self.model_fields_set:
+            object.__setattr__(self, "arrival_radius_m", min(self.arrival_radius_m, self.limits.max_step_m / 2))
         return self
 
     @model_validator(mode="after")

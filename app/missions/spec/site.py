@@ -9,15 +9,12 @@ from shapely.geometry.polygon import orient
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.spec.base import Model, PolygonGeometry, cell_count
+from app.missions.spec.base import Model, PolygonGeometry, ShownName, cell_count
 
 MAX_SITE_CELLS = 4_000_000
 """Of a site's grid: several surveys are taken together in memory."""
 
 SiteId = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$")]
-SiteName = Annotated[
-    str, Field(min_length=1, max_length=120, pattern=r"\S", description="Shown to people; need not be unique")
-]
 SiteCell = Annotated[float, Field(gt=0, le=1000, description="Cell of the site's grid, metres")]
 YearlyChange = Annotated[
     float,
@@ -33,7 +30,7 @@ YearlyChange = Annotated[
 class SiteSpec(Model):
     """A site as an operator describes it."""
 
-    name: SiteName = Field(examples=["Leixoes, harbour mouth"])
+    name: ShownName = Field(examples=["Leixoes, harbour mouth"])
     area: PolygonGeometry = Field(description="What belongs to the site")
     cell_m: SiteCell = 1.0
     yearly_change_m: YearlyChange = 0.0
@@ -67,7 +64,7 @@ class SiteSpec(Model):
 class SiteChanges(Model):
     """What may be changed of a site; what is left out stays."""
 
-    name: SiteName | None = None
+    name: ShownName | None = None
     area: PolygonGeometry | None = None
     cell_m: SiteCell | None = None
     yearly_change_m: YearlyChange | None = None

@@ -40,6 +40,12 @@ def test_latitude_and_longitude_swapped_are_told_by_field(changes: dict[str, Any
         MissionSpec.model_validate(described)
 
 
+def test_the_corner_that_is_far_away_is_told() -> None:
+    ring = [lon_lat(5, 5), lon_lat(10, 5), (8.0, 41.0), lon_lat(5, 5)]
+    with pytest.raises(ValidationError, match=r"keep_out\.0 is at \[8\.0, 41\.0\], nowhere near the area"):
+        sim_spec(keep_out=[{"coordinates": [ring]}])
+
+
 def test_an_area_across_the_line_of_180_degrees_is_refused() -> None:
     ring = [[179.999, 10.0], [-179.999, 10.0], [-179.999, 10.002], [179.999, 10.002], [179.999, 10.0]]
     with pytest.raises(ValidationError, match="crosses 180 degrees"):

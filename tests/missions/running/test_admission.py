@@ -1,0 +1,60 @@
+"""Limits that no team can keep to are refused with both fields and values; those that are only narrow are taken."""
+
+from typing import Any
+
+import pytest
+
+from app.missions.errors import InvalidRequestError
+from app.missions.service import MissionService
+from tests.support.missions.harbour import sim_spec
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "words"),
+    [
+        (
+            {"arrival_radius_m": 8.0},
+            "arrival_radius_m",
+            "arrival_radius_m is 8 m and limits.max_step_m is 8 m: a leg would count as flown where it begins",
+        ),
+        (
+            {"limits": {"max_step_m": 8.0, "com_range_m": 0.5}},
+            "limits.com_range_m",
+            "limits.com_range_m is 0.5 m and limits.min_separation_m is 5 m: no two vehicles",
+        ),
+        (
+            {"limits": {"max_step_m": 8.0, "com_range_m": 4.0, "min_depth_m": 2.0, "max_depth_m": 2.5}},
+            "limits.com_range_m",
+            "limits.com_range_m is 4 m and limits.min_separation_m is 5 m: no two vehicles",
+        ),
+    ],
+    ids=["arrives where it begins", "nowhere near enough", "not one above the other"],
+)
+async def test_limits_that_contradict_each_other_are_refused(
+    service: MissionService, changes: dict[str, Any], field: str, words: str
+) -> None:
+    with pytest.raises(InvalidRequestError, match=words) as caught:
+        await service.create(sim_spec("a", "b", **changes))
+    assert caught.value.field == field
+    assert await service.rows() == []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"arrival_radius_m": 7.9},
+        {"limits": {"max_step_m": 8.0, "com_range_m": 4.0}},
+        {"limits": {"max_step_m": 8.0, "com_range_m": 5.1, "min_depth_m": 2.0, "max_depth_m": 2.0}},
+    ],
+    ids=["nearly a step", "one above the other", "side by side"],
+)
+async def test_narrow_limits_are_taken(service: MissionService, changes: dict[str, Any]) -> None:
+    assert (await service.create(sim_spec("a", "b", **changes))).state == "ready"
+
+
+@pytest.mark.parametrize(
+    ("given", "radius_m"), [({"max_step_m": 2.0}, 1.0), ({"max_step_m": 5.9}, 2.95), ({"max_step_m": 50.0}, 3.0)]
+)
+def test_unless_asked_for_a_leg_is_not_flown_where_it_begins(given: dict[str, float], radius_m: float) -> None:
+    assert sim_spec(limits=given).arrival_radius_m == pytest.approx(radius_m)
+    assert sim_spec(limits=given, arrival_radius_m=1.9).arrival_radius_m == 1.9
