@@ -117,6 +117,7 @@ class VehicleView(View):
     idle_s: float = Field(default=0.0, description="Vehicle time in which it waited for a decision")
     order: OrderView | None = Field(default=None, description="What its operator ordered; null: it does its part")
     withdrawn: str = Field(default="", description="Why it surveys no more; empty while it does")
+    part_done: bool = Field(default=False, description="It surveys no more as it has flown all that it had to")
     energy_left_pct: float | None = Field(
         default=None, description="What is left of its energy, by its battery or else by endurance_min; null: not known"
     )

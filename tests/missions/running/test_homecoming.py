@@ -81,6 +81,8 @@ async def test_who_has_flown_its_way_goes_home_while_others_survey(service: Miss
     fast, slow = (await service.get(mission.id)).team
     await until(lambda: fast.is_home, "the fast one is home")
     assert slow.surveys, "the slow one goes on"
+    shown = (await view_of(service, mission.id)).vehicles
+    assert [vehicle.part_done for vehicle in shown] == [True, False]
     ended = await until_state(service, mission.id, MissionState.FINISHED)
     assert {waypoint.status for waypoint in ended.waypoints} == {"reached"}, "what was flown is not given up"
     told = [words for words in await words_of(service, mission, "recovery") if "goes home" in words]

@@ -1017,7 +1017,7 @@ class MissionSpec(Model):
     speed_mps: float = 1.3
     """Speed asked of vehicles that have none of their own"""
     arrival_radius_m: float = 3.0
-    """Horizontal distance at which a waypoint counts as reached"""
+    """Horizontal distance at which a waypoint counts as reached. Unless given, at most half of limits.max_step_m"""
     step_deadline_s: float = 60.0
     """Least time that a leg is given, seconds of vehicle time, longer where it is long; after that it counts as
     missed and the vehicle flies its next, or, in steps of the whole team, the step ends without it
@@ -2551,6 +2551,8 @@ class VehicleView(Model):
     """What its operator ordered; null: it does its part"""
     withdrawn: str
     """Why it surveys no more; empty while it does"""
+    part_done: bool
+    """It surveys no more as it has flown all that it had to"""
     energy_left_pct: float | None
     """What is left of its energy, by its battery or else by endurance_min; null: not known"""
     energy_left_s: float | None

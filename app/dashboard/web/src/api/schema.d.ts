@@ -3882,7 +3882,7 @@ export interface components {
             speed_mps: number;
             /**
              * Arrival Radius M
-             * @description Horizontal distance at which a waypoint counts as reached
+             * @description Horizontal distance at which a waypoint counts as reached. Unless given, at most half of limits.max_step_m
              * @default 3
              */
             arrival_radius_m: number;
@@ -4096,7 +4096,7 @@ export interface components {
                 speed_mps: number;
                 /**
                  * Arrival Radius M
-                 * @description Horizontal distance at which a waypoint counts as reached
+                 * @description Horizontal distance at which a waypoint counts as reached. Unless given, at most half of limits.max_step_m
                  * @default 3
                  */
                 arrival_radius_m: number;
@@ -7471,6 +7471,12 @@ export interface components {
              * @default
              */
             withdrawn: string;
+            /**
+             * Part Done
+             * @description It surveys no more as it has flown all that it had to
+             * @default false
+             */
+            part_done: boolean;
             /**
              * Energy Left Pct
              * @description What is left of its energy, by its battery or else by endurance_min; null: not known

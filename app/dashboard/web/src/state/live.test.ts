@@ -42,6 +42,7 @@ const vehicle = (
   idle_s: 0,
   order: null,
   withdrawn: "",
+  part_done: false,
   energy_left_pct: null,
   energy_left_s: null,
   recovery_point: null,

@@ -71,6 +71,7 @@ const surveying = {
   link: "engaged",
   phase: "survey",
   withdrawn: "",
+  part_done: false,
   recovery_point: null,
   failsafes: [],
 } as unknown as VehicleView;

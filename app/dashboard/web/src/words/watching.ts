@@ -270,6 +270,10 @@ export const WATCHING = {
     en: "resume its survey with a new battery, or take it out of the water",
     pt: "retome o seu levantamento com outra bateria, ou tire-o da água",
   },
+  "attention.takeOut": {
+    en: "take it out of the water: its part is flown",
+    pt: "tire-o da água: a sua parte está feita",
+  },
   "attention.waits": { en: "{name} waits: {why}", pt: "{name} espera: {why}" },
   "attention.resume": { en: "resume its survey", pt: "retome o seu levantamento" },
   "attention.resumeOrHome": {

@@ -77,6 +77,7 @@ describe("what needs a person", () => {
       mission([
         vehicle("a"),
         vehicle("b", { phase: "home", withdrawn: "called home" }),
+        vehicle("d", { phase: "home", withdrawn: "it has flown its way", part_done: true }),
         vehicle("c", { active: false, left_at: "2026-06-01T10:05:00Z", phase: null }),
       ]),
       [],
@@ -84,8 +85,11 @@ describe("what needs a person", () => {
     expect(found.map(({ vehicle: name, tone }) => [name, tone])).toEqual([
       ["c", "warning"],
       ["b", "calm"],
+      ["d", "calm"],
     ]);
     expect(found[0]?.todo).toContain("bring it home");
+    expect(found[1]?.todo).toContain("with a new battery");
+    expect(found[2]?.todo).toContain("its part is flown");
   });
 
   test("nothing of a mission that ended, and a pause of one that did not", () => {

@@ -96,7 +96,7 @@ function ofVehicle(v: VehicleView, { state, ending }: MissionView, alarms: reado
       ...matter,
       tone: "calm",
       what: say("attention.isHome", { name: v.name }),
-      todo: say("attention.newBattery"),
+      todo: say(v.part_done ? "attention.takeOut" : "attention.newBattery"),
     });
   else if (led && v.phase === "stopped" && v.withdrawn !== "")
     found.push({
