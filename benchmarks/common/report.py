@@ -55,7 +55,8 @@ FLIGHT = Page(
 
 Every section is written by the command that stands in it (`--write`). Vehicles are simulated; service and vehicles
 share the cores of one machine. `loops` and `waiting_pct` count the circles of vehicles that give way, too, and of those
-that have flown their way and wait for the others; `loops_under_way` are without the latter.
+that have flown their way and wait for the others, as nobody told them where home is; `loops_under_way` and
+`waiting_under_way_pct` are without the latter.
 """,
 )
 COVERAGE = Page(

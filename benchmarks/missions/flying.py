@@ -4,7 +4,8 @@ A mission of the service with its simulated vehicles, in process or, with ``--ki
 processes of their own. Of the tracks as they were stored is told, by vehicle and in all: ``flown_m``; ``on_plan_pct``,
 the part flown along a planned leg (within 4 m and 45 degrees of its course); ``loops``, closed circles in a track;
 ``waiting_pct``, the part of the time spent in them; ``loops_under_way``, those until its last leg was reached, after
-which a vehicle waits for the others; ``loops_giving_way``, those of them that it flew to let another one pass;
+which a vehicle waits for the others, and ``waiting_under_way_pct``, the part of that time spent in them;
+``loops_giving_way``, those of them that it flew to let another one pass;
 ``loops_of_legs``, those that have legs in them, where its planned way crosses itself;
 ``survey_minutes``, how long each vehicle surveyed by its clock, of which a mission has so many; and how many legs were
 not reached. ``--slow-decisions 5`` makes each decision take that many
@@ -24,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import decide
@@ -157,6 +158,10 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         by_vehicle[name], drawn[name] = judged(track, seconds, ends, gives_way_s[name]), (track, ends)
     if picture is not None:
         draw(picture, drawn)
+
+    def mean_of(figure: str) -> float:
+        return round(float(np.mean([found[figure] for found in by_vehicle.values()])), 2)
+
     flown = sum(found["flown_m"] for found in by_vehicle.values())
     return {
         "state": str(view.state),
@@ -169,7 +174,8 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         "loops_under_way": sum(found["loops_under_way"] for found in by_vehicle.values()),
         "loops_giving_way": sum(found["loops_giving_way"] for found in by_vehicle.values()),
         "loops_of_legs": sum(found["loops_of_legs"] for found in by_vehicle.values()),
-        "waiting_pct": round(float(np.mean([found["waiting_pct"] for found in by_vehicle.values()])), 2),
+        "waiting_pct": mean_of("waiting_pct"),
+        "waiting_under_way_pct": mean_of("waiting_under_way_pct"),
         "missed": sum(row.status != "reached" for row in waypoints),
         "by_vehicle": by_vehicle,
     }
@@ -224,6 +230,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
             "loops_giving_way": 0,
             "loops_of_legs": 0,
             "waiting_pct": 0.0,
+            "waiting_under_way_pct": 0.0,
             "hours": 0.0,
         }
         return {"flown_m": flown, **nothing}
@@ -268,7 +275,7 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
             of_legs += end <= end_m and not lets_pass and on_legs_m >= LEGS_OF_LOOP_M
             loops, k = loops + 1, end
         k += 1
-    spent = np.diff(times)
+    spent, before = np.diff(times), np.arange(len(step)) < end_m
     return {
         "flown_m": round(flown, 1),
         "planned_m": round(float(legs_m.sum()), 1),
@@ -277,9 +284,15 @@ def judged(track: FloatArray, seconds: FloatArray, ends: FloatArray, gives_way_s
         "loops_under_way": under_way,
         "loops_giving_way": giving_way,
         "loops_of_legs": of_legs,
-        "waiting_pct": round(100.0 * float(spent[circling].sum() / max(spent.sum(), 1e-9)), 2),
+        "waiting_pct": pct_of(spent, circling),
+        "waiting_under_way_pct": pct_of(spent[before], circling[before]),
         "hours": round(float(spent.sum()) / 3600.0, 3),
     }
+
+
+def pct_of(spent_s: FloatArray, in_it: BoolArray) -> float:
+    """Return the part of times (n,) that is in some of them, per cent."""
+    return round(100.0 * float(spent_s[in_it].sum() / max(spent_s.sum(), 1e-9)), 2)
 
 
 def way_m(ends: FloatArray) -> float:
