@@ -11,6 +11,7 @@ from app.arrays import FloatArray
 from app.mapping.readers.file_extensions import DRIVERS
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
+from app.mapping.readers.units import metres_in
 
 DEPTH_BANDS = ("depth", "elevation", "height", "z")
 SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
@@ -69,10 +70,22 @@ def _read(file: Any) -> Raster:
 
 
 def _band(file: Any, number: int) -> FloatArray:
+    """Return a band in metres, NaN where it has no value: whole numbers may stand for others, and units differ."""
     if np.issubdtype(np.dtype(file.dtypes[number - 1]), np.complexfloating):
         raise ReadError(f"band {number}", f"its values are {file.dtypes[number - 1]}", "depths are real numbers")
     values = np.ma.filled(np.ma.asarray(file.read(number, masked=True)).astype(np.float64), np.nan)
-    return np.where(np.isfinite(values), values, np.nan)
+    values = file.scales[number - 1] * values + file.offsets[number - 1]
+    return np.where(np.isfinite(values), _metres(file, number) * values, np.nan)
+
+
+def _metres(file: Any, number: int) -> float:
+    """Return how many metres one is in a band, by its own unit, else by that of the vertical axis."""
+    said = file.units[number - 1]
+    if said or file.crs is None or file.driver == "BAG":
+        return metres_in(said, f"band {number}")
+    crs = pyproj.CRS.from_wkt(file.crs.to_wkt())
+    vertical = next((part for part in crs.sub_crs_list if part.is_vertical), None)
+    return 1.0 if vertical is None else float(vertical.axis_info[0].unit_conversion_factor)
 
 
 def _direction(file: Any, name: str) -> Positive | None:
