@@ -10,8 +10,9 @@ from rasterio.errors import RasterioError
 from app.arrays import FloatArray
 from app.mapping.readers.file_extensions import DRIVERS
 from app.mapping.readers.hdf5 import check_contained
-from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
+from app.mapping.readers.types import MAX_RASTER_CELLS, Points, Positive, Raster, ReadError
 from app.mapping.readers.units import metres_in
+from app.mapping.readers.vr_bag import read_refined
 
 DEPTH_BANDS = ("depth", "elevation", "height", "z")
 SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
@@ -20,8 +21,10 @@ SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
 NAMES = {"GTiff": "GeoTIFF", "AAIGrid": "ESRI ASCII grid", "BAG": "BAG"}
 
 
-def read_raster(content: bytes, kind: str) -> Raster:
+def read_raster(content: bytes, kind: str) -> Points | Raster:
     """Return the grid in a file: its depths and, if it has such a band, their standard deviations.
+
+    Of a BAG of variable resolution the refined cells are returned, each as a sounding in its middle.
 
     Parameters
     ----------
@@ -40,7 +43,8 @@ def read_raster(content: bytes, kind: str) -> Raster:
         if not content:
             raise RasterioError("empty")
         with rasterio.MemoryFile(content, filename=f"file{kind}") as memory, memory.open(driver=driver) as file:
-            return _read(file)
+            refined = read_refined(content, file.transform, _crs(file)) if driver == "BAG" else None
+            return _read(file) if refined is None else refined
     except RasterioError:
         # GDAL's words quote what it stumbled over.
         what = NAMES[driver]
@@ -64,9 +68,13 @@ def _read(file: Any) -> Raster:
         z,
         np.full(z.shape, np.nan) if sd is None else _band(file, sd + 1),
         file.transform,
-        None if file.crs is None else pyproj.CRS.from_wkt(file.crs.to_wkt()),
+        _crs(file),
         _direction(file, names[depth - 1]),
     )
+
+
+def _crs(file: Any) -> pyproj.CRS | None:
+    return None if file.crs is None else pyproj.CRS.from_wkt(file.crs.to_wkt())
 
 
 def _band(file: Any, number: int) -> FloatArray:
@@ -81,9 +89,9 @@ def _band(file: Any, number: int) -> FloatArray:
 def _metres(file: Any, number: int) -> float:
     """Return how many metres one is in a band, by its own unit, else by that of the vertical axis."""
     said = file.units[number - 1]
-    if said or file.crs is None or file.driver == "BAG":
+    crs = _crs(file)
+    if said or crs is None or file.driver == "BAG":
         return metres_in(said, f"band {number}")
-    crs = pyproj.CRS.from_wkt(file.crs.to_wkt())
     vertical = next((part for part in crs.sub_crs_list if part.is_vertical), None)
     return 1.0 if vertical is None else float(vertical.axis_info[0].unit_conversion_factor)
 
