@@ -82,6 +82,7 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: MapEx
         raise ReadError("file", f"{near.sum()} depths are more than {MAX_SOUNDINGS}", "thin the file")
     if not near.all():  # else two million soundings need not be copied
         east, north, depth, sd = east[near], north[near], depth[near], sd[near]
+    _check_side(depth, options)
     total = _deviations(sd, depth, options, notes)
     if isinstance(content, Points) and content.detection_sd_m is not None:
         total = np.where(sd > 0.0, total, np.minimum(np.hypot(total, content.detection_sd_m[near]), MAX_SD_M))
@@ -110,6 +111,7 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
             sampled = (total / np.where(count, count, np.nan)).reshape(place.grid.rows, place.grid.cols)
     if not np.isfinite(sampled).any():
         raise ReadError("file", "none of its depths lies in the mission's grid", "check the file and its crs")
+    _check_side(sampled, options)
     return sampled, notes
 
 
@@ -152,6 +154,16 @@ def _check_depths(depth: FloatArray, content: Points | Raster) -> None:
             _where(content, index),
             f"its depth is not between {MIN_DEPTH_M:g} and {MAX_DEPTH_M:g} m",
             "check units, sign and nodata value",
+        )
+
+
+def _check_side(depth: FloatArray, options: ReadOptions) -> None:
+    """Refuse depths of which nearly all lie above zero, where nobody but the file said which way they grow."""
+    if options.positive is None and np.mean(depth[np.isfinite(depth)] < options.datum_offset_m) >= _BOTH:
+        raise ReadError(
+            "positive",
+            "by what the file says of its values nearly all there lie above the water",
+            "say positive=up for heights, or positive=down where they are depths",
         )
 
 

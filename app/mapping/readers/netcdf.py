@@ -11,6 +11,7 @@ from netCDF4 import Dataset
 from app.arrays import FloatArray
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
+from app.mapping.readers.units import metres_in
 
 DEPTH_NAMES = ("depth", "elevation", "bathymetry", "z", "height", "topo", "band1")
 SD_NAMES = ("uncertainty", "sd", "depth_uncertainty", "standard_deviation")
@@ -52,13 +53,17 @@ def _read(file: Any) -> Raster:
     rows, cols = variable.shape
     if rows * cols > MAX_RASTER_CELLS:
         raise ReadError(name, f"{cols} x {rows} cells are more than {MAX_RASTER_CELLS}", "cut it to the mission's area")
-    y_name, x_name = variable.dimensions
+    turned = _is_eastward(file, variable.dimensions[0]) and not _is_eastward(file, variable.dimensions[1])
+    y_name, x_name = variable.dimensions[::-1] if turned else variable.dimensions
     y, x = _axis(file, y_name), _axis(file, x_name)
-    z = _values(variable)
+    z = _metres(variable)
     if not np.isfinite(z).any():
         raise ReadError(name, "no cell of it has a value", "check its _FillValue")
     sd = next((file.variables[n] for n in SD_NAMES if n in file.variables), None)
-    sd_values = _values(sd) if sd is not None and sd.shape == variable.shape else np.full(z.shape, np.nan)
+    same = sd is not None and sd.dimensions == variable.dimensions
+    sd_values = _metres(sd) if same else np.full(z.shape, np.nan)
+    if turned:
+        z, sd_values = z.T, sd_values.T
     step_x, step_y = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
     transform = Affine(step_x, 0.0, x[0] - 0.5 * step_x, 0.0, step_y, y[0] - 0.5 * step_y)
     return Raster(z, sd_values, transform, _crs(file, variable, x_name, y_name), _direction(variable))
@@ -96,6 +101,21 @@ def _axis(file: Any, name: str) -> FloatArray:
     if not np.all(np.isfinite(values)) or step == 0 or np.max(np.abs(values - even)) > REGULAR * abs(step):
         raise ReadError(_called(name), "its values are not evenly spaced", "regrid the file, or send it as XYZ")
     return values
+
+
+def _is_eastward(file: Any, name: str) -> bool:
+    """Return whether an axis says that it leads to the east."""
+    variable = file.variables.get(name)
+    said = [str(getattr(variable, attribute, "")).lower() for attribute in ("axis", "standard_name")]
+    return (
+        said[0] == "x"
+        or said[1] in ("longitude", "projection_x_coordinate")
+        or name.lower() in ("x", "lon", "long", "longitude", "easting", "east")
+    )
+
+
+def _metres(variable: Any) -> FloatArray:
+    return metres_in(getattr(variable, "units", ""), _called(variable.name)) * _values(variable)
 
 
 def _values(variable: Any) -> FloatArray:

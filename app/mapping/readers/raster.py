@@ -10,7 +10,9 @@ from rasterio.errors import RasterioError
 from app.arrays import FloatArray
 from app.mapping.readers.file_extensions import DRIVERS
 from app.mapping.readers.hdf5 import check_contained
-from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
+from app.mapping.readers.types import MAX_RASTER_CELLS, Points, Positive, Raster, ReadError
+from app.mapping.readers.units import metres_in
+from app.mapping.readers.vr_bag import read_refined
 
 DEPTH_BANDS = ("depth", "elevation", "height", "z")
 SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
@@ -19,8 +21,10 @@ SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
 NAMES = {"GTiff": "GeoTIFF", "AAIGrid": "ESRI ASCII grid", "BAG": "BAG"}
 
 
-def read_raster(content: bytes, kind: str) -> Raster:
+def read_raster(content: bytes, kind: str) -> Points | Raster:
     """Return the grid in a file: its depths and, if it has such a band, their standard deviations.
+
+    Of a BAG of variable resolution the refined cells are returned, each as a sounding in its middle.
 
     Parameters
     ----------
@@ -39,7 +43,8 @@ def read_raster(content: bytes, kind: str) -> Raster:
         if not content:
             raise RasterioError("empty")
         with rasterio.MemoryFile(content, filename=f"file{kind}") as memory, memory.open(driver=driver) as file:
-            return _read(file)
+            refined = read_refined(content, file.transform, _crs(file)) if driver == "BAG" else None
+            return _read(file) if refined is None else refined
     except RasterioError:
         # GDAL's words quote what it stumbled over.
         what = NAMES[driver]
@@ -63,16 +68,32 @@ def _read(file: Any) -> Raster:
         z,
         np.full(z.shape, np.nan) if sd is None else _band(file, sd + 1),
         file.transform,
-        None if file.crs is None else pyproj.CRS.from_wkt(file.crs.to_wkt()),
+        _crs(file),
         _direction(file, names[depth - 1]),
     )
 
 
+def _crs(file: Any) -> pyproj.CRS | None:
+    return None if file.crs is None else pyproj.CRS.from_wkt(file.crs.to_wkt())
+
+
 def _band(file: Any, number: int) -> FloatArray:
+    """Return a band in metres, NaN where it has no value: whole numbers may stand for others, and units differ."""
     if np.issubdtype(np.dtype(file.dtypes[number - 1]), np.complexfloating):
         raise ReadError(f"band {number}", f"its values are {file.dtypes[number - 1]}", "depths are real numbers")
     values = np.ma.filled(np.ma.asarray(file.read(number, masked=True)).astype(np.float64), np.nan)
-    return np.where(np.isfinite(values), values, np.nan)
+    values = file.scales[number - 1] * values + file.offsets[number - 1]
+    return np.where(np.isfinite(values), _metres(file, number) * values, np.nan)
+
+
+def _metres(file: Any, number: int) -> float:
+    """Return how many metres one is in a band, by its own unit, else by that of the vertical axis."""
+    said = file.units[number - 1]
+    crs = _crs(file)
+    if said or crs is None or file.driver == "BAG":
+        return metres_in(said, f"band {number}")
+    vertical = next((part for part in crs.sub_crs_list if part.is_vertical), None)
+    return 1.0 if vertical is None else float(vertical.axis_info[0].unit_conversion_factor)
 
 
 def _direction(file: Any, name: str) -> Positive | None:

@@ -1,18 +1,23 @@
-"""Water levels from a table of high and low waters (``.tid`` files, as Neptus and DUNE users have them)."""
+"""Water levels from a table of high and low waters or of observed levels (``.tid`` files as of Neptus and DUNE)."""
 
 import hashlib
 import re
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicHermiteSpline
 
 from app.arrays import FloatArray
 
 MAX_LEVEL_M = 20.0
 MAX_GAP_S = 24.0 * 3600.0
 """Where the sea has one tide a day its extremes are half a day apart; a larger gap is a hole in the table."""
+
+OBSERVED_GAP_S = 2.0 * 3600.0
+"""Entries that are no farther apart are levels of a gauge in a table whose entries are not all extremes."""
 
 MAX_LINES = 200_000
 _LINE = re.compile(
@@ -26,7 +31,7 @@ class TideTableError(ValueError):
 
 @dataclass(frozen=True)
 class TideTable:
-    """High and low waters in the order of time.
+    """High and low waters, or levels as a gauge observed them, in the order of time.
 
     Attributes
     ----------
@@ -52,9 +57,11 @@ class TideTable:
         return datetime.fromtimestamp(float(self.times_s[-1]), UTC)
 
     def levels_at(self, time_s: ArrayLike) -> FloatArray:
-        """Return the level at each time, a half cosine between two extremes; NaN where the table says nothing.
+        """Return the level at each time; NaN where the table says nothing.
 
-        That is before the first entry, after the last, and in a hole of more than ``MAX_GAP_S``.
+        A half cosine leads from one extreme to the next; observed levels are joined by cubics whose slopes at an entry
+        are those of the parabola through it and its neighbours. Nothing is said before the first entry, after the
+        last, and in a hole of more than ``MAX_GAP_S``.
         """
         times = np.asarray(time_s, float)
         after = np.clip(np.searchsorted(self.times_s, times, side="right"), 1, len(self.times_s) - 1)
@@ -62,9 +69,22 @@ class TideTable:
         low, high = self.levels_m[after - 1], self.levels_m[after]
         phase = np.pi * (times - begin) / (end - begin)
         level = 0.5 * (low + high) + 0.5 * (low - high) * np.cos(phase)
+        if not self._of_extremes:
+            level = np.where(end - begin <= OBSERVED_GAP_S, self._cubic(times), level)
         known = (times >= self.times_s[0]) & (times <= self.times_s[-1])
         known &= (end - begin <= MAX_GAP_S) | (times == begin) | (times == end)
         return np.where(known, level, np.nan)
+
+    @cached_property
+    def _of_extremes(self) -> bool:
+        """Whether levels rise and fall in turn, as from high water to low water."""
+        rise = np.diff(self.levels_m)
+        return bool(np.all(rise[:-1] * rise[1:] < 0.0))
+
+    @cached_property
+    def _cubic(self) -> CubicHermiteSpline:
+        slopes: FloatArray = np.gradient(self.levels_m, self.times_s, edge_order=2)
+        return CubicHermiteSpline(self.times_s, self.levels_m, slopes, extrapolate=False)
 
     def why_not(self, time_s: float) -> str:
         """Return why there is no level at a time, for an operator; empty when there is one."""

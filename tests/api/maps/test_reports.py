@@ -240,6 +240,20 @@ async def test_a_swath_survey_lists_holidays_crosslines_and_corrections(client: 
     assert page.tags["img"] == 6
 
 
+async def test_what_beams_met_is_not_told_as_known_to_an_accuracy(client: httpx.AsyncClient) -> None:
+    told = {}
+    for survey in (swath_survey, single_beam_survey):
+        path = await survey(client)
+        page = Page((await client.get(f"{path}/report.html")).text)
+        told[survey] = {source for source, *_ in page.shown}, "Area known to the accuracy asked for" in page.text
+    sources, known = told[swath_survey]
+    assert "mission.progress.ensonified_pct" in sources
+    assert not known
+    sources, known = told[single_beam_survey]
+    assert "mission.progress.coverage_pct" in sources
+    assert known
+
+
 async def test_hostile_names_are_only_names(client: httpx.AsyncClient) -> None:
     path = await single_beam_survey(client)
     answer = await client.get(f"{path}/report.html")

@@ -13,6 +13,9 @@ from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.bag import NODATA
 from app.mapping.products.vr_bag import REFINED_CELLS, vr_bag
+from app.mapping.readers.files import read_file
+from app.mapping.readers.georeferencing import place_reference, place_soundings
+from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map
 from app.mapping.tiers import coarsened, doublings
@@ -122,3 +125,32 @@ def test_a_map_without_soundings_is_refused(bathymetry: BathymetricMap) -> None:
     alone.sounded[:] = False
     with pytest.raises(ValueError, match="sounded"):
         vr_bag(alone, SHARE, FRAME, vertical_datum=LAT, title="x", common_sd_m=0.0)
+
+
+def test_what_is_exported_is_imported_again_cell_by_cell(path: Path, bathymetry: BathymetricMap) -> None:
+    place = MapExtent(FRAME, bathymetry.grid, margin_m=10.0)
+    content = read_file(io.BytesIO(path.read_bytes()), ".bag", place)
+    found = place_soundings(content, ReadOptions(), place)
+    s = found.soundings
+    with h5py.File(path) as file:
+        assert len(s) == found.found == (file["BAG_root/varres_refinements"]["depth"] != NODATA).sum()
+    assert found.notes == []
+    slope = 10.0 + 0.6 * (s.east_m - 5.0)
+    # A cell of up to 8 m at the border of what was sounded holds the mean of a part of it.
+    assert np.percentile(np.abs(s.depth_m - slope), 95) < 0.6
+    fine = np.isclose((s.east_m - 5.0) % 1.0, 0.5, atol=1e-3) & (s.depth_m < 20.0)
+    row, col = (s.north_m + 7.0).astype(int)[fine], (s.east_m - 5.0).astype(int)[fine]
+    np.testing.assert_allclose(s.depth_m[fine], bathymetry.depth_m[row, col], atol=1e-4)
+    np.testing.assert_allclose(s.sd_m[fine], bathymetry.sd_m[row, col], atol=1e-4)
+    sampled, _ = place_reference(content, ReadOptions(), place)
+    np.testing.assert_allclose(sampled[row, col], bathymetry.depth_m[row, col], atol=1e-4)
+
+
+def test_refinements_that_lie_beyond_the_end_are_refused(path: Path, bathymetry: BathymetricMap) -> None:
+    with h5py.File(path, "r+") as file:
+        table = file["BAG_root/varres_metadata"][:]
+        table["index"][table["index"] < 1000] += 10_000_000
+        file["BAG_root/varres_metadata"][:] = table
+    place = MapExtent(FRAME, bathymetry.grid, margin_m=10.0)
+    with pytest.raises(ReadError, match="cannot be read as BAG"):
+        read_file(io.BytesIO(path.read_bytes()), ".bag", place)

@@ -149,6 +149,90 @@ def test_netcdf_with_latitude_and_longitude_and_heights(tmp_path: Path) -> None:
     np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("dtype", "unit", "vertical", "scale", "offset"),
+    [
+        ("int16", "", None, 0.01, 0.0),
+        ("int16", "m", None, 0.01, 2.0),
+        ("float64", "ft", None, 1.0, 0.0),
+        ("float64", "", 6360, 1.0, 0.0),
+    ],
+    ids=["whole centimetres", "whole centimetres from 2 m", "feet", "a vertical system in US survey feet"],
+)
+def test_what_a_raster_says_of_its_numbers_is_heeded(
+    dtype: str, unit: str, vertical: int | None, scale: float, offset: float, tmp_path: Path
+) -> None:
+    metres = {"ft": 0.3048, "m": 1.0, "": 1.0 if vertical is None else 1200 / 3937}[unit]
+    numbers = (depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)) / metres - offset) / scale
+    crs = UTM if vertical is None else pyproj.CRS.from_user_input(f"EPSG:32629+{vertical}")
+    west, south = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True).transform(0.0, 0.0)
+    with rasterio.open(
+        path := tmp_path / "a.tif", "w", driver="GTiff", width=GRID.cols, height=GRID.rows, count=1, dtype=dtype,
+        transform=Affine(2.0, 0.0, west, 0.0, 2.0, south), crs=crs.to_wkt(),
+    ) as file:  # fmt: skip
+        file.write(np.round(numbers).astype(dtype) if dtype == "int16" else numbers, 1)
+        file.scales, file.offsets = [scale], [offset]
+        if unit:
+            file.set_band_unit(1, unit)
+    content = read_path(path)
+    assert isinstance(content, Raster)
+    np.testing.assert_allclose(content.z, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.006)
+
+
+def write_netcdf(path: Path, name: str, unit: str, metres: float, *, east_first: bool = False) -> None:
+    with netCDF4.Dataset(path, "w") as file:
+        for axis, values in (("x", GRID.east_m), ("y", GRID.north_m)):
+            file.createDimension(axis, len(values))
+            file.createVariable(axis, "f8", (axis,))[:] = values
+        z = depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)) / metres
+        for layer, values in ((name, z), ("uncertainty", 0.01 * z)):
+            variable = file.createVariable(layer, "f8", ("x", "y") if east_first else ("y", "x"))
+            variable.units = unit
+            variable[:] = values.T if east_first else values
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("Metres", 1.0), ("cm", 0.01), ("feet", 0.3048)])
+def test_depths_in_netcdf_have_the_unit_that_they_state(unit: str, metres: float, tmp_path: Path) -> None:
+    write_netcdf(path := tmp_path / "a.nc", "depth", unit, metres)
+    s = place_soundings(read_path(path), ReadOptions(crs="local"), PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m))
+    np.testing.assert_allclose(s.sd_m, 0.01 * s.depth_m)
+
+
+def test_a_unit_that_is_none_of_length_is_refused(tmp_path: Path) -> None:
+    write_netcdf(path := tmp_path / "a.nc", "depth", "dbar", 1.0)
+    with pytest.raises(ReadError, match="its unit is no known one of length") as caught:
+        read_path(path)
+    assert caught.value.field == "variable depth"
+
+
+def test_a_grid_whose_first_axis_leads_east_lies_where_it_should(tmp_path: Path) -> None:
+    write_netcdf(path := tmp_path / "a.nc", "depth", "m", 1.0, east_first=True)
+    s = place_soundings(read_path(path), ReadOptions(crs="local"), PLACE).soundings
+    assert len(s) == GRID.rows * GRID.cols
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m))
+    np.testing.assert_allclose(s.sd_m, 0.01 * s.depth_m)
+
+
+@pytest.mark.parametrize(("name", "sign"), [("depth", -1.0), ("elevation", 1.0)])
+def test_names_that_contradict_the_signs_are_not_believed(name: str, sign: float) -> None:
+    rows = [f"{east},{north},{sign * (6.0 + 0.1 * east + 0.05 * north)}" for east in (5, 20) for north in (8, 30)]
+    content = read_words("\n".join([f"east_m,north_m,{name}", *rows]))
+    for place in (place_soundings, place_reference):
+        with pytest.raises(ReadError, match="lie above the water") as caught:
+            place(content, SD, PLACE)
+        assert caught.value.field == "positive"
+    s = place_soundings(content, ReadOptions(sd_m=0.3, positive="up" if sign < 0 else "down"), PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m))
+    said = ReadOptions(sd_m=0.3, positive="down" if sign < 0 else "up")
+    np.testing.assert_allclose(place_soundings(content, said, PLACE).soundings.depth_m, -s.depth_m)
+
+
+def test_ground_that_dries_beside_ground_that_does_not_is_taken() -> None:
+    content = read_words("east_m,north_m,depth\n5,8,-1.5\n20,8,0.5\n20,30,-0.2")
+    assert place_soundings(content, SD, PLACE).soundings.depth_m.tolist() == [-1.5, 0.5, -0.2]
+
+
 def test_text_in_every_usual_shape(tmp_path: Path) -> None:
     east, north = np.array([5.0, 20.0]), np.array([8.0, 30.0])
     (lat, lon), depth = FRAME.to_geographic(east, north), depth_at(east, north)

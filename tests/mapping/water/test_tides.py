@@ -43,6 +43,22 @@ def test_between_two_extremes_the_level_never_leaves_them(part: float) -> None:
     assert 1.1 - 1e-9 <= table.levels_at(table.times_s[0] + part * span) <= 3.0 + 1e-9
 
 
+@pytest.mark.parametrize(("minutes", "most_m"), [(6, 0.001), (30, 0.005), (60, 0.02)])
+def test_observed_levels_are_no_staircase_of_extremes(minutes: int, most_m: float) -> None:
+    """Half cosines between the levels of each hour are up to 0.09 m off half way up a tide of 3 m."""
+    begin, period_s = datetime(2026, 1, 1, tzinfo=UTC), 12.42 * 3600
+
+    def level(seconds: float) -> float:
+        return 2.0 + 1.5 * math.sin(2 * math.pi * seconds / period_s)
+
+    entries = [60.0 * minutes * i for i in range(48 * 60 // minutes + 1)]
+    table = parse_tid("\n".join(f"{begin + timedelta(seconds=s):%Y/%m/%d %H:%M:%S} {level(s):.4f}" for s in entries))
+    np.testing.assert_allclose(table.levels_at(table.times_s), table.levels_m)
+    between = np.arange(0.0, entries[-1], 60.0)
+    off = table.levels_at(begin.timestamp() + between) - [level(s) for s in between]
+    assert np.abs(off).max() < most_m
+
+
 @pytest.mark.parametrize("seconds", [-1.0, 67_681.0, 1e9, math.nan])
 def test_beyond_the_table_there_is_no_level_and_a_reason(seconds: float) -> None:
     table = parse_tid(TABLE)

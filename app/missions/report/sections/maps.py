@@ -85,13 +85,17 @@ def density(w: Writer) -> list[Block]:
     kind = LAYERS["density" if w.is_swath else "count"]
     layer = kind.of(snapshot.source(w.answers.order))
     swept = snapshot.ensonified()
-    facts: list[tuple[str, Text]] = [(t("fact_coverage"), w.number("mission.progress.coverage_pct", 1, "%"))]
-    facts.append((t("fact_accuracy"), w.number("mission.spec.accuracy_m", 2, "m")))
+    facts: list[tuple[str, Text]]
     if w.is_swath:
-        facts += [
+        facts = [
             (t("fact_ensonified"), w.number("mission.progress.ensonified_pct", 1, "%")),
             (t("fact_dense"), w.number("mission.progress.dense_pct", 1, "%")),
             (t("fact_holidays"), w.number("mission.progress.holidays")),
+        ]
+    else:
+        facts = [
+            (t("fact_coverage"), w.number("mission.progress.coverage_pct", 1, "%")),
+            (t("fact_accuracy"), w.number("mission.spec.accuracy_m", 2, "m")),
         ]
     blocks: list[Block] = [Facts(facts), Paragraph(t("coverage_swath" if w.is_swath else "coverage_single"))]
     if layer is not None:
