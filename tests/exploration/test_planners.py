@@ -332,3 +332,12 @@ def test_who_waits_where_it_may_not_be_keeps_nobody_from_going_on() -> None:
     positions = planner.propose(asked, np.random.default_rng(0)).positions
     assert np.array_equal(positions[0], asked.positions[0])
     assert np.hypot(*(positions[1] - asked.positions[1])[:2]) > 1.0
+
+
+@pytest.mark.parametrize("name", ["cao", "rollout", "spsa", "fdsa"])
+def test_an_area_that_its_zones_cover_is_refused_in_words(name: str) -> None:
+    middle = SQUARE.mean(axis=0)
+    covering = replace(make_situation().constraints, keep_out=(middle + 1.5 * (SQUARE - middle),))
+    situation = replace(make_situation(), constraints=covering)
+    with pytest.raises(ValueError, match="leave nothing of the area to map"):
+        create_planner(name, PlannerOptions(search=8), SingleBeam()).propose(situation, np.random.default_rng(0))

@@ -40,6 +40,8 @@ class TrackRun:
     are not accurately known at the end. ``target_tracked_pct`` and ``target_error`` count from step 100 on. A
     ``needless`` rising came before it was needed. ``wrongly_accurate_pct``: landmarks of ``A`` that are farther from
     their estimates than their deviations explain. ``error`` is the norm of the landmarks' error per step.
+    ``broken_constraints`` counts the steps of single vehicles that broke a limit as they were flown: altimeters lift
+    vehicles off ground that lies higher than estimated, and the step is longer than it may be.
     """
 
     planner: str
@@ -100,10 +102,9 @@ def run_track(
         t0 = time.perf_counter()
         proposal = chooser.propose(situation, choice)
         plan_s.append(time.perf_counter() - t0)
-        broken += len(
-            {v.vehicle for v in scenario.constraints.violations(world.names, world.estimated, proposal.positions)}
-        )
+        before = world.estimated.copy()
         distance += float(world.move(proposal.positions).sum())
+        broken += len({v.vehicle for v in scenario.constraints.violations(world.names, before, world.estimated)})
         world.pass_time()
         world.sense(noise)
         history.append(100.0 * float(1.0 - world.known.accurate.mean()))

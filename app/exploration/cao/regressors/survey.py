@@ -169,6 +169,8 @@ class SurveyRegressors:
             heard_of = np.asarray(cKDTree(self._silent).query(team.belief.xy_m)[0]) <= SILENT_WITHIN * self._spacing
             roughness = np.where(heard_of & (distance > SILENT_WITHIN * self._spacing), SILENT, 1.0) * roughness
         self._nodes = thin_nodes(team, roughness)
+        if not len(self._nodes.x):
+            raise ValueError("keep-out zones and their margins leave nothing of the area to map")
         self._scale = max(team.belief.correlation_length_m, self._spacing)
         turns = Turns(self._options.turn_radius_m, CORNER_LOSS * constraints.max_step_m if team.left_m is None else 0.0)
         self._noise = noise_part(team.belief, distance, self._scale) * len(self._nodes.x)
