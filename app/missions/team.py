@@ -21,7 +21,7 @@ from app.missions.fleet.interface import (
     WaypointOrder,
     WaypointStatus,
 )
-from app.missions.flown import Flown
+from app.missions.flown import Flown, Phase
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import Active
 from app.missions.spec.failsafes import Response
@@ -326,6 +326,7 @@ class Team:
         member = self.members.pop(name, None)
         if member is not None:
             member.left_at, member.status, member.pursuing = at, None, None
+            member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
             member.set_order(None)
             member.ahead.clear()
             member.engaged = member.surfacing = False
@@ -367,6 +368,11 @@ class Team:
     def surveying(self) -> list[Member]:
         """Those that take part in the survey, whether or not they can be reached now."""
         return [m for m in self.members.values() if m.withdrawal is None]
+
+    @property
+    def going_on(self) -> list[Member]:
+        """Those that survey, or may again when they are not held any more."""
+        return [*self.surveying, *self.held]
 
     @property
     def at_rest(self) -> list[Member]:
