@@ -486,9 +486,11 @@ class LiveMission:
             return max(self.search.left_s(), 0.0) / self._time_scale
         if self.reports.leg_s is None:
             return None
-        committed = [len(m.ahead) + m.ordered for m in self.team]
-        leg_m = self.spec.limits.max_step_m
-        left = [m.way_left_m(self.spec) / leg_m for m in self.team.present] or [self.spec.steps - self.header.step]
+        if list(self.team) and not self.team.going_on:
+            return 0.0  # what they still fly is their way home
+        committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
+        leg_m, flying = self.spec.limits.max_step_m, [*self.team.present, *self.team.held]
+        left = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
         return (max(0.0, *left) + max(committed, default=0)) * self.reports.leg_s
 
     def summary(self) -> MissionSummary:
