@@ -91,6 +91,8 @@ class Withdrawal:
         Whether a person wanted it: then only a person ends it.
     below
         Whether it waits below for ships to pass: it would come up where it is.
+    done
+        Whether it has flown its part, or its mission was flown to its end.
     """
 
     response: Response
@@ -99,17 +101,21 @@ class Withdrawal:
     led: bool = False
     asked: bool = False
     below: bool = False
+    done: bool = False
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored, so that a restart goes on with it."""
-        return {"response": self.response, "why": self.why, "over": self.over, "asked": self.asked}
+        facts = {"response": self.response, "why": self.why, "over": self.over, "asked": self.asked}
+        return facts | {"done": self.done}
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Withdrawal | None":
         """Return what was stored."""
         if not stored:
             return None
-        return cls(Response(stored["response"]), stored["why"], stored["over"], asked=stored.get("asked", False))
+        why, asked = stored["why"], stored.get("asked", False)
+        done = stored.get("done", why in PART_DONE)
+        return cls(Response(stored["response"]), why, stored["over"], asked=asked, done=done)
 
 
 @dataclass

@@ -312,15 +312,17 @@ class LiveMission:
         """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
         self.reports.take(event, self.spec, running=self._counting, standing=bool(self.standstill))
 
-    def withdraw(self, member: Member, response: Response, why: str, *, asked: bool = False) -> bool:
+    def withdraw(
+        self, member: Member, response: Response, why: str, *, asked: bool = False, done: bool = False
+    ) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.
 
-        The flight sends it where the response leads. ``asked``: a person wants it.
+        The flight sends it where the response leads. ``asked``: a person wants it; ``done``: it has flown its part.
         """
         before = member.withdrawal
         if before is not None and (STRENGTH[before.response] >= STRENGTH[response] or before.over):
             return False
-        member.withdrawal = Withdrawal(response, why, asked=asked)
+        member.withdrawal = Withdrawal(response, why, asked=asked, done=done)
         member.pursuing = None
         self.changed.set()
         return True

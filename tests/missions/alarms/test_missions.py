@@ -211,7 +211,7 @@ async def test_a_vehicle_that_comes_back_while_nobody_flies_is_lost_no_longer(ha
 
     await until(over, "it is heard")
     alarms = [alarm.kind for alarm in await harbour.service.alarms.alarms(mission_id=mission)]
-    assert (alarms.count("link_lost"), alarms.count("vehicle_lost")) == (1, 1), "each was raised once"
+    assert (alarms.count(AlarmKind.LINK_LOST), alarms.count(AlarmKind.VEHICLE_LOST)) == (1, 1), "each was raised once"
 
 
 async def test_a_vehicle_that_is_not_heard_after_a_restart_is_still_lost(harbour: Harbour) -> None:
