@@ -544,3 +544,17 @@ async def test_what_a_mission_that_was_finished_refuses_is_said_of_a_finished_on
     with pytest.raises(ConflictError, match="the mission is finished: nobody is led") as refused:
         await call_home(live, "a", "Ana")
     assert "create a new mission" in refused.value.remedy
+
+
+async def test_a_mission_in_steps_of_the_team_whose_vehicles_were_all_called_home_says_so(
+    service: MissionService,
+) -> None:
+    limits = {"max_step_m": 5.0, "com_range_m": 200.0, "min_separation_m": 1.0}
+    mission = await service.create(recovered("a", "b", steps=1000, limits=limits))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    for name in ("a", "b"):
+        await call_home(live, name, "Ana")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert ended.reason == "nobody surveys any more"
