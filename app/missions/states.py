@@ -64,7 +64,12 @@ class MoveRefusedError(Exception):
         super().__init__(f"cannot {action.replace('_', ' ')} a mission that is {state}; allowed from: {allowed}")
         self.action = action
         self.state = state
-        self.remedy = _REMEDIES[state]
+        self.remedy = remedy(state)
+
+
+def remedy(state: MissionState) -> str:
+    """Return what can be done with a mission in this state, for who asked for something else."""
+    return _REMEDIES[state]
 
 
 def allowed_actions(state: MissionState) -> list[Action]:

@@ -17,7 +17,6 @@ from app.missions.live.mission import LiveMission
 from app.missions.preflight.survey import preflight
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, MissionState, MoveRefusedError
-from app.missions.team import PART_DONE
 from app.missions.views.mission import CheckStatus, Level
 from app.storage.database import Database
 from app.storage.models import MissionRow
@@ -119,7 +118,7 @@ class Succession:
             words = f"does not begin by itself: {before.spec.name!r} was not flown to its end"
             await live.journal.log(Level.WARNING, "waiting", words)
             return
-        why_not, told = _unfit(live, before, reason), False
+        why_not, told = _unfit(live, before), False
         until_s = asyncio.get_running_loop().time() + PATIENCE_S
         while not why_not:
             # Meanwhile a person may have started it, given it up, or described it anew.
@@ -154,7 +153,7 @@ async def _raise(live: LiveMission, why: str) -> None:
     await live.journal.alarm(AlarmKind.NOT_BEGUN, f"does not begin by itself: {why}")
 
 
-def _unfit(live: LiveMission, before: LiveMission, reason: str) -> str:
+def _unfit(live: LiveMission, before: LiveMission) -> str:
     """Return why nobody but a person may let a mission begin after the one before it; '' if it may begin by itself."""
     grave = [alarm for alarm in before.journal.alarms.open if alarm.severity is AlarmSeverity.CRITICAL]
     if grave:
@@ -165,7 +164,7 @@ def _unfit(live: LiveMission, before: LiveMission, reason: str) -> str:
             continue
         if earlier.left_at is not None:
             return f"{member.name} left {before.spec.name!r}"
-        # At the end everybody is called home for that reason; who has done its part goes before.
-        if earlier.withdrawal is not None and earlier.withdrawal.why not in (reason, *PART_DONE):
+        # At the end everybody is called home, with its part done; who has done it goes before.
+        if earlier.withdrawal is not None and not earlier.withdrawal.done:
             return f"{member.name} did not fly {before.spec.name!r} to its end: {earlier.withdrawal.why}"
     return ""

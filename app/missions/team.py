@@ -21,7 +21,7 @@ from app.missions.fleet.interface import (
     WaypointOrder,
     WaypointStatus,
 )
-from app.missions.flown import Flown
+from app.missions.flown import Flown, Phase
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import Active
 from app.missions.spec.failsafes import Response
@@ -91,6 +91,8 @@ class Withdrawal:
         Whether a person wanted it: then only a person ends it.
     below
         Whether it waits below for ships to pass: it would come up where it is.
+    done
+        Whether it has flown its part, or its mission was flown to its end.
     """
 
     response: Response
@@ -99,17 +101,21 @@ class Withdrawal:
     led: bool = False
     asked: bool = False
     below: bool = False
+    done: bool = False
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored, so that a restart goes on with it."""
-        return {"response": self.response, "why": self.why, "over": self.over, "asked": self.asked}
+        facts = {"response": self.response, "why": self.why, "over": self.over, "asked": self.asked}
+        return facts | {"done": self.done}
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Withdrawal | None":
         """Return what was stored."""
         if not stored:
             return None
-        return cls(Response(stored["response"]), stored["why"], stored["over"], asked=stored.get("asked", False))
+        why, asked = stored["why"], stored.get("asked", False)
+        done = stored.get("done", why in PART_DONE)
+        return cls(Response(stored["response"]), why, stored["over"], asked=asked, done=done)
 
 
 @dataclass
@@ -326,6 +332,7 @@ class Team:
         member = self.members.pop(name, None)
         if member is not None:
             member.left_at, member.status, member.pursuing = at, None, None
+            member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
             member.set_order(None)
             member.ahead.clear()
             member.engaged = member.surfacing = False
@@ -367,6 +374,11 @@ class Team:
     def surveying(self) -> list[Member]:
         """Those that take part in the survey, whether or not they can be reached now."""
         return [m for m in self.members.values() if m.withdrawal is None]
+
+    @property
+    def going_on(self) -> list[Member]:
+        """Those that survey, or may again when they are not held any more."""
+        return [*self.surveying, *self.held]
 
     @property
     def at_rest(self) -> list[Member]:

@@ -18,7 +18,7 @@ from app.missions.views.mission import CheckStatus, CheckView, PreflightView
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, state_of, until_state, until_step, view_of
-from tests.support.missions.specs import make_spec, rectangle
+from tests.support.missions.specs import lon_lat, make_spec, rectangle
 from tests.support.waiting import until
 
 EAST = rectangle(60, 0, 90, 30)
@@ -279,3 +279,19 @@ async def test_the_way_in_takes_nothing_of_a_missions_length(service: MissionSer
         while await state_of(service, mission.id) is S.RUNNING:
             await rover.poll(0.1)
     assert 25.0 < member.committed_m < 40.0, "as much as was asked for, and a last leg"
+
+
+@pytest.mark.parametrize("length", [{"steps": 3}, {"budget": {"minutes": 0.5}}])
+async def test_a_restart_while_everybody_goes_home_changes_nothing_of_how_a_mission_ended(
+    harbour: Harbour, length: dict[str, Any]
+) -> None:
+    recovery = {"point": lon_lat(15.0, -300.0)}
+    west, east = await two_blocks(harbour.service, "a", "b", recovery=recovery, **length)
+    await act(harbour.service, west, "start")
+    live = await harbour.service.get(west)
+    await until(lambda: bool(list(live.team)) and not live.team.surveying, "everybody goes home")
+    await until(lambda: all(m.withdrawal is not None and m.withdrawal.led for m in live.team), "they are led there")
+    service = await harbour.reopen()
+    ended = await until_state(service, west, S.FINISHED)
+    assert ended.reason == ("every step is done" if "steps" in length else "everybody has flown its way")
+    await until_state(service, east, S.RUNNING)

@@ -18,6 +18,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace
 from app.exploration.lines.flown_lines import flown_lines, length_m, line_now
 from app.exploration.planner.ordered import OrderedPlanner
+from app.missions import states
 from app.missions.clock import now
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import WaypointStatus
@@ -123,7 +124,7 @@ class OrderBook:
         live = self._live
         member = live.team.named(name)
         if live.header.state is not MissionState.RUNNING:
-            raise ConflictError(f"the mission is {live.header.state}: nobody is led", "start or resume it first")
+            raise ConflictError(f"the mission is {live.header.state}: nobody is led", states.remedy(live.header.state))
         live.refuse_ending()
         if self._flight is None:
             raise ConflictError("the flight is just beginning", "try again in a moment")

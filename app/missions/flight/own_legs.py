@@ -140,7 +140,7 @@ class OwnLegs:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
                 for member in self._flown_out():
-                    self._live.withdraw(member, Response.RETURN, WAY_FLOWN)
+                    self._live.withdraw(member, Response.RETURN, WAY_FLOWN, done=True)
                 getting = self._who_gets_legs()
                 if getting:
                     await self._decide(getting)
@@ -153,7 +153,8 @@ class OwnLegs:
         if self._done and any(self._wants_legs(member) for member in left):
             return self._all_seen() if self._measured else "nobody can fly a further line"
         team = self._live.team
-        if any(m.withdrawal is not None and m.name not in self._sent_home and self._has_way(m) for m in team):
+        gave_up = (m for m in team if m.withdrawal is not None and not m.withdrawal.done)
+        if any(m.name not in self._sent_home and self._has_way(m) for m in gave_up):
             return "nobody surveys any more"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
         return f"{words} but {', '.join(m.name for m in left)}" if left else words
@@ -301,7 +302,7 @@ class OwnLegs:
                 energy_m = self._range.beyond_m(member)
                 lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
                 why = "its energy lasts for its way home and for no further line" if lasts else NO_FURTHER_LINE
-                self._live.withdraw(member, Response.RETURN, why)
+                self._live.withdraw(member, Response.RETURN, why, done=not lasts)
                 self._sent_home.add(member.name)
 
     def _flown_out(self) -> list[Member]:

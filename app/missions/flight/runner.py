@@ -41,7 +41,7 @@ from app.missions.flight.way_home.onboard_way import OnboardWays
 from app.missions.flight.way_home.withdrawals import Withdrawals
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
-from app.missions.team import SETTLED, Member
+from app.missions.team import PART_DONE, SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.queries import missions as mission_queries
@@ -141,7 +141,7 @@ class Runner:
         """
         flight = self._flight()
         while True:
-            reason = await flight.fly(resumed=resumed)
+            reason = (resumed and self._ended_before()) or await flight.fly(resumed=resumed)
             self._call_home(reason)
             staying = {member.name: member for member in self._live.team.surveying}
             if await self._withdrawals.finished(partial(self._somebody_came, staying)):
@@ -158,11 +158,19 @@ class Runner:
             return OwnLegs(*shared, self._constraints, self._time_scale, self._range, self._orders)
         return TeamSteps(*shared, self._lookout, self._time_scale)
 
+    def _ended_before(self) -> str:
+        """Return why an earlier flight called everybody home at the mission's end; '' where it did not."""
+        team = self._live.team
+        if team.going_on:
+            return ""
+        ends = [m.withdrawal.why for m in team if m.withdrawal is not None and m.withdrawal.done]
+        return next((why for why in ends if why not in PART_DONE), "")
+
     def _call_home(self, why: str) -> None:
         """Send everybody home at the mission's end who has a recovery point, unless the mission wants it otherwise."""
         for member in self._live.team:
             if self._live.spec.ends_at_home(member.spec):
-                self._live.withdraw(member, Response.RETURN, why)
+                self._live.withdraw(member, Response.RETURN, why, done=True)
 
     async def _recover(self) -> bool:
         """Take up what was last committed: the planner's memory, and the legs that were not flown; whether any was."""
@@ -191,6 +199,7 @@ class Runner:
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             if not was_led:
                 self._leave_out_passed(member)  # after a pause all that was flown is written down
+            member.count_late(live.spec, live.frame)
         await live.journal.log(Level.INFO, "resumed", f"going on after step {step.number}", step=step.number)
         return True
 

@@ -53,6 +53,11 @@ class Boundaries:
         shapely.prepare([self._area, *self._zones])
         self._been_inside: set[str] = set()
         self._breaches: dict[str, dict[int, _Breach]] = {}
+        self._recalled: set[tuple[AlarmKind, str | None]] = set()
+
+    def recall(self, alarms: set[tuple[AlarmKind, str | None]]) -> None:
+        """Take up alarms of an earlier process that are not over, each with its vehicle."""
+        self._recalled |= alarms
 
     def judge(
         self, vehicle: str, en_m: tuple[float, float], depth_m: float, at_s: float, *, may_leave: bool = False
@@ -62,9 +67,10 @@ class Boundaries:
         ``may_leave``: its way home leads out of the area.
         """
         place = Point(en_m)
-        crossings = []
+        crossings, zones_left = [], True
         for number, zone in enumerate(self._zones, 1):
             inside_m = -_signed_distance_m(zone, place)
+            zones_left = zones_left and inside_m < -CLEAR_M
             crossings += self._follow(
                 vehicle,
                 number,
@@ -83,7 +89,19 @@ class Boundaries:
         crossings += self._follow(
             vehicle, 0, "outside the area", outside_m, astray, outside_m <= OUTSIDE_OVER_M, depth_m, at_s
         )
+        # What is raised anew ends as that does.
+        self._recalled -= {(crossing.alarm, vehicle) for crossing in crossings if crossing.begins}
+        if zones_left:
+            crossings += self._end_recalled(AlarmKind.ZONE_ENTERED, vehicle, "is in no keep-out zone any more")
+        if outside_m <= OUTSIDE_OVER_M:
+            crossings += self._end_recalled(AlarmKind.AREA_LEFT, vehicle, "is no longer outside the area")
         return crossings
+
+    def _end_recalled(self, alarm: AlarmKind, vehicle: str, words: str) -> list[Crossing]:
+        if (alarm, vehicle) not in self._recalled:
+            return []
+        self._recalled.discard((alarm, vehicle))
+        return [Crossing(alarm, False, True, f"{vehicle} {words}", {"vehicle": vehicle, "zone": None, "begins": False})]
 
     def breach(self, vehicle: str) -> str:
         """Return where a vehicle is that it must not be; empty when all is well."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from app.mapping.water.tides import parse_tid
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
 from app.missions.flown import Flown
@@ -23,6 +24,7 @@ from app.missions.team import Withdrawal
 from app.storage.database import Database
 from app.storage.models import AdjustmentRow, MissionRow, PositionRow, TideTableRow
 from app.storage.ping_files import PingFiles
+from app.storage.queries import alarms as alarm_queries
 from app.storage.queries import events as event_queries
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import scans as scan_queries
@@ -53,6 +55,7 @@ async def take_up(
         drift = await session.get(AdjustmentRow, row.id)
         heard = await telemetry_queries.last_heard(session, row.id)
         batteries = await telemetry_queries.last_batteries(session, row.id) if row.state in AT_SEA else {}
+        standing = await alarm_queries.standing(session, row.id) if row.state in AT_SEA else []
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
     loop = asyncio.get_running_loop()
@@ -73,6 +76,8 @@ async def take_up(
     live = LiveMission(database, hub, executor, ping_files, time_scale, mission, search, builder)
     async with database.reading() as session:
         pinged = await live.pings.open(session)
+    live.journal.alarms.recall(standing)
+    live.boundaries.recall(live.journal.alarms.standing([AlarmKind.ZONE_ENTERED, AlarmKind.AREA_LEFT]))
     live.journal.counts = replace(counts, pings=pinged.pings, beams=pinged.beams, rejected_pings=pinged.rejected)
     if spec.targets:
         await loop.run_in_executor(executor, tracking_warm_up)

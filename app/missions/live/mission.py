@@ -312,15 +312,17 @@ class LiveMission:
         """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
         self.reports.take(event, self.spec, running=self._counting, standing=bool(self.standstill))
 
-    def withdraw(self, member: Member, response: Response, why: str, *, asked: bool = False) -> bool:
+    def withdraw(
+        self, member: Member, response: Response, why: str, *, asked: bool = False, done: bool = False
+    ) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.
 
-        The flight sends it where the response leads. ``asked``: a person wants it.
+        The flight sends it where the response leads. ``asked``: a person wants it; ``done``: it has flown its part.
         """
         before = member.withdrawal
         if before is not None and (STRENGTH[before.response] >= STRENGTH[response] or before.over):
             return False
-        member.withdrawal = Withdrawal(response, why, asked=asked)
+        member.withdrawal = Withdrawal(response, why, asked=asked, done=done)
         member.pursuing = None
         self.changed.set()
         return True
@@ -486,9 +488,11 @@ class LiveMission:
             return max(self.search.left_s(), 0.0) / self._time_scale
         if self.reports.leg_s is None:
             return None
-        committed = [len(m.ahead) + m.ordered for m in self.team]
-        leg_m = self.spec.limits.max_step_m
-        left = [m.way_left_m(self.spec) / leg_m for m in self.team.present] or [self.spec.steps - self.header.step]
+        if list(self.team) and not self.team.going_on:
+            return 0.0  # what they still fly is their way home
+        committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
+        leg_m, flying = self.spec.limits.max_step_m, [*self.team.present, *self.team.held]
+        left = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
         return (max(0.0, *left) + max(committed, default=0)) * self.reports.leg_s
 
     def summary(self) -> MissionSummary:

@@ -15,9 +15,12 @@ class Remaining:
 
 
 def remaining(spec: MissionSpec, team: Team) -> Remaining:
-    """Return what is left of a mission; vehicles of which that is not known yet have all that their budget allows."""
+    """Return what is left of a mission; vehicles of which that is not known yet have all that their budget allows.
+
+    What a vehicle leaves that was called home counts only when nobody goes on.
+    """
     minutes, metres = [], []
-    for member in team:
+    for member in team.going_on or team:
         left_m = spec.allowance(member.spec).metres if member.flown.left_m is None else member.flown.left_m
         if left_m is not None:
             minutes.append(left_m / spec.speed_of(member.spec) / 60.0)

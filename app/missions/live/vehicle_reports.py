@@ -152,7 +152,7 @@ class VehicleReports:
         if member.ordered and member.leg_start_m is not None and member.target_m is not None:
             leg = place_of(member.leg_start_m), place_of(member.target_m)
         flown.add_way(before, place, leg)
-        if not member.ordered and member.legs and way_left_m > 0.0:
+        if not member.ordered and member.legs and way_left_m > 0.0 and member.withdrawal is None:
             flown.idle_s += passed_s
 
     def _count_energy(self, member: Member, report: VehicleReport, policy: SurfacePolicy | None) -> None:

@@ -179,6 +179,11 @@ class FailsafeJudge:
         return self.active
 
     @property
+    def looming(self) -> set[Failsafe]:
+        """What is detected, in force or not yet."""
+        return set(self._since_s)
+
+    @property
     def active(self) -> list[Active]:
         """What is in force, the strongest response first; of equals in the table's order."""
         order = list(TABLE)

@@ -1,5 +1,6 @@
 """Whether vehicles go home before a mission ends; single ones called home, held where they are, and sent on."""
 
+from app.missions import states
 from app.missions.errors import ConflictError
 from app.missions.flight.orders import OrderBook
 from app.missions.flown import Phase
@@ -7,7 +8,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.running.supervisor import MissionSupervisor
 from app.missions.spec.failsafes import Response
 from app.missions.spec.recovery import Homecoming
-from app.missions.states import AT_SEA, Action, MissionState
+from app.missions.states import AT_SEA, ENDED, Action, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
 from app.storage.queries import missions as mission_queries
@@ -37,7 +38,7 @@ async def call_home(live: LiveMission, name: str, actor: str) -> None:
     """Send one vehicle home and go on without it. Raises VehicleNotFoundError, ConflictError."""
     member = live.team.named(name)
     if live.header.state is not MissionState.RUNNING:
-        raise ConflictError(f"the mission is {live.header.state}: nobody is led", "resume it first")
+        raise ConflictError(f"the mission is {live.header.state}: nobody is led", states.remedy(live.header.state))
     if live.spec.recovery_of(member.spec) is None:
         raise ConflictError(f"vehicle {name!r} has no recovery point", "abort it: it stops where it is")
     if not live.withdraw(member, Response.RETURN, f"called home by {actor}"):
@@ -58,6 +59,8 @@ async def hold(live: LiveMission, name: str, actor: str) -> None:
 async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, actor: str) -> None:
     """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
     member = live.team.named(name)
+    if live.header.state not in AT_SEA:
+        raise ConflictError(f"the mission is {live.header.state}: nobody is led", states.remedy(live.header.state))
     if member.withdrawal is None and await live.part(OrderBook).cancel(member, actor):
         return
     if member.withdrawal is None:
@@ -81,7 +84,7 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
 
 
 def _what(live: LiveMission) -> str:
-    return str(live.header.state) if live.ending is None else "ending"
+    return str(live.header.state) if live.ending is None or live.header.state in ENDED else "ending"
 
 
 def _why(member: Member) -> str:

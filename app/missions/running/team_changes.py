@@ -118,8 +118,8 @@ async def _store_joining(live: LiveMission, vehicle: VehicleSpec) -> int:
         rows = await mission_queries.vehicles_of(session, live.id)
         known = next((row for row in rows if row.name == vehicle.name), None)
         if known is not None:
-            # It comes back: it keeps its place.
-            known.spec, known.left_at = vehicle.model_dump(mode="json"), None
+            # It comes back: it keeps its place, and surveys whatever it did when it left.
+            known.spec, known.left_at, known.withdrawal = vehicle.model_dump(mode="json"), None, None
             return known.slot
         session.add(vehicle_row(live.id, vehicle, len(rows)))
         return len(rows)

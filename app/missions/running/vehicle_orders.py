@@ -9,7 +9,6 @@ from app.exploration.lines.flown_lines import line_near, line_now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.flight.orders import Flight, OrderBook, free_region, is_free
 from app.missions.live.mission import LiveMission
-from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import DenserOrder, GoOrder, OrderKind, RepeatOrder
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.team import Member
@@ -83,7 +82,7 @@ async def survey_denser(live: LiveMission, order: DenserOrder, actor: str) -> Or
     names = [order.vehicle] if order.vehicle is not None else _nearest_first(live, part)
 
     async def find(member: Member, flight: Flight) -> FloatArray:
-        spacing_m = order.line_spacing_m or CLOSER * spacing_of(live.spec, member)
+        spacing_m = order.line_spacing_m or CLOSER * spacing_of(live, member)
         start_m = book.start_m(member, OrderKind.DENSER)
 
         def lines() -> FloatArray:
@@ -116,8 +115,9 @@ def _nearest_first(live: LiveMission, part: Polygon) -> list[str]:
     return found or [member.name for member in live.team]
 
 
-def spacing_of(spec: MissionSpec, member: Member) -> float:
+def spacing_of(live: LiveMission, member: Member) -> float:
     """Return how far apart a vehicle's lines are in its mission, about, metres."""
+    spec = live.spec
     sonar: SwathSonarSpec | None = member.spec.sonar
     if member.swath is not None:
         return float(np.clip(member.swath.port_m + member.swath.starboard_m, 1.0, 1000.0))
@@ -125,6 +125,6 @@ def spacing_of(spec: MissionSpec, member: Member) -> float:
         altitude_m = member.spec.altitude_m or USUAL_ALTITUDE_M
         return float(np.clip(2.0 * altitude_m * np.tan(np.deg2rad(sonar.aperture_deg) / 2.0), 1.0, 1000.0))
     area_m2 = Polygon(spec.local_area()).area
-    ways_m = [spec.allowance(vehicle).metres for vehicle in spec.vehicles]
+    ways_m = [spec.allowance(vehicle).metres for vehicle in live.team.specs]
     whole_m = sum(way_m if way_m is not None else spec.steps * spec.limits.max_step_m for way_m in ways_m)
     return float(np.clip(area_m2 / max(whole_m, 1.0), 1.0, 1000.0))

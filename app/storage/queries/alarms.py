@@ -27,6 +27,12 @@ async def newest(
     return (await session.scalars(query)).all()
 
 
+async def standing(session: AsyncSession, mission_id: str) -> Sequence[AlarmRow]:
+    """Return a mission's alarms whose causes are not over, acknowledged or not."""
+    query = select(AlarmRow).where(AlarmRow.mission_id == mission_id, AlarmRow.ended_at.is_(None))
+    return (await session.scalars(query)).all()
+
+
 async def of_ids(session: AsyncSession, ids: Collection[str]) -> Sequence[AlarmRow]:
     """Return the alarms of these ids, as far as there are."""
     return (await session.scalars(select(AlarmRow).where(AlarmRow.id.in_(ids)))).all() if ids else []

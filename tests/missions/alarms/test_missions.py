@@ -9,17 +9,19 @@ from sqlalchemy import func, make_url, select
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarms import dispatcher
+from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.live.journals import db_retry
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import watched
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
+from app.missions.spec.vehicle import VehicleKind
 from app.missions.views.alarms import AlarmState
 from app.missions.views.messages import AlarmMessage, SnapshotMessage
 from app.storage import database as storage
 from app.storage.models import AlarmRow
 from tests.support.missions.alarms import hook, told_by
-from tests.support.missions.harbour import Harbour, Rover, act
+from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_step
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
 
@@ -175,3 +177,84 @@ async def _alarm_of(page: AsyncIterator[object]) -> AlarmMessage:
         while not isinstance(message := await anext(page), AlarmMessage):
             pass
     return message
+
+
+async def _ended(harbour: Harbour, mission_id: str) -> dict[str, bool]:
+    """Return of each kind of alarm that was raised whether it is over, all of them."""
+    alarms = await harbour.service.alarms.alarms(mission_id=mission_id)
+    return {kind: all(a.ended_at is not None for a in alarms if a.kind == kind) for kind in {a.kind for a in alarms}}
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+async def test_a_vehicle_that_comes_back_while_nobody_flies_is_lost_no_longer(harbour: Harbour, restarts: bool) -> None:
+    mission = (await harbour.service.create(sim_spec("a", "b", steps=1000, side_m=80.0))).id
+    await act(harbour.service, mission, "start")
+    await until_step(harbour.service, mission, 1)
+    _link(harbour).silence("a")
+
+    async def lost() -> bool:
+        return "link_lost" in await _ended(harbour, mission)
+
+    await until(lost, "it was silent for long")
+    raised = await _ended(harbour, mission)
+    assert raised == {"vehicle_lost": False, "link_lost": False}
+    if restarts:
+        await harbour.reopen()
+    else:
+        await act(harbour.service, mission, "pause")
+        _link(harbour).reach("a")
+        await act(harbour.service, mission, "resume")
+
+    async def over() -> bool:
+        ended = await _ended(harbour, mission)
+        return ended["vehicle_lost"] and ended["link_lost"]
+
+    await until(over, "it is heard")
+    alarms = [alarm.kind for alarm in await harbour.service.alarms.alarms(mission_id=mission)]
+    assert (alarms.count(AlarmKind.LINK_LOST), alarms.count(AlarmKind.VEHICLE_LOST)) == (1, 1), "each was raised once"
+
+
+async def test_a_vehicle_that_is_not_heard_after_a_restart_is_still_lost(harbour: Harbour) -> None:
+    vehicles = [{"name": "a", "kind": "rest"}, {"name": "b", "kind": "sim"}]
+    mission = (await harbour.service.create(sim_spec(steps=1000, side_m=80.0, vehicles=vehicles))).id
+    live = await harbour.service.get(mission)
+    await Rover(harbour.service, mission, "a").post()
+    await act(harbour.service, mission, "start")
+    await until_step(harbour.service, mission, 1)
+    await live.journal.alarm(AlarmKind.VEHICLE_LOST, "a is lost: silent", vehicle="a")
+    await live.journal.alarm(AlarmKind.LINK_LOST, "a: its link is lost: silent", vehicle="a")
+    service = await harbour.reopen()
+    step = (await service.get(mission)).header.step
+    await until_step(service, mission, step + 5)
+    assert await _ended(harbour, mission) == {"vehicle_lost": False, "link_lost": False}
+    rover = Rover(service, mission, "a")
+
+    async def over() -> bool:
+        await rover.post()
+        return all((await _ended(harbour, mission)).values())
+
+    await until(over, "it is heard")
+
+
+async def test_that_nobody_can_be_sent_is_over_when_somebody_can_after_a_pause(harbour: Harbour) -> None:
+    mission = (await harbour.service.create(sim_spec("a", steps=1000, side_m=80.0, step_deadline_s=5.0))).id
+    await act(harbour.service, mission, "start")
+    await until_step(harbour.service, mission, 1)
+    _link(harbour).silence("a")
+
+    async def nobody() -> bool:
+        return "no_vehicle" in await _ended(harbour, mission)
+
+    await until(nobody, "nobody can be sent")
+    await act(harbour.service, mission, "pause")
+    _link(harbour).reach("a")
+    step = (await harbour.service.get(mission)).header.step
+    await act(harbour.service, mission, "resume")
+    await until_step(harbour.service, mission, step + 2)
+    assert (await _ended(harbour, mission))["no_vehicle"]
+
+
+def _link(harbour: Harbour) -> SimFleetLink:
+    link = harbour.service.hub._links[VehicleKind.SIM]
+    assert isinstance(link, SimFleetLink)
+    return link

@@ -70,6 +70,18 @@ def test_a_vehicle_that_left_the_mission_is_forgotten() -> None:
     assert boundaries.breach("a") == ""
 
 
+def test_alarms_of_before_a_restart_end_where_the_vehicle_is_clear() -> None:
+    boundaries = Boundaries(AREA, [ZONE])
+    boundaries.recall({(AlarmKind.ZONE_ENTERED, "a"), (AlarmKind.AREA_LEFT, "a"), (AlarmKind.AREA_LEFT, "b")})
+    assert told(boundaries, [(-15, 50), (-9, 50), (20, 50)]) == [
+        (None, "a is in no keep-out zone any more"),
+        (None, "a is no longer outside the area"),
+    ]
+    again = Boundaries(AREA, [ZONE])
+    again.recall({(AlarmKind.ZONE_ENTERED, "a")})
+    assert [alarm for alarm, _ in told(again, [(50, 50), (20, 50)])] == [AlarmKind.ZONE_ENTERED, None]
+
+
 @pytest.mark.parametrize("speed_mps", [0.5, 1.0, 1.5, 2.0])
 def test_no_vehicle_that_waits_at_its_waypoint_circles_farther_than_the_margin(speed_mps: float) -> None:
     terrain = generate("harbour", 0, width_m=200, height_m=200, origin=(LAT, LON))

@@ -5,8 +5,9 @@ from typing import Any
 import pytest
 
 from app.missions.live.remaining import Remaining, remaining
+from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
-from app.missions.team import Team
+from app.missions.team import Team, Withdrawal
 from tests.support.missions.specs import spec_json
 
 FAST_AND_SLOW = [{"name": "fast", "kind": "rest", "speed_mps": 2.0}, {"name": "slow", "kind": "rest", "speed_mps": 1.0}]
@@ -33,6 +34,15 @@ def test_under_way_it_is_what_the_vehicle_with_most_has(length: dict[str, Any]) 
     for member, left_m in zip(team, (600.0, 450.0), strict=True):
         member.flown.left_m = left_m
     assert remaining(spec, team) == Remaining(7.5, 0.6)
+
+
+@pytest.mark.parametrize(("response", "left"), [(Response.RETURN, 3.0), (Response.HOLD, 10.0)])
+def test_what_a_vehicle_leaves_that_goes_home_does_not_count(response: Response, left: float) -> None:
+    spec, team = described(budget={"minutes": 30})
+    fast, slow = team
+    fast.flown.left_m, slow.flown.left_m = 1200.0, 180.0
+    fast.withdrawal = Withdrawal(response, "asked by Ana", asked=True)
+    assert remaining(spec, team).minutes == left
 
 
 def test_without_vehicles_nothing_is_known() -> None:

@@ -139,3 +139,24 @@ async def test_vehicles_that_wait_for_each_other_all_the_time_survey_for_their_m
     assert np.median(survey_s) < 240.0 + 180.0, survey_s
     assert survey_s.min() > 240.0 - 30.0, survey_s
     assert max(member.committed_m for member in live.team) < 240.0 * live.spec.speed_mps + 1.0
+
+
+async def test_when_everybody_goes_home_no_leg_is_to_come(under_way: Callable[..., Awaitable[UnderWay]]) -> None:
+    vehicle = await under_way(minutes=MINUTES)
+    live = vehicle.live
+    live.reports.leg_s = 10.0
+    assert (live.progress().eta_s or 0.0) > 100.0
+    vehicle.member.withdrawal = Withdrawal(Response.RETURN, "called home by Ana")
+    assert live.progress().eta_s == 0.0
+
+
+async def test_who_is_held_or_home_waits_for_no_decision(under_way: Callable[..., Awaitable[UnderWay]]) -> None:
+    vehicle = await under_way(minutes=MINUTES)
+    member = vehicle.member
+    member.set_order(None)
+    vehicle.reports(10.0, 20.0)
+    assert member.flown.idle_s == 10.0
+    for response in (Response.HOLD, Response.RETURN):
+        member.withdrawal = Withdrawal(response, "asked by Ana", over=response is Response.RETURN)
+        vehicle.reports(member.report.time_s + 10.0 if member.report else 0.0, 20.0)
+    assert member.flown.idle_s == 10.0

@@ -516,3 +516,46 @@ async def test_the_way_home_keeps_clear_of_zones(service: MissionService) -> Non
 def test_recovery_points_are_near_and_clear(recovery: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         sim_spec("a", recovery=recovery, keep_out=[rectangle(10, 10, 20, 20)])
+
+
+async def test_nobody_of_a_mission_that_ended_is_sent_on(service: MissionService) -> None:
+    mission = await service.create(recovered("a", steps=3))
+    live = await service.get(mission.id)
+    with pytest.raises(ConflictError, match="the mission is ready: nobody is led"):
+        await service.send_on(live, "a", "Ana")
+    await act(service, mission.id, "start")
+    await until_state(service, mission.id, MissionState.FINISHED)
+    with pytest.raises(ConflictError, match="the mission is finished: nobody is led"):
+        await service.send_on(live, "a", "Ana")
+    with pytest.raises(ConflictError, match="the mission is finished: nobody is held"):
+        await hold(live, "a", "Ana")
+    assert await phase_of(service, mission, "a") is Phase.HOME
+    assert not [line for line in await words_of(service, mission, "recovery") if "goes on" in line]
+
+
+async def test_what_a_mission_that_was_finished_refuses_is_said_of_a_finished_one(service: MissionService) -> None:
+    mission = await service.create(recovered("a", steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 1)
+    await act(service, mission.id, "finish")
+    await until_state(service, mission.id, MissionState.FINISHED)
+    live = await service.get(mission.id)
+    with pytest.raises(ConflictError, match="the mission is finished: nobody is held"):
+        await hold(live, "a", "Ana")
+    with pytest.raises(ConflictError, match="the mission is finished: nobody is led") as refused:
+        await call_home(live, "a", "Ana")
+    assert "create a new mission" in refused.value.remedy
+
+
+async def test_a_mission_in_steps_of_the_team_whose_vehicles_were_all_called_home_says_so(
+    service: MissionService,
+) -> None:
+    limits = {"max_step_m": 5.0, "com_range_m": 200.0, "min_separation_m": 1.0}
+    mission = await service.create(recovered("a", "b", steps=1000, limits=limits))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    for name in ("a", "b"):
+        await call_home(live, name, "Ana")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert ended.reason == "nobody surveys any more"

@@ -321,3 +321,15 @@ async def test_a_team_that_moves_as_one_takes_no_orders(service: MissionService)
     await service.send_on(live, "b", "Ana")
     await until_step(service, live.id, step + 2)
     await act(service, live.id, "abort")
+
+
+async def test_lines_are_as_close_for_vehicles_that_joined_a_draft(service: MissionService) -> None:
+    described, joined = survey("a", "b"), survey("a", "b").model_copy(update={"vehicles": []})
+    mission = (await service.create(joined)).id
+    for vehicle in described.vehicles:
+        await service.team_changes.join(await service.get(mission), vehicle, "Ana")
+    await act(service, mission, "start")
+    await until_step(service, mission, 4)
+    other, live = await flying(service, survey("c", "d")), await service.get(mission)
+    spacing_m = vehicle_orders.spacing_of(live, live.team.named("a"))
+    assert spacing_m == vehicle_orders.spacing_of(other, other.team.named("c"))

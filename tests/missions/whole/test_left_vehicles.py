@@ -5,16 +5,18 @@ from collections.abc import AsyncIterator
 import pytest
 
 from app.missions.errors import ConflictError, MissionNotFoundError, VehicleNotFoundError
+from app.missions.flown import Phase
 from app.missions.operations.history import events_after
 from app.missions.operations.imports.uploads import Uploads
 from app.missions.preflight.survey import preflight
+from app.missions.running.homecoming import call_home
 from app.missions.running.mission_views import watched
 from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.missions.views.measurements.imports import ImportOptions
 from app.missions.views.mission import CheckStatus, VehicleView
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_step, view_of
-from tests.support.missions.specs import make_spec
+from tests.support.missions.specs import lon_lat, make_spec
 from tests.support.waiting import until
 
 
@@ -160,3 +162,31 @@ async def test_a_vehicle_that_left_before_a_restart_comes_back_with_its_own_numb
     await until(lambda: live.team.members["a"].legs > flown + 2, "a surveys again")
     assert live.header.state is MissionState.RUNNING
     await act(service, mission, "abort", actor="Ana")
+
+
+async def test_who_went_home_left_and_came_back_surveys_after_a_restart_too(harbour: Harbour) -> None:
+    service = harbour.service
+    spec = sim_spec("a", "b", steps=1000, side_m=80.0, recovery={"point": lon_lat(15.0, 4.0)})
+    mission = (await service.create(spec)).id
+    await act(service, mission, "start")
+    await until_step(service, mission, 1)
+    live = await service.get(mission)
+    a = live.team.named("a")
+    await call_home(live, "a", "Ana")
+    await until(lambda: a.is_home, "it is home")
+    await service.team_changes.take_out(live, "a", "Ana")
+    await service.team_changes.rejoin(live, "a", "Ana")
+    await until(lambda: live.team.named("a").legs > a.legs, "it surveys again")
+
+    live = await (await harbour.reopen()).get(mission)
+    assert live.team.named("a").withdrawal is None
+    await until(lambda: live.team.named("a").surveys, "it surveys still")
+
+
+async def test_who_left_surveys_no_more(service: MissionService) -> None:
+    mission = (await service.create(sim_spec("a", "b", steps=1000, side_m=80.0))).id
+    await act(service, mission, "start")
+    live = await service.get(mission)
+    await until(lambda: by_name(live.vehicles.all(), "a").phase is Phase.SURVEY, "it surveys")
+    await service.team_changes.take_out(live, "a", "Ana")
+    assert by_name((await view_of(service, mission)).vehicles, "a").phase is Phase.STOPPED

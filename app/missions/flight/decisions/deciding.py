@@ -118,6 +118,7 @@ class Decider:
             self._told = {}
             if self._live.standstill:
                 self._live.stand_still("")
+            if self._live.journal.alarms.standing([AlarmKind.NO_WAYPOINT]):
                 await self._live.journal.end([AlarmKind.NO_WAYPOINT], "a vehicle can be sent on again")
             return decisions
         self.planner.restore(memory)

@@ -14,7 +14,7 @@ from app.missions.fleet.interface import LinkState, VehicleInfo, VehicleRefusedE
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import near_report
 from app.missions.spec.failsafes import Response
-from app.missions.team import Member
+from app.missions.team import OUT_OF_REACH, Member
 from app.missions.views.mission import Level
 
 PERIOD_S = 2.0
@@ -58,7 +58,8 @@ class Engagement:
         self._send = send
         self._asking: dict[str, asyncio.Task[None]] = {}
         self._refused: dict[str, _Refused] = {}
-        self._lost: set[str] = set()
+        standing = live.journal.alarms.standing([AlarmKind.VEHICLE_LOST])
+        self._lost = {vehicle for _, vehicle in standing if vehicle is not None}
         self._advised: set[str] = set()
         self._machine_advised = False
 
@@ -99,7 +100,7 @@ class Engagement:
     async def _tell_of_loss(self, member: Member, info: VehicleInfo) -> None:
         """Write down when a vehicle that followed gets lost, and when it is back."""
         lost = member.followed and info.state is LinkState.LOST
-        if lost == (member.name in self._lost):
+        if lost == (member.name in self._lost) or (not lost and info.state in OUT_OF_REACH):
             return
         journal = self._live.journal
         if lost:

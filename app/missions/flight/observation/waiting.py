@@ -33,20 +33,30 @@ class Waiting:
 
     async def for_team(self, patient_s: float | None = None) -> None:
         """Wait until a vehicle can be planned for; where ``patient_s`` is given so long, first, for all of them."""
-        live, team = self._live, self._live.team
+        team = self._live.team
         if patient_s is not None:
             deadline_s = asyncio.get_running_loop().time() + patient_s
             if await self.until(lambda: self._nobody_surveys or self._all_present, deadline_s):
-                return
-        if team.present or self._nobody_surveys:
-            return
+                return await self._note_over()
+        if not team.present and not self._nobody_surveys:
+            await self._for_anybody()
+        return await self._note_over()
+
+    async def _for_anybody(self) -> None:
+        live, team = self._live, self._live.team
         absent = [member.name for member in team]
         message = (
             "no vehicle can be sent anywhere; waiting for one" if absent else "every vehicle left; add one to go on"
         )
-        await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=absent)
+        if not live.journal.alarms.standing([AlarmKind.NO_VEHICLE]):
+            await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=absent)
         await self.until(lambda: bool(team.present) or self._nobody_surveys, None)
-        await live.journal.end([AlarmKind.NO_VEHICLE], "a vehicle can be sent again")
+
+    async def _note_over(self) -> None:
+        """End the alarm that nobody can be sent, whoever raised it: the mission may have been paused meanwhile."""
+        alarms = self._live.journal.alarms
+        if alarms.standing([AlarmKind.NO_VEHICLE]):
+            await self._live.journal.end([AlarmKind.NO_VEHICLE], "a vehicle can be sent again")
 
     @property
     def _all_present(self) -> bool:

@@ -22,6 +22,7 @@ from app.missions.recovery.failsafes import (
     LOW_PCT,
     POSITION_LOST_M,
     STRENGTH,
+    TABLE,
     Active,
     FailsafeJudge,
     with_reserve_s,
@@ -29,7 +30,7 @@ from app.missions.recovery.failsafes import (
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.recovery import Homecoming
-from app.missions.team import Member
+from app.missions.team import OUT_OF_REACH, Member
 from app.missions.views.mission import Level
 
 HEARD_S = 3.0
@@ -55,7 +56,9 @@ class FailsafeWatch:
         self._range = energy_range
         self._time_scale = time_scale
         self._judges: dict[str, FailsafeJudge] = {}
-        self._told: dict[str, list[Active]] = {}
+        self._told = told_before(live)
+        self._carried = self._told_at(asyncio.get_running_loop().time() * time_scale)
+        """By vehicle: alarms that an earlier flight raised, and when each was so or not known at the latest."""
         self._ships: dict[str, set[int]] = {}
         """By vehicle: the ships (MMSI) that came too close a moment ago."""
         self._words_of_ships: list[tuple[str, str]] = []
@@ -96,7 +99,7 @@ class FailsafeWatch:
         for name, words in words_of_ships:
             await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=name)
         for name, found in news:
-            await self._tell(name, found)
+            await self._tell(name, found, now_s)
 
     def _look_at(self, member: Member, now_s: float, too_close: dict[Failsafe, str]) -> None:
         """Tell what a vehicle's way home takes, and do what its failsafes ask for."""
@@ -241,11 +244,11 @@ class FailsafeWatch:
             return {}
         return {Failsafe.ALL_LINKS_LOST: f"none of {len(followed)} vehicles is heard any more"}
 
-    async def _tell(self, name: str, found: list[Active]) -> None:
+    async def _tell(self, name: str, found: list[Active], now_s: float) -> None:
         """Write down what begins and what is over."""
-        before = {one.failsafe: one for one in self._told.get(name, [])}
+        before = self._told.get(name, frozenset())
         now = {one.failsafe: one for one in found}
-        self._told[name] = found
+        self._told[name] = stay = self._undecided(name, before, frozenset(now), now_s) | now.keys()
         who = f"{name}: " if name else ""
         for failsafe, one in now.items():
             if failsafe not in before:
@@ -255,15 +258,49 @@ class FailsafeWatch:
                     await self._live.journal.log(Level.WARNING, "failsafe", words, **facts)
                 else:
                     await self._live.journal.alarm(AlarmKind(failsafe.value), words, **facts)
-        for failsafe in before.keys() - now.keys():
+        for failsafe in before - stay:
             words = f"{who}{failsafe.replace('_', ' ')} is over"
             facts = {"failsafe": failsafe} | ({"vehicle": name} if name else {})
             if failsafe is Failsafe.SEPARATION_LOST:
                 await self._live.journal.log(Level.INFO, "failsafe", words, **facts)
             else:
                 await self._live.journal.end([AlarmKind(failsafe.value)], words, **facts)
-        if before.keys() != now.keys():
+        if before != stay:
             self._live.publish_summary()
+
+    def _told_at(self, now_s: float) -> dict[str, dict[Failsafe, float]]:
+        return {name: dict.fromkeys(told, now_s) for name, told in self._told.items()}
+
+    def _undecided(
+        self, name: str, before: frozenset[Failsafe], now: frozenset[Failsafe], now_s: float
+    ) -> frozenset[Failsafe]:
+        """Return which alarms of an earlier flight may still be so though this one does not know it.
+
+        Whoever they are of has to be heard for as long as for any other before they are over.
+        """
+        carried = self._carried.get(name, {})
+        for failsafe in now & carried.keys():
+            del carried[failsafe]
+        judge = self._judges.get(name)
+        looming = set() if judge is None else judge.looming
+        silent = not any(self._is_known(member) for member in self._live.team if name in (member.name, TEAM))
+        carried |= dict.fromkeys(carried.keys() if silent else carried.keys() & looming, now_s)
+        return frozenset(f for f in before & carried.keys() if now_s - carried[f] < TABLE[f].over_s)
+
+    def _is_known(self, member: Member) -> bool:
+        """Whether a vehicle is heard, or is where nothing more is asked of it."""
+        at_rest = member.withdrawal is not None and member.withdrawal.over
+        return at_rest or self._hub.info(member.key).state not in OUT_OF_REACH
+
+
+def told_before(live: LiveMission) -> dict[str, frozenset[Failsafe]]:
+    """Return the failsafes of which alarms were raised that are not over, by their vehicles' names."""
+    kinds = [AlarmKind(failsafe.value) for failsafe in Failsafe if failsafe.value in set(AlarmKind)]
+    found: dict[str, frozenset[Failsafe]] = {}
+    for kind, vehicle in live.journal.alarms.standing(kinds):
+        name = TEAM if vehicle is None else vehicle
+        found[name] = found.get(name, frozenset()) | {Failsafe(kind.value)}
+    return found
 
 
 def overrides(spec: MissionSpec, member: Member) -> dict[Failsafe, Response]:

@@ -18,7 +18,7 @@ from app.missions.safety.free_space import CIRCLE_M
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import OrderKind
 from app.missions.spec.surface_policy import SurfacePolicy
-from app.missions.team import PART_DONE, Member, Swath, Team
+from app.missions.team import Member, Swath, Team
 from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView, WaitingCircle
 from app.missions.views.orders import OrderView
 
@@ -151,7 +151,7 @@ class VehicleViews:
         active = [FailsafeView(failsafe=a.failsafe, response=a.response, message=a.message) for a in member.failsafes]
         return {
             "withdrawn": "" if member.withdrawal is None else member.withdrawal.why,
-            "part_done": member.withdrawal is not None and member.withdrawal.why in PART_DONE,
+            "part_done": member.withdrawal is not None and member.withdrawal.done,
             "energy_left_pct": energy_left_pct(member),
             "energy_left_s": None if left is None else round(left.safe_s),
             "recovery_point": None if recovery is None else recovery.point,

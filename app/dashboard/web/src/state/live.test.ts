@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { AlarmView, EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
-import { ageSeconds, allDecided, EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
+import { ageSeconds, allDecided, allWait, EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
 
 const vehicle = (
   name: string,
@@ -270,4 +270,14 @@ describe("whether a step is to come", () => {
     const none = { minutes_left: 0, km_left_per_vehicle: 0 };
     expect(allDecided({ ...none, ...many, budget: { ...length, minutes: 30 } })).toBe(true);
   });
+});
+
+it("has vehicles wait for a decision only while somebody surveys", () => {
+  const of = (withdrawn: string, status: WaypointView["status"]) => ({
+    view: { ...vehicle("a", 0, 0), withdrawn },
+    waypoint: waypoint("a", 1, status),
+  });
+  expect(allWait([of("", "reached"), of("called home by Ana", "acknowledged")])).toBe(true);
+  expect(allWait([of("", "acknowledged"), of("held by Ana", "reached")])).toBe(false);
+  expect(allWait([of("held by Ana", "reached"), of("called home by Ana", "reached")])).toBe(false);
 });

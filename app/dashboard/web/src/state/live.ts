@@ -234,6 +234,19 @@ export function allDecided({ budget, step, steps, minutes_left, km_left_per_vehi
   return budget.steps != null ? step >= steps : minutes_left === 0 || km_left_per_vehicle === 0;
 }
 
+const SETTLED = ["reached", "missed", "refused"];
+
+/** Whether all that survey wait for a decision; who is held or called home waits for none. */
+export function allWait(vehicles: readonly Waiting[]): boolean {
+  const team = vehicles.filter(({ view }) => view.active && view.link === "engaged" && view.withdrawn === "");
+  return team.length > 0 && team.every(({ waypoint }) => !waypoint || SETTLED.includes(waypoint.status));
+}
+
+interface Waiting {
+  view: Pick<VehicleView, "active" | "link" | "withdrawn">;
+  waypoint: Pick<WaypointView, "status"> | undefined;
+}
+
 type Decided = Pick<
   MissionView["progress"],
   "budget" | "step" | "steps" | "minutes_left" | "km_left_per_vehicle"

@@ -1,19 +1,17 @@
 /** Whether the vehicles wait for the next step's decision, and for how long. */
 
 import { computed, effect, signal } from "@preact/signals";
-import { allDecided } from "../live";
+import { allDecided, allWait } from "../live";
 import { mission, now, socketStatus, vehicles } from "../store";
 
 /** A decision that takes no longer is not worth a word. */
 const LEAST_S = 2;
-const DONE = ["reached", "missed", "refused"];
 
 const idle = computed(() => {
   const present = mission.value;
   if (present?.state !== "running" || socketStatus.value?.kind !== "open") return false;
   if (allDecided(present.progress)) return false;
-  const team = vehicles.value.filter((v) => v.view.active && v.view.link === "engaged");
-  return team.length > 0 && team.every((v) => !v.waypoint || DONE.includes(v.waypoint.status));
+  return allWait(vehicles.value);
 });
 
 const since = signal<number | null>(null);
