@@ -56,6 +56,15 @@ async def until_alarms(service: MissionService, mission_id: str, *kinds: tuple[A
     await until(there, f"alarms are {kinds}")
 
 
+async def test_a_mission_that_another_one_follows_is_not_deleted(service: MissionService) -> None:
+    west, east = await two_blocks(service)
+    with pytest.raises(ConflictError, match="'East' is to begin after it"):
+        await service.delete_stored(west)
+    await service.delete_stored(east)
+    await service.delete_stored(west)
+    assert await service.rows() == []
+
+
 async def test_a_mission_begins_when_the_one_before_it_was_flown_to_its_end(service: MissionService) -> None:
     west, east = await two_blocks(service)
     assert (await view_of(service, east)).after == west

@@ -17,15 +17,21 @@ from app.storage.queries import missions as mission_queries
 def returns(live: LiveMission, action: Action, asked: bool | None) -> bool:
     """Whether vehicles go home before an action takes effect.
 
-    Raises ConflictError where that was asked for and nobody has a recovery point.
+    Raises ConflictError where that was asked for and nobody has a recovery point, and where a mission that is being
+    aborted is to be finished.
     """
     if action not in (Action.FINISH, Action.ABORT):
         return False
+    if action is Action.FINISH and live.ending is not None and live.ending.state is MissionState.ABORTED:
+        raise ConflictError(
+            f"it is aborted by {live.ending.actor}, as soon as everybody is home",
+            "wait for that, or abort it again to stop them where they are",
+        )
     out = [member for member in live.team if member.withdrawal is None or not member.withdrawal.over]
     homes = {member.name: live.spec.recovery_of(member.spec) for member in out}
     able = live.header.state in AT_SEA and any(homes.values())
     if asked:
-        if out and not any(homes.values()):
+        if out and not any(homes.values()) and live.header.state in AT_SEA:
             raise ConflictError("no vehicle has a recovery point to return to", "give recovery.point, or stop them")
         return able
     if asked is not None or action is Action.ABORT or live.ending is not None:

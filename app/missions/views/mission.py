@@ -242,7 +242,8 @@ class MissionSummary(View):
     @property
     def allowed_actions(self) -> list[Action]:
         """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
-        return allowed_actions(self.state)
+        aborted = self.ending is MissionState.ABORTED
+        return [one for one in allowed_actions(self.state) if not (aborted and one is Action.FINISH)]
 
 
 class MissionView(MissionSummary):

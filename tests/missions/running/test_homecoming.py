@@ -148,6 +148,25 @@ async def test_a_second_finish_stops_those_on_their_way(service: MissionService)
     assert [stop.acknowledged for stop in ended.stops] == [True]
 
 
+@pytest.mark.parametrize("return_home", [True, None])
+async def test_what_is_being_aborted_cannot_be_finished(service: MissionService, return_home: bool | None) -> None:
+    mission = await service.create(recovered("a", point=lon_lat(15.0, -600.0), steps=1000))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    answer = await service.act(live, Action.ABORT, actor="Ana", return_home=True)
+    assert Action.FINISH not in answer.mission.allowed_actions
+    with pytest.raises(ConflictError, match="it is aborted by Ana, as soon as everybody is home"):
+        await service.act(live, Action.FINISH, actor="Rui", return_home=return_home)
+    assert (await act(service, mission.id, "abort")).mission.state is MissionState.ABORTED
+
+
+async def test_a_mission_that_has_not_begun_is_aborted_with_nobody_to_bring_home(service: MissionService) -> None:
+    live = await service.get((await service.create(sim_spec("a"))).id)
+    aborted = await service.act(live, Action.ABORT, actor="Ana", return_home=True)
+    assert aborted.mission.state is MissionState.ABORTED
+
+
 async def test_an_abort_stops_at_once_unless_asked_otherwise(service: MissionService) -> None:
     mission = await service.create(recovered("a", point=OUTSIDE, steps=1000))
     await act(service, mission.id, "start")
