@@ -139,7 +139,9 @@ def test_tracks_of_any_name_are_valid_xml() -> None:
 
 
 async def test_files_of_a_mission_with_any_name_can_be_taken_away(client: httpx.AsyncClient) -> None:
-    name = 'a"\r\nSet-Cookie: x\u202e\x01=b'
+    name = 'a"\tSet-Cookie: x\u202e\x01=b'
+    lines = await client.post("/missions", json=mission_spec(name=name.replace("\t", "\r\n")))
+    assert (lines.status_code, lines.json()["errors"][0]["field"]) == (422, "name")
     mission = (await client.post("/missions", json=mission_spec(name=name))).json()
     path = f"/missions/{mission['id']}"
     answer = await client.post(f"{path}/measurements", json={"items": soundings(12)})

@@ -104,7 +104,7 @@ async def test_who_is_lost_keeps_no_mission_open_whose_others_are_home(service: 
     mission = await service.create(unlike(step_deadline_s=30.0))
     await act(service, mission.id, "start")
     fast, _ = (await service.get(mission.id)).team
-    await until(lambda: fast.is_home, "the fast one is home")
+    await until(lambda: fast.withdrawal is not None, "the fast one has flown its way")
     link = service.hub._links[VehicleKind.SIM]
     assert isinstance(link, SimFleetLink)
     link.silence("slow")
