@@ -40,8 +40,8 @@ class TrackRun:
     are not accurately known at the end. ``target_tracked_pct`` and ``target_error`` count from step 100 on. A
     ``needless`` rising came before it was needed. ``wrongly_accurate_pct``: landmarks of ``A`` that are farther from
     their estimates than their deviations explain. ``error`` is the norm of the landmarks' error per step.
-    ``broken_constraints`` counts the steps of single vehicles that broke a limit as they were flown: altimeters lift
-    vehicles off ground that lies higher than estimated, and the step is longer than it may be.
+    ``broken_constraints`` counts the steps of single vehicles that broke a limit as they were flown, which may not be
+    as they were sent: altimeters lift vehicles off ground that lies higher than estimated.
     """
 
     planner: str

@@ -59,6 +59,9 @@ ROUGHLY = 0.1
 NEARBY = 0.4
 """How far an altimeter's reading is taken to hold, in distances of sight."""
 
+HALVINGS = 30
+"""How often the way to a waypoint is halved to find how far a vehicle comes that is lifted."""
+
 AREA_OF_CUBE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
@@ -210,7 +213,7 @@ class TrackWorld:
     def move(self, waypoints: FloatArray) -> FloatArray:
         """Send the vehicles to where they should be in their own reckoning; return how far each went."""
         if self.scenario.fading is None:
-            before, self.positions = self.positions, self._clear(waypoints)
+            before, self.positions = self.positions, self._reached(waypoints)
             return np.asarray(np.linalg.norm(self.positions - before, axis=1))
         fading = self.scenario.fading
         legs = waypoints - self.estimated
@@ -222,6 +225,20 @@ class TrackWorld:
         self._drift = kept * self._drift + pull
         self.team = self._localizer.move(self.team, legs)
         return np.asarray(distance)
+
+    def _reached(self, waypoints: FloatArray) -> FloatArray:
+        """Return how far vehicles come in a step: whom its altimeter lifts does not get there, it is no faster."""
+        before, reached = self.positions, self._clear(waypoints)
+        step = self.scenario.constraints.max_step_m
+        late = np.linalg.norm(reached - before, axis=1) > step
+        if not late.any():
+            return reached
+        enough, too_far = np.zeros(len(before)), np.ones(len(before))
+        for _ in range(HALVINGS):
+            part = 0.5 * (enough + too_far)
+            fits = np.linalg.norm(self._clear(_on_the_way(before, waypoints, part)) - before, axis=1) <= step
+            enough, too_far = np.where(fits, part, enough), np.where(fits, too_far, part)
+        return np.where(late[:, None], self._clear(_on_the_way(before, waypoints, enough)), reached)
 
     def _clear(self, positions: FloatArray) -> FloatArray:
         """Lift vehicles to the clearance above the true floor, as their altimeters do."""
@@ -419,3 +436,8 @@ class TrackWorld:
     def localization_errors(self) -> FloatArray:
         """Return how far each vehicle is from where it believes to be, (n_vehicles,), horizontally."""
         return np.asarray(np.linalg.norm((self.estimated - self.positions)[:, :2], axis=1))
+
+
+def _on_the_way(before: FloatArray, waypoints: FloatArray, part: FloatArray) -> FloatArray:
+    """Return where vehicles are after parts (n,) of their ways, (n, 3)."""
+    return before + part[:, None] * (waypoints - before)
