@@ -264,6 +264,8 @@ def _changes_csv(change: SiteChange) -> bytes:
         "significant": found.significant[rows, cols].astype(int),
     }
     stream = io.StringIO()
+    datum = change.surveys[1].vertical_datum.statement
+    stream.write(f"# depths: positive down, from {datum}; a positive difference: it is deeper now\n")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))

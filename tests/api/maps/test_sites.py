@@ -1,7 +1,6 @@
 """Sites over REST: one map of several missions' depths, and what changed between them."""
 
 import csv
-import io
 from collections.abc import Callable
 from typing import Any
 
@@ -116,7 +115,9 @@ async def test_a_dredged_pit_is_found_and_nothing_else(client: httpx.AsyncClient
     assert found["net"]["m3"] == pytest.approx(-dug_m3, abs=2.0 * found["net"]["sd_m3"])
     assert found["largest_m"] == pytest.approx(1.0, abs=0.4)
 
-    rows = list(csv.DictReader(io.StringIO((await client.get(f"/sites/{site}/changes.csv")).text)))
+    said, *lines = (await client.get(f"/sites/{site}/changes.csv")).text.splitlines()
+    assert said.startswith(f"# depths: positive down, from {found['vertical_datum']}; a positive difference")
+    rows = list(csv.DictReader(lines))
     assert len(rows) == CELLS**2
     significant = np.array([row["significant"] == "1" for row in rows]).reshape(CELLS, CELLS)
     deeper = np.array([float(row["difference_m"]) for row in rows]).reshape(CELLS, CELLS) > 0
