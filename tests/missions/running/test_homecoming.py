@@ -94,9 +94,8 @@ async def test_who_is_to_stop_in_the_end_waits_for_the_others(service: MissionSe
     mission = await service.create(unlike(recovery={"on_finish": "stop"}))
     await act(service, mission.id, "start")
     fast, _ = (await service.get(mission.id)).team
-    await until(lambda: fast.waits_m is not None, "the fast one has flown its way")
-    assert fast.surveys
     await until_state(service, mission.id, MissionState.FINISHED)
+    assert fast.withdrawal is None, "it surveyed until the end"
     assert not [words for words in await words_of(service, mission, "recovery") if "goes home" in words]
 
 
