@@ -84,10 +84,8 @@ async def test_who_has_flown_its_way_goes_home_while_others_survey(service: Miss
     assert [vehicle.part_done for vehicle in shown] == [True, False]
     ended = await until_state(service, mission.id, MissionState.FINISHED)
     assert {waypoint.status for waypoint in ended.waypoints} == {"reached"}, "what was flown is not given up"
-    words = await words_of(service, mission, "recovery")
-    expected = ["fast goes home: it has flown its way", "fast is home", "slow goes home: everybody has flown its way"]
-    told = [start for line in words for start in expected if line.startswith(start)]
-    assert told == expected
+    told = [words for words in await words_of(service, mission, "recovery") if "goes home" in words]
+    assert told == ["fast goes home: it has flown its way", "slow goes home: everybody has flown its way"]
 
 
 async def test_who_is_to_stop_in_the_end_waits_for_the_others(service: MissionService) -> None:
