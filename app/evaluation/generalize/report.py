@@ -38,7 +38,7 @@ def markdown(
         if name in pictures:
             lines += [f"![{name}]({pictures[name]})", "", "Lines: vehicles. Black: what was left.", ""]
         lines += _worst(of["worst"])
-        lines += ["", *_facts(runs[name])]
+        lines += ["", *_facts(runs[name]), *_yardstick_done(of)]
     return "\n".join(lines)
 
 
@@ -58,6 +58,19 @@ def _worst(worst: Sequence[Mapping[str, Any]]) -> list[str]:
         cells = (str(row[n]) if isinstance(row.get(n), str) else f"{row[n]:.3g}" if n in row else "–" for n in names)
         lines.append(f"| {' | '.join(cells)} |")
     return lines
+
+
+def _yardstick_done(of: Mapping[str, Any]) -> list[str]:
+    done = of["yardstick_done"]
+    if done is None:
+        return []
+    paired, never = done["difference"], of["floors"] - done["floors"]
+    return [
+        "",
+        f"On {never} of {of['floors']} floors the yardstick did not get there and counts one step more than it had. "
+        f"On the other {done['floors']} the figure is {done['mean']:.3g} ± {done['ci95']:.2g}, "
+        f"the difference {paired['mean']:+.3g} ± {paired['ci95']:.2g}.",
+    ]
 
 
 def _facts(runs: Sequence[Run]) -> list[str]:

@@ -276,9 +276,10 @@ def _refuse_measured(steps: int, soundings: int, pings: int) -> None:
 
 async def _delete(session: AsyncSession, mission_id: str) -> None:
     """Delete a mission's row with all that belongs to it. Raises ConflictError where another one is to follow it."""
-    for follower in await mission_queries.followers(session, mission_id):
-        name = (await session.get_one(MissionRow, follower)).name
-        raise ConflictError(f"{name!r} is to begin after it", "change or delete that one first")
+    followers = await mission_queries.followers(session, mission_id)
+    if followers:
+        first = await session.get_one(MissionRow, followers[0])
+        raise ConflictError(f"{first.name!r} is to begin after it", "change or delete that one first")
     await session.execute(delete(MissionRow).where(MissionRow.id == mission_id))
     await site_queries.forget_survey(session, mission_id)
 

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.evaluation.cli import evaluate_app
+from app.evaluation.generalize.report import markdown
 from app.evaluation.generalize.site import site_of
 from app.evaluation.generalize.summary import figure_of, summary_of, worst_of
 from app.evaluation.generalize.tasks import TASKS
@@ -79,6 +80,19 @@ def test_differences_are_paired_and_ratios_are_of_the_same_floor() -> None:
     assert of["difference"]["mean"] == pytest.approx(-80.0 / 3.0)
     assert of["kept"] == 2
     assert [one["floor"] for one in of["worst"]] == ["canyons:1", "wrecks:1", "dunes:1"]
+
+
+def test_floors_on_which_the_yardstick_never_got_there_are_told_apart() -> None:
+    got_there = [run("dunes:1", 50.0, 100.0) | {"facts": {"left_by_yardstick_pct": left}} for left in (0.0, 1.0)]
+    never = run("canyons:1", 100.0, 501.0) | {"facts": {"left_by_yardstick_pct": 1.1}}
+    of = summary_of(TASKS["explore"], [*got_there, never])
+    assert of["floors"] == 3
+    assert (of["yardstick_done"]["floors"], of["yardstick_done"]["mean"]) == (2, 0.5)
+    assert of["yardstick_done"]["difference"]["mean"] == -50.0
+    text = markdown({"explore": [*got_there, never]}, {}, 0, {})
+    assert "On 1 of 3 floors the yardstick did not get there" in text
+    assert "On the other 2 the figure is 0.5" in text
+    assert summary_of(TASKS["explore"], got_there)["yardstick_done"] is None
 
 
 def test_what_is_left_is_told_as_it_is() -> None:

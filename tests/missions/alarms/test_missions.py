@@ -15,6 +15,7 @@ from app.missions.operations.history import events_after
 from app.missions.running.mission_views import watched
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
+from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleKind
 from app.missions.views.alarms import AlarmState
 from app.missions.views.messages import AlarmMessage, SnapshotMessage
@@ -105,6 +106,8 @@ async def test_what_another_process_acknowledges_the_owners_pages_see(
         [alarm] = await second.alarms.alarms(AlarmState.OPEN)
         await second.alarms.acknowledge(alarm.id, "Ben")
         await until(lambda: live.journal.alarms.open == [], "the owner's pages do not show it any more")
+        [seen] = await owner.alarms.alarms()
+        assert (seen.state, seen.acknowledged_by) == (AlarmState.ACKNOWLEDGED, "Ben")
     finally:
         await one.close()
         await other.close()
@@ -116,7 +119,10 @@ async def test_a_mission_that_is_taken_up_shows_what_is_open(harbour: Harbour) -
     await live.journal.alarm(AlarmKind.LEAK, "a: it reports: water", vehicle="a")
     again = await harbour.reopen()
     live = await again.get(mission.id)
-    await until(lambda: [one.kind for one in live.journal.alarms.open] == ["leak"], "it is shown")
+    await until(lambda: live.journal.alarms.open, "it is shown")
+    assert [(one.kind, one.vehicle, one.message) for one in live.journal.alarms.open] == [
+        (AlarmKind.LEAK, "a", "a: it reports: water")
+    ]
 
 
 @pytest.fixture
@@ -185,17 +191,23 @@ async def _ended(harbour: Harbour, mission_id: str) -> dict[str, bool]:
     return {kind: all(a.ended_at is not None for a in alarms if a.kind == kind) for kind in {a.kind for a in alarms}}
 
 
-@pytest.mark.parametrize("restarts", [False, True])
-async def test_a_vehicle_that_comes_back_while_nobody_flies_is_lost_no_longer(harbour: Harbour, restarts: bool) -> None:
-    mission = (await harbour.service.create(sim_spec("a", "b", steps=1000, side_m=80.0))).id
+async def _silent(harbour: Harbour, spec: MissionSpec, alarm: str) -> str:
+    """Start a mission whose vehicle ``a`` is silent after the first step until an alarm is raised; its id."""
+    mission = (await harbour.service.create(spec)).id
     await act(harbour.service, mission, "start")
     await until_step(harbour.service, mission, 1)
     _link(harbour).silence("a")
 
-    async def lost() -> bool:
-        return "link_lost" in await _ended(harbour, mission)
+    async def raised() -> bool:
+        return alarm in await _ended(harbour, mission)
 
-    await until(lost, "it was silent for long")
+    await until(raised, f"{alarm} is raised")
+    return mission
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+async def test_a_vehicle_that_comes_back_while_nobody_flies_is_lost_no_longer(harbour: Harbour, restarts: bool) -> None:
+    mission = await _silent(harbour, sim_spec("a", "b", steps=1000, side_m=80.0), "link_lost")
     raised = await _ended(harbour, mission)
     assert {kind: raised[kind] for kind in ("vehicle_lost", "link_lost")} == {"vehicle_lost": False, "link_lost": False}
     if restarts:
@@ -238,15 +250,8 @@ async def test_a_vehicle_that_is_not_heard_after_a_restart_is_still_lost(harbour
 
 
 async def test_that_nobody_can_be_sent_is_over_when_somebody_can_after_a_pause(harbour: Harbour) -> None:
-    mission = (await harbour.service.create(sim_spec("a", steps=1000, side_m=80.0, step_deadline_s=5.0))).id
-    await act(harbour.service, mission, "start")
-    await until_step(harbour.service, mission, 1)
-    _link(harbour).silence("a")
-
-    async def nobody() -> bool:
-        return "no_vehicle" in await _ended(harbour, mission)
-
-    await until(nobody, "nobody can be sent")
+    spec = sim_spec("a", steps=1000, side_m=80.0, step_deadline_s=5.0)
+    mission = await _silent(harbour, spec, "no_vehicle")
     await act(harbour.service, mission, "pause")
     _link(harbour).reach("a")
     step = (await harbour.service.get(mission)).header.step
