@@ -141,7 +141,9 @@ class VehicleReports:
         """Add what a vehicle has flown since its last report, if that can have been."""
         flown = member.flown
         way_left_m = member.way_left_m(spec)
-        flown.left_m = way_left_m + member.way_ahead_m(self._frame)
+        # Legs of a way home are none of the survey's.
+        surveys = member.withdrawal is None or member.withdrawal.response is Response.HOLD
+        flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if surveys else 0.0)
         before = None if member.report is None else local_place(self._frame, member.report.position)
         if member.report is None or before is None:
             return

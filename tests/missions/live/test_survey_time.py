@@ -150,6 +150,17 @@ async def test_when_everybody_goes_home_no_leg_is_to_come(under_way: Callable[..
     assert live.progress().eta_s == 0.0
 
 
+async def test_the_way_home_is_not_left_of_the_survey(under_way: Made) -> None:
+    vehicle = await under_way(km_per_vehicle=0.1)
+    member = vehicle.member
+    for time_s in (10.0, 11.0):
+        vehicle.reports(time_s, 30.0)
+    assert member.flown.left_m == pytest.approx(80.0, abs=0.1), "of the only leg that it may fly"
+    member.withdrawal = Withdrawal(Response.RETURN, "it has flown its way", done=True)
+    vehicle.reports(20.0, 50.0)
+    assert member.flown.left_m == 0.0
+
+
 async def test_who_is_held_or_home_waits_for_no_decision(under_way: Callable[..., Awaitable[UnderWay]]) -> None:
     vehicle = await under_way(minutes=MINUTES)
     member = vehicle.member
