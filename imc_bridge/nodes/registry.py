@@ -228,7 +228,7 @@ class NodeRegistry:
         """Give a node its announced name, made unique."""
         taken = {other.name for other in self._nodes.values() if other is not node}
         node.name = name if name and name not in taken else f"{name} (0x{node.imc_id:04X})".strip()
-        node.intake.vehicle = node.pings.vehicle = node.ranges.vehicle = node.name
+        node.intake.vehicle = node.pings.vehicle = node.ranges.vehicle = node.faults.vehicle = node.name
 
 
 def _claim(announcement: Announcement) -> Claim:

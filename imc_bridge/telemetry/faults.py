@@ -28,7 +28,7 @@ class Faults:
     """The faults of one vehicle. Each is told once, and once more when it is over."""
 
     def __init__(self, vehicle: str) -> None:
-        self._vehicle = vehicle
+        self.vehicle = vehicle
         self._leaks: dict[str, str] = {}
         self._present: dict[FaultKind, Fault] = {}
         self._in_error_since_s = math.inf
@@ -64,9 +64,9 @@ class Faults:
     def _judge(self, kind: FaultKind, reason: str, time_s: float) -> Fault | None:
         known = self._present.get(kind)
         if reason and known is None:
-            self._present[kind] = fault = Fault(self._vehicle, time_s, kind, reason)
+            self._present[kind] = fault = Fault(self.vehicle, time_s, kind, reason)
             return fault
         if not reason and known is not None:
             del self._present[kind]
-            return Fault(self._vehicle, time_s, kind, known.reason, over=True)
+            return Fault(self.vehicle, time_s, kind, known.reason, over=True)
         return None

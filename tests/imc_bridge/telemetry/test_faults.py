@@ -5,7 +5,7 @@ from typing import Any
 import imcpy
 import pytest
 
-from imc_bridge import Fault, FaultKind, NodeState
+from imc_bridge import Bridge, BridgeSettings, Fault, FaultKind, NodeState
 from imc_bridge.telemetry.faults import ERROR_LASTS_S, Faults, is_leak_sensor
 from tests.support.imc.sea import Sea, open_sea
 from tests.support.waiting import until
@@ -79,3 +79,24 @@ async def broken(sea: Sea, what: str, kind: FaultKind, words: str) -> None:
     node.mend()
     await until(lambda: told() == [(kind, False), (kind, True)], f"the {what} is over")
     assert sea.bridge.nodes()[0].faults == ()
+
+
+def test_a_fault_is_told_under_the_vehicles_name_also_where_telemetry_came_before_the_announce() -> None:
+    """As after a restart of this service: DUNE goes on sending, and announces itself up to 10 s later."""
+    now_s, told = 1000.0, list[Any]()
+    bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: now_s, wall_clock=lambda: 1.7e9 + now_s)
+    bridge.listen(told.append)
+    address = "127.0.0.1", 6002
+
+    def packet(message: imcpy.Message) -> bytes:
+        message.src, message.dst, message.timestamp = 0x15, 0xFFFF, 1.7e9 + now_s
+        return bytes(imcpy.Packet.serialize(message))
+
+    bridge.on_packet(packet(state(0, 0.0)), address)
+    announce = imcpy.Announce()
+    announce.sys_name, announce.sys_type, announce.services = "a", imcpy.SystemType.UUV, "imc+udp://127.0.0.1:6002/"
+    bridge.on_announce(packet(announce), address)
+    for _ in range(12):
+        now_s += 0.5
+        bridge.on_packet(packet(state(2, 0.0)), address)
+    assert [(fault.vehicle, fault.kind) for fault in told if isinstance(fault, Fault)] == [("a", ERROR)]
