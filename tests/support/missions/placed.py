@@ -52,7 +52,8 @@ class PlacedVehicles:
         at: Place,
         to: Place,
         *,
-        time_s: float = 100.0,
+        heard_s: float = 100.0,
+        clock_ahead_s: float = 0.0,
         heading_rad: float | None = None,
         anew: bool = False,
     ) -> Member:
@@ -64,7 +65,8 @@ class PlacedVehicles:
         member.link = LinkState.ENGAGED
         if heading_rad is None:
             heading_rad = math.atan2(to[0] - at[0], to[1] - at[1])
-        member.report = VehicleReport(name, time_s, self._position(at), heading_rad=heading_rad)
+        member.report = VehicleReport(name, heard_s + clock_ahead_s, self._position(at), heading_rad=heading_rad)
+        member.heard_s = heard_s
         order = member.order
         if order is None or anew:
             order = WaypointOrder(self.live.id, 1, name, self._position(to), 1.0, 3.0, 1.0)

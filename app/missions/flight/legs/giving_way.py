@@ -148,11 +148,11 @@ class GivingWay:
         return max(member.capabilities.circles_m, turn_radius_m(self._live.spec, member.spec))
 
     def _age_s(self, member: Member) -> float:
-        """Return how much older a vehicle's report is than the newest of the team."""
-        if member.report is None or member.link not in OUT_OF_REACH:
+        """Return how much earlier than the newest of the team a vehicle's report came: their clocks may differ."""
+        if member.heard_s is None or member.link not in OUT_OF_REACH:
             return 0.0
-        newest_s = max(one.report.time_s for one in self._live.team if one.report is not None)
-        return max(newest_s - member.report.time_s, 0.0)
+        newest_s = max(one.heard_s for one in self._live.team if one.heard_s is not None)
+        return (newest_s - member.heard_s) * self._time_scale
 
     def _may_meet(self) -> list[Member]:
         """Return the vehicles that are so near another one that they may meet it in a moment."""

@@ -36,7 +36,7 @@ from app.missions.views.mission import Level
 HEARD_S = 3.0
 """Who was heard within so long and does not follow obeys somebody else; who is silent may be starting anew."""
 FRESH_S = 5.0
-"""Places of two vehicles are compared when they are not older, seconds of the vehicles' time."""
+"""Places of two vehicles are compared where one came so soon after the other, seconds of the vehicles' time."""
 
 FAULTS = {FaultKind.LEAK: Failsafe.LEAK, FaultKind.ERROR: Failsafe.VEHICLE_ERROR}
 
@@ -225,7 +225,9 @@ class FailsafeWatch:
         flying = [m for m in live.team if m.present and m.report is not None and m.legs]
         found: dict[str, dict[Failsafe, str]] = {}
         for one, other in combinations(flying, 2):
-            if one.report is None or other.report is None or abs(one.report.time_s - other.report.time_s) > FRESH_S:
+            # By when they came: vehicles' own clocks may differ by hours.
+            between_s = abs((one.heard_s or 0.0) - (other.heard_s or 0.0)) * self._time_scale
+            if one.report is None or other.report is None or between_s > FRESH_S:
                 continue
             apart_m = abs(one.report.position.depth_m - other.report.position.depth_m)
             away_m = float(np.hypot(*(one.place_m(live.frame) - other.place_m(live.frame))))

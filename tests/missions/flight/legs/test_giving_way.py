@@ -186,10 +186,12 @@ async def test_who_surveys_gives_way_to_who_goes_home(scene: PlacedVehicles) -> 
     assert {order.vehicle for order in scene.ordered} == {"a"}
 
 
-async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: PlacedVehicles) -> None:
-    scene.put("a", (30.0, 1.0, 3.0), (30.0, 55.0, 3.0), time_s=120.0)
+@pytest.mark.parametrize("clock_ahead_s", [0.0, 3600.0, -3600.0])
+async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: PlacedVehicles, clock_ahead_s: float) -> None:
+    scene.put("a", (30.0, 1.0, 3.0), (30.0, 55.0, 3.0), heard_s=120.0)
     # It was 33 m away when it was heard last, ten seconds ago: alone where it was then it would meet nobody.
-    scene.put("b", (1.0, 16.0, 3.0), (59.0, 16.0, 3.0), time_s=110.0).link = LinkState.LOST
+    silent = scene.put("b", (1.0, 16.0, 3.0), (59.0, 16.0, 3.0), heard_s=110.0, clock_ahead_s=clock_ahead_s)
+    silent.link = LinkState.LOST
     await scene.giving_way.look()
     assert {order.vehicle for order in scene.ordered} == {"a"}
 

@@ -2,14 +2,17 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from app.missions.clock import told_by
 from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleRefusedError, VehicleReport
 from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
+from app.missions.recovery import failsafes
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Failsafe
 from tests.support.missions.harbour import act, sim_spec, until_step
@@ -62,3 +65,34 @@ async def test_only_who_is_heard_can_follow_another_console(
     age_s = 0.2
     await until(lambda: any(one.failsafe is Failsafe.OTHER_CONSOLE for one in b.failsafes), "somebody else has it")
     await act(service, mission.id, "abort")
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "silent_s", "told"),
+    [(0.0, 0.0, ["a", "b"]), (30.0, 0.0, ["a", "b"]), (0.0, 30.0, [])],
+    ids=["their clocks agree", "one clock is ahead", "one was heard long ago"],
+)
+async def test_vehicles_are_too_close_by_when_they_were_heard_whatever_their_clocks_show(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch, ahead_s: float, silent_s: float, told: list[str]
+) -> None:
+    rule = failsafes.TABLE[Failsafe.SEPARATION_LOST]
+    monkeypatch.setitem(failsafes.TABLE, Failsafe.SEPARATION_LOST, replace(rule, after_s=0.0))
+    live = await service.get((await service.create(sim_spec("a", "b", limits={"min_separation_m": 5.0}))).id)
+    constraints = make_constraints(live.spec)
+    energy_range = EnergyRange(live, constraints, LegCommit(live, constraints, leads=True))
+    watch = FailsafeWatch(live, service.hub, energy_range, 1.0)
+
+    async def beside(away_m: float) -> None:
+        for name, east_m, clock_s, at_s in (("b", 20.0 + away_m, ahead_s, 0.0), ("a", 20.0, 0.0, silent_s)):
+            lat, lon = live.frame.to_geographic(np.array(east_m), np.array(20.0))
+            with told_by(lambda at_s=at_s: 1.7e9 + at_s):  # type: ignore[misc]
+                report = VehicleReport(name, 1.7e9 + at_s + clock_s, Position(float(lat), float(lon), 2.0))
+                live.reports.take(report, live.spec, running=True)
+        await watch.look()
+
+    for member in live.team:
+        member.engaged, member.link, member.legs = True, LinkState.ENGAGED, 1
+    await beside(40.0)
+    await beside(2.0)
+    close = [m.name for m in live.team if any(one.failsafe is Failsafe.SEPARATION_LOST for one in m.failsafes)]
+    assert close == told
