@@ -66,8 +66,8 @@ class SentenceReader:
 
     _parts: OrderedDict[tuple[str, int, str, int], tuple[float, list[Any]]] = field(default_factory=OrderedDict)
 
-    def read(self, line: bytes, source: str, now_s: float) -> list[Told]:
-        """Return what a line tells; nothing for what is of no interest, or not whole yet.
+    def read(self, line: bytes, source: str, now_s: float) -> list[Told] | None:
+        """Return what a line tells; nothing for what is of no interest, or not whole yet; None for what is no AIS.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class SentenceReader:
         try:
             sentence = NMEASentenceFactory.produce(line)
             if sentence.TYPE != "AIS":
-                return []  # other receivers' sentences, as of GPS, come on the same wire
+                return None  # other receivers' sentences, as of GPS, come on the same wire
             if not sentence.is_valid:
                 raise SentenceError("its checksum is wrong")
             whole = self._whole(sentence, source, now_s)
@@ -98,7 +98,7 @@ class SentenceReader:
             raise
         except UnknownMessageException:
             if line.lstrip()[:1] == b"$":
-                return []
+                return None
             raise SentenceError("it is not known") from None
         except Exception as error:  # whatever a decoder stumbles over
             raise SentenceError(type(error).__name__) from None

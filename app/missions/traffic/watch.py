@@ -134,6 +134,17 @@ class Traffic:
         """For how long it has listened."""
         return 0.0 if self._began_s is None else self.now_s - self._began_s
 
+    @property
+    def deaf(self) -> str:
+        """Why no ship is heard by any source any more; empty as long as one may be, also where nothing listens."""
+        why = []
+        for state in self.states():
+            silent_s = self.listened_s if state.silent_s is None else state.silent_s
+            if silent_s < (SILENCE_S if state.trouble else self.settings.max_age_s):
+                return ""
+            why.append(f"{state.name}: {state.trouble or f'nothing for {silent_s:.0f} s'}")
+        return "; ".join(why)
+
     def _put(self, line: bytes, source: Source) -> None:
         if len(self._waiting) >= MOST_WAITING:
             self.dropped += 1
@@ -162,6 +173,8 @@ class Traffic:
                 told = self._reader.read(line, source.name, self.now_s)
             except SentenceError:
                 self.malformed += 1
+                continue
+            if told is None:
                 continue
             source.sentences += 1
             source.heard_s = self.now_s

@@ -19,7 +19,7 @@ from tests.support.missions.ais import CLASS_A, CLASS_B, RECORDED, STATIC, sente
 
 def read(*lines: bytes) -> list[ShipPosition | ShipParticulars]:
     reader = SentenceReader()
-    return [one for line in lines for one in reader.read(line, "test", 0.0)]
+    return [one for line in lines for one in reader.read(line, "test", 0.0) or []]
 
 
 def test_a_position_of_class_a_is_read() -> None:

@@ -14,7 +14,7 @@ from app.missions.traffic.sources import Lines, UdpSource
 from app.missions.traffic.watch import MOST_PER_TICK, MOST_WAITING, Traffic
 from app.missions.views.traffic import traffic_findings
 from imc_bridge.doctor.diagnosis import Severity
-from tests.support.missions.ais import CLASS_A, RECORDED, STATIC, named, position
+from tests.support.missions.ais import CLASS_A, RECORDED, STATIC, named, nmea, position
 from tests.support.waiting import until
 
 
@@ -146,6 +146,18 @@ async def test_silence_is_told() -> None:
         await udp_port(traffic)
         [finding] = traffic_findings(traffic)
         assert finding.severity is Severity.NOTE
+        assert "nothing was heard" in finding.text
+
+
+async def test_other_instruments_on_the_same_wire_are_no_ais_that_is_heard() -> None:
+    async with listening(udp_address="127.0.0.1", udp_port=0) as traffic:
+        await udp_port(traffic)
+        [source] = traffic.sources
+        for sentence in ("GPGSV,1,1,01,21,00,000,", "GPZDA,120000.00,29,11,2026,00,00", "SDDPT,3.4,0.0"):
+            traffic._put(nmea(sentence), source)
+        traffic._take_some()
+        [finding] = traffic_findings(traffic)
+        assert (traffic.malformed, finding.severity) == (0, Severity.NOTE)
         assert "nothing was heard" in finding.text
 
 

@@ -63,6 +63,8 @@ class FailsafeWatch:
         """By vehicle: the ships (MMSI) that came too close a moment ago."""
         self._words_of_ships: list[tuple[str, str]] = []
         """Vehicles and alarms about ships that are still to be written."""
+        self._deaf = False
+        """Whether it was told that no ship is heard any more."""
         self._below_since_s: dict[str, float] = {}
         """Since when vehicles have waited below for ships."""
         self._have_waited: set[str] = set()
@@ -100,6 +102,7 @@ class FailsafeWatch:
             await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=name)
         for name, found in news:
             await self._tell(name, found, now_s)
+        await self._tell_of_deafness()
 
     def _look_at(self, member: Member, now_s: float, too_close: dict[Failsafe, str]) -> None:
         """Tell what a vehicle's way home takes, and do what its failsafes ask for."""
@@ -245,6 +248,19 @@ class FailsafeWatch:
         if len(followed) < 2 or len(lost) < len(followed):
             return {}
         return {Failsafe.ALL_LINKS_LOST: f"none of {len(followed)} vehicles is heard any more"}
+
+    async def _tell_of_deafness(self) -> None:
+        """Write down when no ship is heard any more, and when one is again: no ships about looks the same."""
+        traffic = self._live.ships.traffic
+        why = "" if traffic is None else traffic.deaf
+        if bool(why) == self._deaf:
+            return
+        self._deaf = bool(why)
+        if why:
+            words = f"no ship is heard by AIS any more ({why}): nobody is warned of any, and nobody waits for any"
+            await self._live.journal.log(Level.WARNING, "traffic", words)
+        else:
+            await self._live.journal.log(Level.INFO, "traffic", "AIS is heard again")
 
     async def _tell(self, name: str, found: list[Active], now_s: float) -> None:
         """Write down what begins and what is over."""

@@ -1,5 +1,6 @@
 """What is taken for a failure of a vehicle, and what is not."""
 
+import asyncio
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +13,23 @@ from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
+from app.missions.live.mission import LiveMission
+from app.missions.operations.history import events_after
 from app.missions.recovery import failsafes
 from app.missions.service import MissionService
+from app.missions.settings import AisSettings
 from app.missions.spec.failsafes import Failsafe
+from app.missions.traffic.watch import SILENCE_S, Traffic
+from app.missions.views.mission import Level
 from tests.support.missions.harbour import act, sim_spec, until_step
 from tests.support.missions.specs import lon_lat
 from tests.support.waiting import until
+
+
+def watch_of(live: LiveMission, service: MissionService) -> FailsafeWatch:
+    constraints = make_constraints(live.spec)
+    energy_range = EnergyRange(live, constraints, LegCommit(live, constraints, leads=True))
+    return FailsafeWatch(live, service.hub, energy_range, 1.0)
 
 
 async def test_one_whose_way_home_cannot_be_told_keeps_nobody_from_looking_after_the_others(
@@ -31,9 +43,7 @@ async def test_one_whose_way_home_cannot_be_told_keeps_nobody_from_looking_after
         member.report = VehicleReport(member.name, 0.0, Position(lat, lon, 2.0))
     # As a description of before this was checked has it.
     a.spec = a.spec.model_copy(update={"recovery_point": (lat, lon)})
-    constraints = make_constraints(live.spec)
-    committing = LegCommit(live, constraints, leads=True)
-    await FailsafeWatch(live, service.hub, EnergyRange(live, constraints, committing), 1.0).look()
+    await watch_of(live, service).look()
     assert a.way_home_m is None
     assert b.way_home_m is not None
 
@@ -78,9 +88,7 @@ async def test_vehicles_are_too_close_by_when_they_were_heard_whatever_their_clo
     rule = failsafes.TABLE[Failsafe.SEPARATION_LOST]
     monkeypatch.setitem(failsafes.TABLE, Failsafe.SEPARATION_LOST, replace(rule, after_s=0.0))
     live = await service.get((await service.create(sim_spec("a", "b", limits={"min_separation_m": 5.0}))).id)
-    constraints = make_constraints(live.spec)
-    energy_range = EnergyRange(live, constraints, LegCommit(live, constraints, leads=True))
-    watch = FailsafeWatch(live, service.hub, energy_range, 1.0)
+    watch = watch_of(live, service)
 
     async def beside(away_m: float) -> None:
         for name, east_m, clock_s, at_s in (("b", 20.0 + away_m, ahead_s, 0.0), ("a", 20.0, 0.0, silent_s)):
@@ -96,3 +104,24 @@ async def test_vehicles_are_too_close_by_when_they_were_heard_whatever_their_clo
     await beside(2.0)
     close = [m.name for m in live.team if any(one.failsafe is Failsafe.SEPARATION_LOST for one in m.failsafes)]
     assert close == told
+
+
+async def test_that_no_ship_is_heard_any_more_is_a_line_of_the_log(service: MissionService) -> None:
+    live = await service.get((await service.create(sim_spec("a"))).id)
+    live.ships.traffic = traffic = Traffic(AisSettings(tcp_host="ais", max_age_s=600.0))
+    [source] = traffic.sources
+    watch, heard_s = watch_of(live, service), asyncio.get_running_loop().time()
+
+    async def told(silent_s: float, trouble: str) -> list[tuple[Level, str]]:
+        source.heard_s, source.trouble = heard_s - silent_s, trouble
+        await watch.look()
+        await watch.look()
+        return [(one.level, one.message) for one in await events_after(live, 0, 1000) if one.kind == "traffic"]
+
+    assert await told(0.5 * SILENCE_S, "Connection refused") == []
+    assert await told(500.0, "") == []  # few ships
+    [(level, words)] = await told(500.0, "Connection refused")
+    assert level is Level.WARNING
+    assert "no ship is heard by AIS any more (TCP ais:10110: Connection refused)" in words
+    assert (await told(0.0, ""))[1:] == [(Level.INFO, "AIS is heard again")]
+    assert "nothing for 60" in (await told(601.0, ""))[2][1]
