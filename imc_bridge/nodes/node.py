@@ -41,8 +41,9 @@ SLOWEST_ASCENT_MPS = 0.1
 """How fast a vehicle without motor floats up, at least."""
 CONTACT_AGAIN_S = 20.0
 """DUNE looks for contacts every 5 s; a few of our heartbeats may be lost."""
-LONGEST_BOND_S = 3600.0
-"""A vehicle that was under water for longer may come back under another address."""
+LONGEST_DIVE_S = 3600.0
+"""So long a vehicle may be silent under water in a plan whose length is not known here, as another console's or the way
+home on board; one that was away for longer may come back under another address."""
 STATE_MESSAGES_FRESH_S = 3.0
 MAX_TEXT = 500
 """Characters kept of what a vehicle says in words."""
@@ -191,7 +192,7 @@ class Node:
     def given_up(self, now: float) -> bool:
         """Whether it was silent long enough for another host to announce its id."""
         last = max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
-        patience = max(ANNOUNCES_MISSED * self.settings.announce_period_s, min(self.patience_s, LONGEST_BOND_S))
+        patience = max(ANNOUNCES_MISSED * self.settings.announce_period_s, min(self.patience_s, LONGEST_DIVE_S))
         return now - last > patience
 
     # Packets and the vehicle's clock
@@ -371,7 +372,7 @@ class Node:
         if not self.submerged:
             return self.settings.release_after_s
         if not self.references_needed:
-            return math.inf
+            return LONGEST_DIVE_S
         return self.settings.follow_timeout_s + self.ascent_s
 
     @property
