@@ -17,7 +17,8 @@ MAX_GAP_S = 24.0 * 3600.0
 """Where the sea has one tide a day its extremes are half a day apart; a larger gap is a hole in the table."""
 
 OBSERVED_GAP_S = 2.0 * 3600.0
-"""Entries that are no farther apart are levels of a gauge in a table whose entries are not all extremes."""
+"""Entries that are no farther apart are levels of a gauge in a table whose entries are not all extremes. Where most are
+so, a larger gap is a time in which the gauge told nothing."""
 
 MAX_LINES = 200_000
 _LINE = re.compile(
@@ -61,7 +62,7 @@ class TideTable:
 
         A half cosine leads from one extreme to the next; observed levels are joined by cubics whose slopes at an entry
         are those of the parabola through it and its neighbours. Nothing is said before the first entry, after the
-        last, and in a hole of more than ``MAX_GAP_S``.
+        last, and in a hole of more than ``MAX_GAP_S``, or of more than ``OBSERVED_GAP_S`` among a gauge's levels.
         """
         times = np.asarray(time_s, float)
         after = np.clip(np.searchsorted(self.times_s, times, side="right"), 1, len(self.times_s) - 1)
@@ -72,7 +73,7 @@ class TideTable:
         if not self._of_extremes:
             level = np.where(end - begin <= OBSERVED_GAP_S, self._cubic(times), level)
         known = (times >= self.times_s[0]) & (times <= self.times_s[-1])
-        known &= (end - begin <= MAX_GAP_S) | (times == begin) | (times == end)
+        known &= (end - begin <= self._longest_gap_s) | (times == begin) | (times == end)
         return np.where(known, level, np.nan)
 
     @cached_property
@@ -80,6 +81,12 @@ class TideTable:
         """Whether levels rise and fall in turn, as from high water to low water."""
         rise = np.diff(self.levels_m)
         return bool(np.all(rise[:-1] * rise[1:] < 0.0))
+
+    @cached_property
+    def _longest_gap_s(self) -> float:
+        """How far two entries may be apart between which there is a level."""
+        of_gauge = not self._of_extremes and float(np.median(np.diff(self.times_s))) <= OBSERVED_GAP_S
+        return OBSERVED_GAP_S if of_gauge else MAX_GAP_S
 
     @cached_property
     def _cubic(self) -> CubicHermiteSpline:

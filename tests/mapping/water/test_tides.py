@@ -76,6 +76,22 @@ def test_a_hole_in_the_table_is_no_half_tide() -> None:
     assert table.why_not(table.times_s[-1]) == ""
 
 
+def test_while_a_gauge_told_nothing_there_is_no_level() -> None:
+    """A half cosine over six hours without its levels is up to 0.8 m off in a tide of 3 m."""
+    begin = datetime(2026, 1, 1, tzinfo=UTC)
+    hours = [h for h in range(48) if not 20 < h < 26]
+    table = parse_tid(
+        "\n".join(
+            f"{begin + timedelta(hours=h):%Y/%m/%d %H:%M:%S} {1.5 + 1.5 * math.cos(2 * math.pi * h / 12.42):.3f}"
+            for h in hours
+        )
+    )
+    silent = begin.timestamp() + 3600.0 * np.array([20.5, 23.0, 25.5])
+    assert np.isnan(table.levels_at(silent)).all()
+    assert "hole" in table.why_not(silent[0])
+    assert np.isfinite(table.levels_at(begin.timestamp() + 3600.0 * np.array([19.5, 20.0, 26.0, 26.5]))).all()
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
