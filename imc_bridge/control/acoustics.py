@@ -101,10 +101,8 @@ class SoundPath:
         Sends a message to the gateway.
     next_id
         Numbers for requests.
-    wall_clock
-        Unix seconds: deadlines are given in them.
-    time_scale
-        How much faster than the wall clock the vehicles live.
+    gateway_clock
+        Unix seconds by the gateway's own clock: it holds deadlines against that.
     """
 
     def __init__(
@@ -113,8 +111,7 @@ class SoundPath:
         gateway: str,
         send: Callable[[Message], None],
         next_id: Callable[[], int],
-        wall_clock: Callable[[], float],
-        time_scale: float = 1.0,
+        gateway_clock: Callable[[], float],
     ) -> None:
         self.vehicle = vehicle
         self.gateway = gateway
@@ -123,8 +120,7 @@ class SoundPath:
         self.report: SoundReport | None = None
         self._send = send
         self._next_id = next_id
-        self._wall_clock = wall_clock
-        self._time_scale = time_scale
+        self._gateway_clock = gateway_clock
         self._under_way: _Transmission | None = None
         self._asked_at = -math.inf
 
@@ -136,7 +132,7 @@ class SoundPath:
             return False
         request_id = self._next_id()
         self._under_way = _Transmission(request_id, type(message).__name__, now, urgent, frame_bytes(message))
-        self._send(transmission(message, self.vehicle, request_id, self._wall_clock() + DEADLINE_S / self._time_scale))
+        self._send(transmission(message, self.vehicle, request_id, self._gateway_clock() + DEADLINE_S))
         return True
 
     def status(self, message: Message) -> str:

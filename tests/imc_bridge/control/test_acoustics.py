@@ -8,7 +8,7 @@ from typing import Any
 import imcpy
 import pytest
 
-from imc_bridge import BridgeSettings, Guidance, NodeState, RefusedError, Waypoint, WaypointStatus
+from imc_bridge import Bridge, BridgeSettings, Guidance, NodeState, RefusedError, Waypoint, WaypointStatus
 from imc_bridge.control.acoustics import (
     DEADLINE_S,
     INSTANT_BYTES,
@@ -185,6 +185,46 @@ async def test_legs_go_on_by_sound_where_radio_does_not_reach() -> None:
         finally:
             serving.cancel()
             modem.sock.close()
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 600.0, -600.0])
+async def test_deadlines_are_by_the_gateways_clock(ahead_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gateway holds them against its own: on a console that is slow every command would be too late at once."""
+    now_s, wall_s = 1000.0, 1.7e9
+    bridge = Bridge(BridgeSettings(loopback_only=True), clock=lambda: now_s, wall_clock=lambda: wall_s)
+    requests: list[imcpy.TransmissionRequest] = []
+
+    def sent(packet: bytes, address: tuple[str, int]) -> bool:
+        message = imcpy.Packet.deserialize(packet)
+        requests.extend([message] if isinstance(message, imcpy.TransmissionRequest) else [])
+        return True
+
+    monkeypatch.setattr(bridge.transport, "send", sent)
+
+    def hear(imc_id: int, port: int, *messages: imcpy.Message, announce: bool = False) -> None:
+        for message in messages:
+            message.src, message.dst = imc_id, 0xFFFF
+            message.timestamp = wall_s + (ahead_s if imc_id == GATEWAY_ID else 0.0)
+            take = bridge.on_announce if announce else bridge.on_packet
+            take(bytes(imcpy.Packet.serialize(message)), ("127.0.0.1", port))
+
+    for imc_id, name, kind, port in ((GATEWAY_ID, GATEWAY, "STATICSENSOR", 6020), (0x1E, "a", "UUV", 6002)):
+        announce = imcpy.Announce()
+        announce.sys_name, announce.sys_type = name, getattr(imcpy.SystemType, kind)
+        announce.services = f"imc+udp://127.0.0.1:{port}/"
+        hear(imc_id, port, announce, announce=True)
+        hear(imc_id, port, imcpy.Heartbeat())
+    ready = imcpy.PlanControlState()
+    ready.state = imcpy.PlanControlState.StateEnum.READY
+    hear(0x1E, 6002, imcpy.VehicleState(), ready)
+    engaging = asyncio.create_task(bridge.engage("a", Guidance.ACOUSTIC, GATEWAY))
+    await asyncio.sleep(0)
+    bridge.pass_time()
+    bridge.goto("a", WAYPOINT)
+    now_s += 9.0  # radio is silent
+    bridge.pass_time()
+    engaging.cancel()
+    assert [request.deadline - wall_s - ahead_s for request in requests[:1]] == [DEADLINE_S]
 
 
 async def test_a_gateway_that_nobody_heard_of_is_refused() -> None:
