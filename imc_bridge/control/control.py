@@ -37,6 +37,7 @@ from imc_bridge.settings import BridgeSettings
 
 STOP_RETRY_S = 0.5
 ABANDONED_STOP_RETRY_S = 2.0
+NO_POSITION = "no state of it holds a position: it has no GPS fix yet, or its navigation has failed"
 EVIDENCE_S = 1.5
 """How long an ended plan is looked into before its cause is judged: an abort shows as ERROR, then BLOCKED."""
 
@@ -320,7 +321,7 @@ class Control(ABC):
 
     def _tick_waiting(self, now: float) -> None:
         node, settings = self.node, self._settings
-        if node.can_start(now):
+        if node.can_start(now) and node.report is not None:
             self._evidence = Evidence()
             self._begin(now)
             return
@@ -328,7 +329,8 @@ class Control(ABC):
         if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now, wanted=True)
         elif now - self._since > self._waiting_limit_s():
-            reason = status.reason or "does not report being in service and ready"
+            unready = NO_POSITION if node.report is None else "does not report being in service and ready"
+            reason = status.reason or unready
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
         elif self._runs_ours() and now >= self._request_due:
             # The way home, or our plan of an earlier run, whose references have ceased: it is ended before a new one

@@ -359,6 +359,9 @@ def _addresses(node: NodeView) -> str:
 
 def _state_findings(node: NodeView, dropped: int) -> list[Finding]:
     rate = node.rates_hz.get("EstimatedState", 0.0)
+    if rate >= MIN_STATE_RATE_HZ and node.report is None:
+        text = f"EstimatedState at {rate:.1f} Hz from {node.address}, and no position in any"
+        return [problem(Cause.LOW_RATE, text, "Wait for its GPS fix; where it has one its navigation has failed")]
     if rate >= MIN_STATE_RATE_HZ:
         return [ok(f"EstimatedState at {rate:.1f} Hz from {node.address}; rates: {node.rate_limiters}")]
     if dropped:

@@ -216,7 +216,9 @@ async def test_deadlines_are_by_the_gateways_clock(ahead_s: float, monkeypatch: 
         hear(imc_id, port, imcpy.Heartbeat())
     ready = imcpy.PlanControlState()
     ready.state = imcpy.PlanControlState.StateEnum.READY
-    hear(0x1E, 6002, imcpy.VehicleState(), ready)
+    place = imcpy.EstimatedState()
+    place.lat, place.lon = math.radians(WAYPOINT.lat_deg), math.radians(WAYPOINT.lon_deg)
+    hear(0x1E, 6002, imcpy.VehicleState(), ready, place)
     engaging = asyncio.create_task(bridge.engage("a", Guidance.ACOUSTIC, GATEWAY))
     await asyncio.sleep(0)
     bridge.pass_time()

@@ -122,6 +122,7 @@ class Script:
 
 def test_plan_is_sent_only_when_the_vehicle_is_in_service_and_ready() -> None:
     script = Script()
+    script.move()
     script.report(mode=OperationMode.BOOT, plan=PlanState.BLOCKED)
     assert script.follower.engage(script.now)
     script.run(3.0)
@@ -133,6 +134,7 @@ def test_plan_is_sent_only_when_the_vehicle_is_in_service_and_ready() -> None:
 
 def test_start_is_repeated_with_the_same_request_until_answered() -> None:
     script = Script()
+    script.move()
     script.report()
     script.follower.engage(script.now)
     script.run(5.0)
@@ -143,11 +145,25 @@ def test_start_is_repeated_with_the_same_request_until_answered() -> None:
 
 def test_vehicle_that_never_answers_is_refused() -> None:
     script = Script()
+    script.move()
     script.report()
     script.follower.engage(script.now)
     script.run(11.0)
     assert not script.follower.engaged
     assert "no answer to the plan within 10 s" in script.follower.refusal.reason
+
+
+@pytest.mark.parametrize("kind", [Follower, LegFollower])
+def test_vehicle_that_tells_no_position_is_not_engaged(kind: type[Any]) -> None:
+    """It would be sent down where nobody knows what is below it."""
+    script = Script(kind)
+    script.follower.engage(script.now)
+    script.run(16.0)
+    assert script.sent == []
+    assert "holds a position" in script.follower.refusal.reason
+
+    script.move()
+    assert script.follower.engage(script.now)
 
 
 def test_vehicle_that_never_gets_ready_is_refused_with_its_error() -> None:
@@ -162,6 +178,7 @@ def test_vehicle_that_never_gets_ready_is_refused_with_its_error() -> None:
 
 def test_refused_plan_is_reported_with_the_vehicles_words() -> None:
     script = Script()
+    script.move()
     script.report()
     script.follower.engage(script.now)
     script.follower.tick(script.now)

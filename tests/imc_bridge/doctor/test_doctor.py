@@ -1,6 +1,7 @@
 """The doctor names the cause of what is wrong and what to do, against real sockets and fake DUNE nodes."""
 
 import asyncio
+import math
 import socket
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from imc_bridge.doctor.replay import RecordingError
 from imc_bridge.events import SwathPing
 from imc_bridge.settings import BridgeSettings
 from simulator.dune import DuneFleet, DuneOptions, VehicleSpec
+from simulator.dune.telemetry import Telemetry
 from simulator.network import NetworkFaults
 from tests.support.imc.sea import Peer, Sea, open_sea
 from tests.support.ports import free_ports
@@ -38,6 +40,21 @@ async def test_healthy_vehicles_pass() -> None:
         assert "bottom measured by Altimeter" in diagnosis.text()
         assert "in service and ready" in diagnosis.text()
         assert diagnosis.nodes[0].history[0].state == "announced"
+
+
+async def test_states_without_a_position_are_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    state = Telemetry.estimated_state
+
+    def lost(telemetry: Telemetry) -> imcpy.EstimatedState:
+        message = state(telemetry)
+        message.lat = math.nan
+        return message
+
+    monkeypatch.setattr(Telemetry, "estimated_state", lost)
+    async with open_sea() as sea:
+        await sea.ready()
+        await until(lambda: "and no position in any" in judge(sea.bridge, 1.0).text(), "it is told")
+        assert Cause.LOW_RATE in judge(sea.bridge, 1.0).causes
 
 
 async def test_nothing_heard_is_a_problem_with_ports_to_check() -> None:
