@@ -31,6 +31,7 @@ from app.missions.flight.legs.keeping_off import KeepingOff, KeepOutZones
 from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
+from app.missions.flight.observation.vehicle_clocks import VehicleClocks
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import Flight, OrderBook
 from app.missions.flight.own_legs import OwnLegs
@@ -110,6 +111,7 @@ class Runner:
                 self._engagement.keep,
                 partial(keep_time, live),
                 partial(keep_telemetry, live, self._time_scale),
+                VehicleClocks(live, self._time_scale).keep,
                 self._watch.keep,
                 self._withdrawals.keep,
                 self._onboard.keep,
