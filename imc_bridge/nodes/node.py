@@ -239,7 +239,10 @@ class Node:
     # Telemetry
 
     def take_state(self, message: Message) -> StateReport | Refused | None:
-        """EstimatedState: None when it is out of order, repeated or not finite, Refused where it cannot be."""
+        """EstimatedState: None when it is out of order, repeated or holds no position, Refused where it cannot be."""
+        if message.lat == 0.0 and message.lon == 0.0:
+            # It has had no fix yet.
+            return None
         lat, lon, _height = toWGS84(message)
         values = (lat, lon, message.depth, message.phi, message.theta, message.psi)
         if not all(map(math.isfinite, values)) or abs(lat) > math.pi / 2:

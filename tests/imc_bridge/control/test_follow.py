@@ -65,7 +65,9 @@ class Script:
         state.timestamp = self.time_s
         state.lat, state.lon, state.depth = math.radians(lat_deg), math.radians(lon_deg), depth_m
         self.node.places.clear()  # the script puts it where it wants
-        self.follower.moved(self.node.take_state(state), self.now)
+        report = self.node.take_state(state)
+        if report is not None:
+            self.follower.moved(report, self.now)
 
     def echo(self, state: int = 2, reference: imcpy.Message | None = None) -> None:
         message = imcpy.FollowRefState()
@@ -164,6 +166,22 @@ def test_vehicle_that_tells_no_position_is_not_engaged(kind: type[Any]) -> None:
 
     script.move()
     assert script.follower.engage(script.now)
+
+
+def test_vehicle_without_a_fix_is_not_sent_to_where_no_ship_is() -> None:
+    """Before its first fix it reports latitude and longitude 0: told to stay there it set out with the fix."""
+    script = Script()
+    script.move(0.0, 0.0)
+    assert script.node.report is None
+    script.follower.engage(script.now)
+    script.run(3.0)
+    assert script.sent == []
+
+    script.move()
+    script.run(0.2)
+    script.report(mode=OperationMode.MANEUVER, plan=PlanState.EXECUTING)
+    script.run(2.0)
+    assert {round(math.degrees(reference.lat), 6) for reference in script.of("Reference")} == {41.185}
 
 
 def test_vehicle_that_never_gets_ready_is_refused_with_its_error() -> None:
