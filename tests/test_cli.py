@@ -232,6 +232,19 @@ def test_a_newer_version_s_database_is_neither_changed_nor_put_in_place(bathyfle
     assert "the database is another version's" in made.stderr
 
 
+def test_a_backup_that_the_start_would_not_bring_up_to_date_is_restored_and_said_to_be(
+    bathyfleet: Run, tmp_path: Path
+) -> None:
+    bathyfleet("token", "create", "Maria")
+    assert bathyfleet("backup", "copy.db").code == 0
+    at_revision(tmp_path / "copy.db", "0018")
+    restored = bathyfleet("restore", "copy.db", "--replace", BATHYFLEET_AUTO_MIGRATE="false")  # as with PostgreSQL
+    assert restored.code == 0
+    assert "what was there before is now" in restored.stdout
+    assert "copy.db is restored" in restored.stdout
+    assert "run 'bathyfleet migrate'" in restored.stderr
+
+
 def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_path: Path) -> None:
     """A service of the older version may still be running on it."""
     bathyfleet("migrate")
