@@ -187,7 +187,9 @@ def create_token(
     name: Annotated[str, typer.Argument(help="Who will hold it, shown in logs.")],
     role: Annotated[TokenRole, typer.Option(help="What the holder may do.")] = TokenRole.OPERATOR,
     vehicle: Annotated[str | None, typer.Option(help="The one vehicle that a token of role vehicle is for.")] = None,
-    days: Annotated[float | None, typer.Option(min=0, help="Days it is valid; default: until revoked.")] = None,
+    days: Annotated[
+        float | None, typer.Option(min=0, max=36_500, help="Days it is valid; default: until revoked.")
+    ] = None,
     database: Database = None,
 ) -> None:
     """Make an access token. It is printed once and cannot be seen again; from now on every request needs one."""
@@ -197,8 +199,18 @@ def create_token(
         raise typer.BadParameter("the name has 1 to 120 characters", param_hint="NAME")
     from datetime import UTC, datetime, timedelta
 
-    from app.api.accounts.tokens import Role, TokenStore
+    from pydantic import TypeAdapter, ValidationError
 
+    from app.api.accounts.tokens import Role, TokenStore
+    from app.missions.spec.base import Name
+
+    try:
+        TypeAdapter(Name | None).validate_python(vehicle)
+    except ValidationError:
+        raise typer.BadParameter(
+            f"{vehicle!r} is no name of a vehicle: letters, digits, '.', '_' and '-', at most 64",
+            param_hint="--vehicle",
+        ) from None
     expires_at = None if days is None else datetime.now(UTC) + timedelta(days=days)
 
     async def run(store: TokenStore) -> tuple[str, str]:
@@ -244,7 +256,9 @@ def list_tokens(
 
     from imc_bridge.printable import printable
 
-    table = Table(Column("id", no_wrap=True), "name", "role", "vehicle", "made", "valid until", "revoked")
+    # A narrow terminal gets more lines; a time or a role that is cut off would say nothing.
+    others = [Column(name, overflow="fold") for name in ("name", "role", "vehicle", "made", "valid until", "revoked")]
+    table = Table(Column("id", no_wrap=True), *others)
     for row in rows:
         table.add_row(*(Text(printable(str(value))) if value is not None else "–" for value in row.values()))
     Console().print(table)

@@ -130,6 +130,8 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["import-log", "nowhere", "Data.lsf"], {}, 1, "0 missions have ids that begin with 'nowhere'"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
+        (["token", "create", "x", "--role", "vehicle", "--vehicle", "a b"], {}, 2, "is no name of a vehicle"),
+        (["token", "create", "x", "--days", "1e9"], {}, 2, "--days"),
         (["token", "revoke", "zzz"], {}, 2, "no valid token has an id that begins with 'zzz'"),
         (["migrate", "--down-to", "nonsense"], {}, 1, "Can't locate revision"),
         (["demo", "--terrain", "nowhere.npz"], {}, 2, "does not exist"),
@@ -179,6 +181,17 @@ def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
     assert bathyfleet("token", "revoke", listed["id"][:8]).code == 0
     (revoked,) = json.loads(bathyfleet("token", "list", "--json").stdout)
     assert revoked["revoked_at"]
+
+
+def test_lists_are_whole_in_a_narrow_terminal(bathyfleet: Run) -> None:
+    bathyfleet("token", "create", "Maria", "--role", "operator", "--days", "30")
+    (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    (noted,) = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
+    tokens, audit = (bathyfleet(*words, COLUMNS="80").stdout for words in (["token", "list"], ["audit"]))
+    assert "…" not in tokens + audit
+    assert noted["time"][:19] + "Z" in audit
+    columns = zip(*(line.split("│")[1:-1] for line in tokens.splitlines() if line.startswith("│")), strict=True)
+    assert listed["expires_at"] in ["".join(part.strip() for part in column) for column in columns]
 
 
 def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathyfleet: Run, tmp_path: Path) -> None:

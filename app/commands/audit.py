@@ -88,12 +88,14 @@ def _plain(row: "AuditRow") -> dict[str, Any]:
 
 def _show(entries: list[dict[str, Any]]) -> None:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
     from rich.text import Text
 
     from imc_bridge.printable import printable
 
-    table = Table("time", "who", "from", "what", "result", "why")
+    # A narrow terminal gets more lines: nothing of who did what is cut off, and no time.
+    others = [Column(name, overflow="fold") for name in ("who", "from", "what", "result", "why")]
+    table = Table(Column("time", no_wrap=True), *others)
     for entry in entries:
         who = f"{entry['actor'] or 'nobody known'} ({entry['role'] or '–'})"
         what = f"{entry['action']} {entry['target']}"
