@@ -165,6 +165,8 @@ def migrate(
             raise of_another_version(url, before, migrations.head())
         if down_to is None:
             await migrations.upgrade(url)
+        elif await migrations.is_in_use(url):
+            raise CommandError("a service has the database, and would lose its tables", "Stop the service first")
         else:
             await migrations.downgrade(url, down_to)
         return before, await migrations.current(url)

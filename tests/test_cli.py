@@ -276,6 +276,8 @@ def test_a_mission_is_served_exported_and_found_again(
         client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(12)})
         exported_beside = bathyfleet("export", mission["id"], "--format", "csv", "--out", "-")
         assert exported_beside.stdout.count("rover") == 12
+        back = bathyfleet("migrate", "--down-to", "0001")
+        assert (back.code, "Stop the service first" in back.stderr) == (1, True)
         tide = ("tide", mission["id"], "--level", "1")
         refused = bathyfleet(*tide)
         assert refused.code == 1
