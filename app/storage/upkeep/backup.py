@@ -83,7 +83,8 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
     finally:
-        part.unlink(missing_ok=True)
+        if part.exists():
+            part.unlink()
         if not target.exists() and copies.folder is not None:
             shutil.rmtree(copies.folder, ignore_errors=True)
     return target, contents

@@ -221,6 +221,9 @@ async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Pa
             contents_of(tmp_path / name)
     with pytest.raises(BackupError, match="exists"):
         back_up(sqlite.url, tmp_path / "other.db")
+    (tmp_path / "notes").touch()
+    with pytest.raises(BackupError, match="cannot be written"):
+        back_up(sqlite.url, tmp_path / "notes")
     with pytest.raises(BackupError, match="there is no database"):
         back_up(f"sqlite+aiosqlite:///{tmp_path / 'absent.db'}", tmp_path / "x.db")
 
