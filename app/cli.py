@@ -16,7 +16,7 @@ from app import __version__
 from app.commands.alarms import alarms_app
 from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
-from app.commands.command import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, command_settings, missing_database, noted
 from app.commands.data import adjust, export, import_file, report, tide
 from app.commands.failsafes import failsafes
 from app.commands.home import home
@@ -517,6 +517,7 @@ def evaluate(context: typer.Context) -> None:
 
 def _with_tokens(database: str | None, run: Any, changing: str = "", target: str = "") -> Any:
     settings = command_settings(database_url=database)
+    new = missing_database(settings)
     from app.api.accounts.tokens import TokenStore
     from app.storage.database import Database as Store
     from app.storage.upkeep.prepare import prepare_database
@@ -533,6 +534,8 @@ def _with_tokens(database: str | None, run: Any, changing: str = "", target: str
             await store.close()
         if changing:
             await noted(settings, changing, target)
+        if new is not None:
+            typer.echo(f"there was no database {new}, so a new one was made; --database names another", err=True)
         return done
 
     return asyncio.run(use())

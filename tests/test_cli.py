@@ -128,6 +128,8 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["report", "nowhere", "--out", "x.doc"], {}, 2, "x.doc ends in none of .pdf, .html"),
         (["report", "nowhere", "--lang", "xx"], {}, 2, "'xx' is not one of en, pt"),
         (["import-log", "nowhere", "Data.lsf"], {}, 1, "0 missions have ids that begin with 'nowhere'"),
+        (["audit"], {}, 1, "there is no database /"),
+        (["prune", "--days", "3"], {}, 1, "there is no database /"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
         (["token", "create", "x", "--role", "vehicle", "--vehicle", "a b"], {}, 2, "is no name of a vehicle"),
@@ -174,12 +176,14 @@ def test_migrate_goes_up_and_down(bathyfleet: Run) -> None:
 def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
     made = bathyfleet("token", "create", "Maria", "--role", "viewer", "--days", "30")
     assert re.fullmatch(r"bf_[\w-]{43}\n", made.stdout)
-    (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    assert "bathyfleet.db, so a new one was made" in made.stderr
+    assert "was made" not in bathyfleet("token", "create", "Rui").stderr
+    _, listed = json.loads(bathyfleet("token", "list", "--json").stdout)
     assert (listed["name"], listed["role"], listed["revoked_at"]) == ("Maria", "viewer", None)
     assert listed["expires_at"] > listed["created_at"]
     assert listed["id"] in bathyfleet("token", "list").stdout
     assert bathyfleet("token", "revoke", listed["id"][:8]).code == 0
-    (revoked,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    _, revoked = json.loads(bathyfleet("token", "list", "--json").stdout)
     assert revoked["revoked_at"]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.command import CommandError, Database, command_settings
+from app.commands.command import CommandError, Database, check_database, command_settings
 
 if TYPE_CHECKING:
     from app.storage.models import AuditRow
@@ -33,6 +33,7 @@ def audit(
     if form not in ("table", "csv", "json"):
         raise typer.BadParameter(f"{form!r} is not one of table, csv, json", param_hint="--format")
     settings = command_settings(database_url=database)
+    check_database(settings)
     from app.storage.database import Database as Store
     from app.storage.queries import audit as stored
     from app.storage.upkeep.prepare import prepare_database

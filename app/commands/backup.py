@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.command import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, check_database, command_settings, noted
 
 if TYPE_CHECKING:
     from app.storage.upkeep.backup import Contents
@@ -81,6 +81,7 @@ def prune(
 ) -> None:
     """Remove missions that ended long ago, with everything measured in them, and give the space back."""
     settings = command_settings(database_url=database)
+    check_database(settings)
     from app.storage.database import Database as Store
     from app.storage.ping_files import PingFiles
     from app.storage.upkeep.prepare import prepare_database
