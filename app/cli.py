@@ -16,7 +16,7 @@ from app import __version__
 from app.commands.alarms import alarms_app
 from app.commands.audit import audit
 from app.commands.backup import backup, prune, restore
-from app.commands.command import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, command_settings, missing_database, noted
 from app.commands.data import adjust, export, import_file, report, tide
 from app.commands.failsafes import failsafes
 from app.commands.home import home
@@ -165,6 +165,8 @@ def migrate(
             raise of_another_version(url, before, migrations.head())
         if down_to is None:
             await migrations.upgrade(url)
+        elif await migrations.is_in_use(url):
+            raise CommandError("a service has the database, and would lose its tables", "Stop the service first")
         else:
             await migrations.downgrade(url, down_to)
         return before, await migrations.current(url)
@@ -187,7 +189,9 @@ def create_token(
     name: Annotated[str, typer.Argument(help="Who will hold it, shown in logs.")],
     role: Annotated[TokenRole, typer.Option(help="What the holder may do.")] = TokenRole.OPERATOR,
     vehicle: Annotated[str | None, typer.Option(help="The one vehicle that a token of role vehicle is for.")] = None,
-    days: Annotated[float | None, typer.Option(min=0, help="Days it is valid; default: until revoked.")] = None,
+    days: Annotated[
+        float | None, typer.Option(min=0, max=36_500, help="Days it is valid; default: until revoked.")
+    ] = None,
     database: Database = None,
 ) -> None:
     """Make an access token. It is printed once and cannot be seen again; from now on every request needs one."""
@@ -197,8 +201,18 @@ def create_token(
         raise typer.BadParameter("the name has 1 to 120 characters", param_hint="NAME")
     from datetime import UTC, datetime, timedelta
 
-    from app.api.accounts.tokens import Role, TokenStore
+    from pydantic import TypeAdapter, ValidationError
 
+    from app.api.accounts.tokens import Role, TokenStore
+    from app.missions.spec.base import Name
+
+    try:
+        TypeAdapter(Name | None).validate_python(vehicle)
+    except ValidationError:
+        raise typer.BadParameter(
+            f"{vehicle!r} is no name of a vehicle: letters, digits, '.', '_' and '-', at most 64",
+            param_hint="--vehicle",
+        ) from None
     expires_at = None if days is None else datetime.now(UTC) + timedelta(days=days)
 
     async def run(store: TokenStore) -> tuple[str, str]:
@@ -244,7 +258,9 @@ def list_tokens(
 
     from imc_bridge.printable import printable
 
-    table = Table(Column("id", no_wrap=True), "name", "role", "vehicle", "made", "valid until", "revoked")
+    # A narrow terminal gets more lines; a time or a role that is cut off would say nothing.
+    others = [Column(name, overflow="fold") for name in ("name", "role", "vehicle", "made", "valid until", "revoked")]
+    table = Table(Column("id", no_wrap=True), *others)
     for row in rows:
         table.add_row(*(Text(printable(str(value))) if value is not None else "–" for value in row.values()))
     Console().print(table)
@@ -501,6 +517,7 @@ def evaluate(context: typer.Context) -> None:
 
 def _with_tokens(database: str | None, run: Any, changing: str = "", target: str = "") -> Any:
     settings = command_settings(database_url=database)
+    new = missing_database(settings)
     from app.api.accounts.tokens import TokenStore
     from app.storage.database import Database as Store
     from app.storage.upkeep.prepare import prepare_database
@@ -517,6 +534,8 @@ def _with_tokens(database: str | None, run: Any, changing: str = "", target: str
             await store.close()
         if changing:
             await noted(settings, changing, target)
+        if new is not None:
+            typer.echo(f"there was no database {new}, so a new one was made; --database names another", err=True)
         return done
 
     return asyncio.run(use())

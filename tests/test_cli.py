@@ -128,8 +128,12 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["report", "nowhere", "--out", "x.doc"], {}, 2, "x.doc ends in none of .pdf, .html"),
         (["report", "nowhere", "--lang", "xx"], {}, 2, "'xx' is not one of en, pt"),
         (["import-log", "nowhere", "Data.lsf"], {}, 1, "0 missions have ids that begin with 'nowhere'"),
+        (["audit"], {}, 1, "there is no database /"),
+        (["prune", "--days", "3"], {}, 1, "there is no database /"),
         (["token", "create", "x", "--role", "king"], {}, 2, "king"),
         (["token", "create", "x", "--role", "viewer", "--vehicle", "a"], {}, 2, "only a token of role vehicle"),
+        (["token", "create", "x", "--role", "vehicle", "--vehicle", "a b"], {}, 2, "is no name of a vehicle"),
+        (["token", "create", "x", "--days", "1e9"], {}, 2, "--days"),
         (["token", "revoke", "zzz"], {}, 2, "no valid token has an id that begins with 'zzz'"),
         (["migrate", "--down-to", "nonsense"], {}, 1, "Can't locate revision"),
         (["demo", "--terrain", "nowhere.npz"], {}, 2, "does not exist"),
@@ -172,13 +176,26 @@ def test_migrate_goes_up_and_down(bathyfleet: Run) -> None:
 def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
     made = bathyfleet("token", "create", "Maria", "--role", "viewer", "--days", "30")
     assert re.fullmatch(r"bf_[\w-]{43}\n", made.stdout)
-    (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    assert "bathyfleet.db, so a new one was made" in made.stderr
+    assert "was made" not in bathyfleet("token", "create", "Rui").stderr
+    _, listed = json.loads(bathyfleet("token", "list", "--json").stdout)
     assert (listed["name"], listed["role"], listed["revoked_at"]) == ("Maria", "viewer", None)
     assert listed["expires_at"] > listed["created_at"]
     assert listed["id"] in bathyfleet("token", "list").stdout
     assert bathyfleet("token", "revoke", listed["id"][:8]).code == 0
-    (revoked,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    _, revoked = json.loads(bathyfleet("token", "list", "--json").stdout)
     assert revoked["revoked_at"]
+
+
+def test_lists_are_whole_in_a_narrow_terminal(bathyfleet: Run) -> None:
+    bathyfleet("token", "create", "Maria", "--role", "operator", "--days", "30")
+    (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
+    (noted,) = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
+    tokens, audit = (bathyfleet(*words, COLUMNS="80").stdout for words in (["token", "list"], ["audit"]))
+    assert "…" not in tokens + audit
+    assert noted["time"][:19] + "Z" in audit
+    columns = zip(*(line.split("│")[1:-1] for line in tokens.splitlines() if line.startswith("│")), strict=True)
+    assert listed["expires_at"] in ["".join(part.strip() for part in column) for column in columns]
 
 
 def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathyfleet: Run, tmp_path: Path) -> None:
@@ -232,6 +249,19 @@ def test_a_newer_version_s_database_is_neither_changed_nor_put_in_place(bathyfle
     assert "the database is another version's" in made.stderr
 
 
+def test_a_backup_that_the_start_would_not_bring_up_to_date_is_restored_and_said_to_be(
+    bathyfleet: Run, tmp_path: Path
+) -> None:
+    bathyfleet("token", "create", "Maria")
+    assert bathyfleet("backup", "copy.db").code == 0
+    at_revision(tmp_path / "copy.db", "0018")
+    restored = bathyfleet("restore", "copy.db", "--replace", BATHYFLEET_AUTO_MIGRATE="false")  # as with PostgreSQL
+    assert restored.code == 0
+    assert "what was there before is now" in restored.stdout
+    assert "copy.db is restored" in restored.stdout
+    assert "run 'bathyfleet migrate'" in restored.stderr
+
+
 def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_path: Path) -> None:
     """A service of the older version may still be running on it."""
     bathyfleet("migrate")
@@ -250,6 +280,8 @@ def test_a_mission_is_served_exported_and_found_again(
         client.post(f"/missions/{mission['id']}/measurements", json={"items": soundings(12)})
         exported_beside = bathyfleet("export", mission["id"], "--format", "csv", "--out", "-")
         assert exported_beside.stdout.count("rover") == 12
+        back = bathyfleet("migrate", "--down-to", "0001")
+        assert (back.code, "Stop the service first" in back.stderr) == (1, True)
         tide = ("tide", mission["id"], "--level", "1")
         refused = bathyfleet(*tide)
         assert refused.code == 1

@@ -1,5 +1,6 @@
 """Bodies and parameters that only the HTTP edge knows; everything else is the missions' own models."""
 
+import re
 from contextvars import ContextVar
 from typing import Annotated, ClassVar
 
@@ -42,6 +43,13 @@ MissionId = Annotated[
         examples=["0197a3c8-6f2e-7c41-9d0f-5b2f6f0c1a2b"],
     ),
 ]
+
+
+def is_mission_id(text: str) -> bool:
+    """Tell whether a text may be a mission's id, where nobody else has looked; databases take no NUL in a text."""
+    return re.fullmatch(r"[A-Za-z0-9_-]{1,64}", text) is not None
+
+
 VehicleName = Annotated[Name, Path(description="The vehicle's name", examples=["lauv-xplore-1"])]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.command import CommandError, Database, command_settings
+from app.commands.command import CommandError, Database, check_database, command_settings
 
 if TYPE_CHECKING:
     from app.storage.models import AuditRow
@@ -33,6 +33,7 @@ def audit(
     if form not in ("table", "csv", "json"):
         raise typer.BadParameter(f"{form!r} is not one of table, csv, json", param_hint="--format")
     settings = command_settings(database_url=database)
+    check_database(settings)
     from app.storage.database import Database as Store
     from app.storage.queries import audit as stored
     from app.storage.upkeep.prepare import prepare_database
@@ -88,12 +89,14 @@ def _plain(row: "AuditRow") -> dict[str, Any]:
 
 def _show(entries: list[dict[str, Any]]) -> None:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
     from rich.text import Text
 
     from imc_bridge.printable import printable
 
-    table = Table("time", "who", "from", "what", "result", "why")
+    # A narrow terminal gets more lines: nothing of who did what is cut off, and no time.
+    others = [Column(name, overflow="fold") for name in ("who", "from", "what", "result", "why")]
+    table = Table(Column("time", no_wrap=True), *others)
     for entry in entries:
         who = f"{entry['actor'] or 'nobody known'} ({entry['role'] or '–'})"
         what = f"{entry['action']} {entry['target']}"

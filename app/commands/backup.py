@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.command import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, check_database, command_settings, noted
 
 if TYPE_CHECKING:
     from app.storage.upkeep.backup import Contents
@@ -57,6 +57,7 @@ def restore(
     """Put a backup in the database's place, after checking it. Stop the service first."""
     from app.storage.ping_files import PingFiles
     from app.storage.upkeep.backup import BackupError, restore_to
+    from app.storage.upkeep.prepare import is_up_to_date
 
     settings = command_settings(database_url=database)
     try:
@@ -64,10 +65,13 @@ def restore(
         contents, aside = restore_to(settings.database_url, file, replace=replace, pings=files)
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None
-    asyncio.run(noted(settings, "restore", str(file)))
     if aside is not None:
         typer.echo(f"what was there before is now {aside}")
     _tell(file, contents, "is restored")
+    if settings.migrates_itself or asyncio.run(is_up_to_date(settings.database_url)):
+        asyncio.run(noted(settings, "restore", str(file)))
+    else:
+        typer.echo("it is of an older version: before the service starts, run 'bathyfleet migrate'", err=True)
 
 
 def prune(
@@ -77,6 +81,7 @@ def prune(
 ) -> None:
     """Remove missions that ended long ago, with everything measured in them, and give the space back."""
     settings = command_settings(database_url=database)
+    check_database(settings)
     from app.storage.database import Database as Store
     from app.storage.ping_files import PingFiles
     from app.storage.upkeep.prepare import prepare_database

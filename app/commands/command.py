@@ -7,6 +7,8 @@ import typer
 M = TypeVar("M", bound="BaseModel")
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pydantic import BaseModel
 
     from app.settings import Settings
@@ -33,6 +35,21 @@ def command_settings(**overrides: Any) -> "Settings":
     settings = load_settings(**overrides)
     logs.configure("warning", settings.log_format)
     return settings
+
+
+def missing_database(settings: "Settings") -> "Path | None":
+    """Return the file of an SQLite database where there is none yet."""
+    from app.storage.upkeep.prepare import file_of
+
+    file = file_of(settings.database_url)
+    return file.resolve() if file is not None and not file.exists() else None
+
+
+def check_database(settings: "Settings") -> None:
+    """Raise CommandError where there is no database: who only looks into one would be shown a new, empty one."""
+    missing = missing_database(settings)
+    if missing is not None:
+        raise CommandError(f"there is no database {missing}", "Name it with --database")
 
 
 def this_user() -> str:

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 from collections.abc import Collection, Iterable
 from functools import cached_property
 from pathlib import Path
@@ -65,8 +66,9 @@ class PingFiles:
         return Path(root) if "file" in kinds else None
 
     def where(self, name: str) -> str:
-        """Return where a file is, for people."""
-        return f"{self.folder / name}" if self.folder else f"{self.url.rstrip('/')}/{name}"
+        """Return where a file is, for people: without a user's name and password in a URL."""
+        shown = re.sub(r"://[^/]*@", "://", self.url).rstrip("/")
+        return f"{self.folder / name}" if self.folder else f"{shown}/{name}"
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file; it has its name only when all of it is on the disk."""

@@ -15,6 +15,8 @@ import structlog
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
+from websockets import ConnectionClosed
+from websockets.asyncio.client import connect
 
 from app.api import logs
 from app.api.accounts.tokens import Role, TokenStore
@@ -29,6 +31,7 @@ from imc_bridge.doctor.diagnosis import Cause, Diagnosis, NodeDiagnosis, problem
 from imc_bridge.events import NodeState
 from imc_bridge.printable import printable
 from tests.support.api.rest import make_client, mission_spec, running, soundings
+from tests.support.storage.databases import Databases
 
 HOSTILE = "a\x1b[2J\x07\x9b31m\x7f\u202eb\u2028c\u2066[red]d[/red]"
 SHOWN = r"a\x1b[2J\x07\x9b31m\x7f\u202eb\u2028c\u2066[red]d[/red]"
@@ -153,3 +156,24 @@ async def test_files_of_a_mission_with_any_name_can_be_taken_away(client: httpx.
         assert "set-cookie" not in taken.headers
         if file.endswith((".gpx", ".kml")):
             ET.fromstring(taken.content)  # noqa: S314 - our own
+
+
+async def test_a_nul_in_an_address_reaches_no_database(
+    make_settings: Callable[..., Settings], databases: Databases
+) -> None:
+    async with (
+        running(make_settings(database_url=databases.fresh("postgresql"))) as server,
+        make_client(server) as client,
+    ):
+        for path, status in (
+            ("/ogc/missions/%00/collections", 404),
+            ("/wms/missions/%00?REQUEST=GetCapabilities", 404),
+            ("/api/v1/alarms?mission=%00", 422),
+        ):
+            assert (await client.get(server.url + path)).status_code == status, path
+        live = f"{server.url}/api/v1/missions/%00/live".replace("http", "ws", 1)
+        async with connect(live) as viewer:
+            with pytest.raises(ConnectionClosed) as closed:
+                await viewer.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 4404

@@ -36,6 +36,11 @@ def test_a_missing_and_a_damaged_file_are_named(files: PingFiles) -> None:
         files.read(NAME, DIGEST)
 
 
+def test_no_password_is_told_of_where_files_are() -> None:
+    with pytest.raises(PingFileError, match=rf"the file of pings memory://host/pings/{NAME} is missing"):
+        PingFiles("memory://watch:hun@ter2@host/pings").read(NAME, DIGEST)
+
+
 def test_what_nobody_knows_is_removed_from_this_mission_only(files: PingFiles) -> None:
     names = [NAME, "m1/orphan.parquet", "m1/half.parquet.part", "m2/other.parquet"]
     for name in names:

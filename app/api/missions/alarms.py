@@ -39,7 +39,9 @@ async def list_alarms(
     service: Service,
     reader: Reader,
     state: Annotated[AlarmState | None, Query(description="Only these; left out: all")] = None,
-    mission: Annotated[str | None, Query(max_length=64, description="Only those of the mission with this id")] = None,
+    mission: Annotated[
+        str | None, Query(max_length=64, pattern=r"^[^\x00]*$", description="Only those of the mission with this id")
+    ] = None,
     limit: Annotated[int, Query(ge=1, le=1000, description="Most alarms in the answer")] = 200,
 ) -> list[AlarmReport]:
     """Return alarms of all missions, newest first, each with who was told of it and what came of that."""

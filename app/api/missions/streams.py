@@ -16,9 +16,9 @@ from app.api.access.auth import Reader, authenticate, until_unwelcome
 from app.api.http.first_completed import first_of
 from app.api.http.problems import ProblemError, describe_mission_error, problems
 from app.api.mission import Mission
-from app.api.schemas import API
+from app.api.schemas import API, is_mission_id
 from app.api.state import EdgeState, State, edge_state
-from app.missions.errors import MissionError
+from app.missions.errors import MissionError, MissionNotFoundError
 from app.missions.live.watchers.broadcast import WatchEndedError
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import followed, watched
@@ -211,6 +211,8 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
 
 
 async def _serve(websocket: WebSocket, state: EdgeState, mission_id: str) -> None:
+    if not is_mission_id(mission_id):
+        raise MissionNotFoundError(f"there is no mission {mission_id[:64]!r}", "GET /api/v1/missions lists all")
     async with watched(await state.service.get(mission_id)) as messages:
         ended = await first_of(
             _send_all(websocket, messages),

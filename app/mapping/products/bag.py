@@ -1,7 +1,9 @@
 """Map as Bathymetric Attributed Grid (BAG 1.6), the exchange format of hydrographic offices."""
 
+import errno
 import io
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
@@ -9,6 +11,7 @@ import numpy as np
 import rasterio
 from numpy.typing import NDArray
 from rasterio.crs import CRS
+from rasterio.errors import RasterioError
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.geotiff import north_up_transform
@@ -17,6 +20,7 @@ from app.mapping.water.vertical import VerticalDatum
 
 NODATA = 1_000_000.0
 """What the format prescribes for cells without a value."""
+NOT_WHOLE = "it cannot be written whole; is the disk that TMPDIR points to full?"
 
 
 def bag(
@@ -26,41 +30,63 @@ def bag(
 
     The deviation includes ``common_sd_m``, that of what all soundings share. Cells without a sounding have their
     predicted depths: the metadata tell how many. The vertical datum stands there, too; the library would call it
-    unknown.
+    unknown. Raises OSError where the file cannot be written whole.
     """
-    grid = bathymetry.grid
     count = np.where(np.isfinite(bathymetry.depth_m), bathymetry.count, 0).astype("<u4")
     layers = [
         np.where(np.isfinite(layer), layer, NODATA).astype(np.float32)[::-1]
         for layer in (-bathymetry.depth_m, bathymetry.charted(common_sd_m).sd_m)
     ]
-    # HDF5 writes to real files only.
     with tempfile.TemporaryDirectory(prefix="bathyfleet-") as folder:
-        path = Path(folder) / "map.bag"
-        with rasterio.open(
-            path,
-            "w",
-            driver="BAG",
-            width=grid.cols,
-            height=grid.rows,
-            count=len(layers),
-            dtype="float32",
-            crs=CRS.from_wkt(frame.crs.to_wkt("WKT1_GDAL")),
-            transform=north_up_transform(bathymetry),
-            nodata=NODATA,
-            VAR_VERT_WKT=vertical_datum.crs.to_wkt("WKT1_GDAL"),
-            VAR_ABSTRACT=f"{title}. Elevations are minus the depth below {vertical_datum.statement}. "
-            f"Uncertainty is {CHARTED_SD}. {_predicted(bathymetry, count)} {bathymetry.model}",
-            VAR_INDIVIDUAL_NAME="bathyfleet",
-            VAR_PROCESS_STEP_DESCRIPTION=f"Made of soundings: {bathymetry.model}",
-        ) as file:
-            for number, layer in enumerate(layers, start=1):
-                file.write(layer, number)
+        path = Path(folder) / "map.bag"  # HDF5 writes to real files only
+        try:
+            _write(path, layers, bathymetry, frame, vertical_datum, title, _predicted(bathymetry, count))
+            whole = _holds(path, layers)
+        except (RasterioError, SystemError) as error:
+            raise OSError(errno.ENOSPC, NOT_WHOLE) from error
+        if not whole:
+            raise OSError(errno.ENOSPC, NOT_WHOLE)
         content = io.BytesIO(path.read_bytes())
     with h5py.File(content, "r+") as file:
         numbers = file["BAG_root"].create_dataset("num_soundings", data=count, chunks=True, compression="gzip")
         numbers.attrs["min_num_soundings"], numbers.attrs["max_num_soundings"] = count.min(), count.max()
     return content.getvalue()
+
+
+def _write(
+    path: Path,
+    layers: Sequence[NDArray[np.float32]],
+    bathymetry: BathymetricMap,
+    frame: LocalFrame,
+    vertical_datum: VerticalDatum,
+    title: str,
+    predicted: str,
+) -> None:
+    with rasterio.open(
+        path,
+        "w",
+        driver="BAG",
+        width=bathymetry.grid.cols,
+        height=bathymetry.grid.rows,
+        count=len(layers),
+        dtype="float32",
+        crs=CRS.from_wkt(frame.crs.to_wkt("WKT1_GDAL")),
+        transform=north_up_transform(bathymetry),
+        nodata=NODATA,
+        VAR_VERT_WKT=vertical_datum.crs.to_wkt("WKT1_GDAL"),
+        VAR_ABSTRACT=f"{title}. Elevations are minus the depth below {vertical_datum.statement}. "
+        f"Uncertainty is {CHARTED_SD}. {predicted} {bathymetry.model}",
+        VAR_INDIVIDUAL_NAME="bathyfleet",
+        VAR_PROCESS_STEP_DESCRIPTION=f"Made of soundings: {bathymetry.model}",
+    ) as file:
+        for number, layer in enumerate(layers, start=1):
+            file.write(layer, number)
+
+
+def _holds(path: Path, layers: Sequence[NDArray[np.float32]]) -> bool:
+    """Tell whether a file holds what was written: of a full disk the library says nothing when it closes it."""
+    with rasterio.open(path) as file:
+        return all(np.array_equal(file.read(number), layer) for number, layer in enumerate(layers, start=1))
 
 
 def _predicted(bathymetry: BathymetricMap, count: NDArray[np.uint32]) -> str:

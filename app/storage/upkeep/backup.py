@@ -83,7 +83,8 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
     finally:
-        part.unlink(missing_ok=True)
+        if part.exists():
+            part.unlink()
         if not target.exists() and copies.folder is not None:
             shutil.rmtree(copies.folder, ignore_errors=True)
     return target, contents
@@ -162,34 +163,45 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
     if parsed.get_backend_name() != "sqlite":
         if contents.revision:
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
+        if postgres_archive.is_in_use(parsed):
+            raise BackupError(f"the database {parsed.database} is in use", "Stop the service first")
         with _put_back(files, beside, beside.names(), before if replace else ""):
             postgres_archive.put_back(parsed, file, replace=replace)
         return contents, None
     if not contents.revision:
         raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
-    path = _path(parsed)
-    aside = None
-    if path.exists():
-        if not replace:
-            raise BackupError(f"{path} exists", "--replace moves it aside")
-        _close_for_good(path)
-        aside = path.with_name(f"{path.name}.{before}")
-        path.rename(aside)
-        private.mend([aside])
+    return contents, _put_file_back(_path(parsed), file, before if replace else "", files)
+
+
+def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Path | None:
+    """Put SQLite's file in its place; returns where what was there is now, under a name with ``before``.
+
+    The old one keeps its name until all of the new one is on the disk: whatever ends this, there is a database.
+    """
+    if path.exists() and not before:
+        raise BackupError(f"{path} exists", "--replace moves it aside")
     private.make_folder(path.parent)
-    part = path.with_name(path.name + ".part")
+    part, aside = path.with_name(path.name + ".part"), path.with_name(f"{path.name}.{before}")
+    there = path.exists()
     try:
-        with _put_back(files, beside, _ping_files(file), before if aside else ""):
-            with file.open("rb") as source, private.open_new(part, "wb") as copy:
-                shutil.copyfileobj(source, copy)
-            _to_disk(part)
+        if there:
+            _close_for_good(path)
+        with file.open("rb") as source, private.open_new(part, "wb") as copy:
+            shutil.copyfileobj(source, copy)
+        _to_disk(part)
+        with _put_back(files, files_beside(file), _ping_files(file), before if there else ""):
+            if there:
+                _close_for_good(path)  # once more: copying may have taken long
+                path.rename(aside)
             part.rename(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
-        if aside is not None:
-            aside.rename(path)
         raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
-    return contents, aside
+    finally:
+        part.unlink(missing_ok=True)
+        if there and not path.exists():
+            aside.rename(path)
+    private.mend([aside])
+    return aside if there else None
 
 
 @contextmanager

@@ -7,10 +7,12 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect
+from sqlalchemy import Connection, inspect, select
 from sqlalchemy.exc import IntegrityError
 
-from app.storage.database import make_engine
+from app.storage.database import Database, make_engine
+from app.storage.models import ProcessRow
+from app.storage.processes.membership import alive_beside
 
 # The migrations lie beside the package in a checkout as in an installation.
 MIGRATIONS = Path(__file__).resolve().parents[3] / "migrations"
@@ -54,6 +56,19 @@ async def current(url: str) -> str | None:
             return await connection.run_sync(lambda sync: MigrationContext.configure(sync).get_current_revision())
     finally:
         await engine.dispose()
+
+
+async def is_in_use(url: str) -> bool:
+    """Tell whether a process of the service has a database."""
+    if ProcessRow.__tablename__ not in await tables(url):
+        return False  # of a version that kept no list of them
+    database = Database(url)
+    try:
+        async with database.reading() as session:
+            numbers = (await session.scalars(select(ProcessRow.id))).all()
+            return bool(await alive_beside(session, url, numbers))
+    finally:
+        await database.close()
 
 
 async def upgrade(url: str, revision: str = "head") -> None:

@@ -13,6 +13,7 @@ from typing import IO, NamedTuple
 from sqlalchemy import URL
 
 from app.storage.models import Base, MissionOwnerRow, ProcessRow
+from app.storage.processes.membership import HELD
 
 VERSION_TABLE = "alembic_version"
 _LEFT_OUT = tuple(row.__tablename__ for row in (MissionOwnerRow, ProcessRow))
@@ -52,6 +53,11 @@ def revision(archive: Path) -> str:
     read = [_program("pg_restore"), "--data-only", f"--table={VERSION_TABLE}", "--file=-"]
     found = re.search(rf"^COPY \S*{VERSION_TABLE} .*\n(\S+)\n", _run([*read, str(archive)]), re.MULTILINE)
     return found[1] if found else ""
+
+
+def is_in_use(url: URL) -> bool:
+    """Tell whether a process of the service has the database open. Raises BackupError where it cannot be reached."""
+    return bool(_run([*_on_server("psql", url), "--no-psqlrc", "--tuples-only", f"--command={HELD}"], url).strip())
 
 
 def put_back(url: URL, archive: Path, *, replace: bool) -> None:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import resource
 import xml.etree.ElementTree as ET
 from datetime import UTC, datetime
 from pathlib import Path
@@ -130,6 +131,17 @@ def test_bag_states_its_datum_and_holds_elevations(bathymetry: BathymetricMap, t
     assert "Lowest Astronomical Tide" in text
     assert TITLE in text
     assert "gauge & <clock>" in text
+
+
+@pytest.mark.parametrize("room_bytes", [0, 8192])
+def test_a_bag_for_which_the_disk_has_no_room_is_not_made(bathymetry: BathymetricMap, room_bytes: int) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room_bytes, before[1]))
+    try:
+        with pytest.raises(OSError, match="TMPDIR"):
+            bag(bathymetry, FRAME, vertical_datum=LAT, title=TITLE, common_sd_m=0.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_contours_in_kml_lie_at_their_depth(bathymetry: BathymetricMap) -> None:

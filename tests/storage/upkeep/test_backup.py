@@ -18,6 +18,7 @@ from sqlalchemy.exc import DBAPIError
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
+from app.storage.processes.membership import make_membership
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
 from tests.support.storage.databases import Databases, query
@@ -123,6 +124,24 @@ async def test_restoring_over_a_database_moves_it_aside_and_never_one_that_is_in
     assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
 
 
+class InterruptedFiles(PingFiles):
+    """The user presses Ctrl-C while files of pings are copied."""
+
+    def write(self, name: str, content: bytes) -> None:
+        raise KeyboardInterrupt
+
+
+async def test_a_restore_that_is_broken_off_leaves_the_database_in_its_place(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    await sqlite.close()
+    before = await counts(sqlite.url)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    with pytest.raises(KeyboardInterrupt):
+        restore_to(sqlite.url, copy, replace=True, pings=InterruptedFiles(str(tmp_path / "pings")))
+    assert await counts(sqlite.url) == before
+    assert not beside(tmp_path, f"{path_of(sqlite.url).name}.")
+
+
 @pytest.mark.parametrize("page", [0, 1, 2, 3])
 async def test_damage_is_noticed_and_nothing_is_restored_from_it(sqlite: Database, tmp_path: Path, page: int) -> None:
     await fill(sqlite)
@@ -202,6 +221,9 @@ async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Pa
             contents_of(tmp_path / name)
     with pytest.raises(BackupError, match="exists"):
         back_up(sqlite.url, tmp_path / "other.db")
+    (tmp_path / "notes").touch()
+    with pytest.raises(BackupError, match="cannot be written"):
+        back_up(sqlite.url, tmp_path / "notes")
     with pytest.raises(BackupError, match="there is no database"):
         back_up(f"sqlite+aiosqlite:///{tmp_path / 'absent.db'}", tmp_path / "x.db")
 
@@ -242,6 +264,21 @@ async def test_postgresql_is_copied_by_its_own_programs(
     with pytest.raises(BackupError, match="pg_dump is not installed") as refused:
         back_up(url, tmp_path / "again.dump")
     assert "docker compose exec database pg_dump" in refused.value.remedy
+
+
+async def test_a_database_of_postgresql_is_not_replaced_while_a_process_has_it(
+    databases: Databases, tmp_path: Path
+) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "files"))
+    copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    member = make_membership(url, lambda: None)
+    await member.enter(1)
+    with pytest.raises(BackupError, match="is in use"):
+        await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
+    await member.leave()
+    await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
 
 
 async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(

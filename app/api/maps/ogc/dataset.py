@@ -7,6 +7,7 @@ from starlette.requests import Request
 
 from app.api.http.links import link_root
 from app.api.maps.ogc.crs import common_zone, offered
+from app.api.schemas import is_mission_id
 from app.api.state import EdgeState
 from app.missions.errors import MissionNotFoundError
 from app.storage.models import MissionRow
@@ -42,7 +43,7 @@ async def dataset_of(request: Request, edge: EdgeState, prefix: str) -> Dataset:
     root = f"{link_root(request)}{prefix}"
     if mission_id is None:
         return Dataset(await edge.service.rows(), root, "Missions")
-    rows = await edge.service.rows(mission_id)
+    rows = await edge.service.rows(mission_id) if is_mission_id(mission_id) else []
     if not rows:
         raise MissionNotFoundError(f"there is no mission {mission_id[:64]!r}", "GET /api/v1/missions lists all")
     return Dataset(rows, f"{root}/missions/{rows[0].id}", rows[0].name, single=True)

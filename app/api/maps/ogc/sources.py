@@ -42,6 +42,8 @@ METRES_PER_DEGREE = 111_000.0
 FEW = 4
 """Of so many missions all features are counted."""
 
+LARGEST_ID = 2**63 - 1
+
 log = structlog.get_logger(__name__)
 
 
@@ -91,7 +93,7 @@ async def _soundings(edge: EdgeState, rows: Sequence[MissionRow], asked: list[Mi
     ids = None if len(asked) == len(rows) and len(rows) > 1 else [row.id for row in asked]
     if ids is not None and not ids:
         return Page([], matched=0)
-    after = int(query.after) if query.after.isascii() and query.after.isdigit() else 0
+    after = min(int(query.after), LARGEST_ID) if query.after.isascii() and query.after.isdigit() else 0
     found = await soundings_after(edge.service.database, ids, query.wanted, after, query.limit + 1)
     if len(found) <= query.limit:
         return Page(found, matched=None if query.after else len(found))

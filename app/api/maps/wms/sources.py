@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlencode
@@ -9,7 +10,7 @@ from urllib.parse import urlencode
 import httpx
 import orjson
 import structlog
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 from starlette.requests import Request
 
 from app.api.accounts.processes import comes_from_peer
@@ -52,8 +53,12 @@ class Found:
 
 
 def usual_range(layer: WebLayer, rows: Sequence[MissionRow]) -> Range:
-    """Return the range of a layer's colours that holds those of all missions."""
-    ranges = [layer.default_range(_Stored.model_validate(row.spec)) for row in rows] or [(0.0, 1.0)]
+    """Return the range of a layer's colours that holds those of all missions that can be read."""
+    ranges: list[Range] = []
+    for row in rows:
+        with suppress(ValidationError):
+            ranges.append(layer.default_range(_Stored.model_validate(row.spec)))
+    ranges = ranges or [(0.0, 1.0)]
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 

@@ -1,6 +1,7 @@
 """A mission's map as it is asked for: the newest, the one of a step, what changed in it, and the files made of it."""
 
 import asyncio
+import errno
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -117,7 +118,7 @@ async def export(
         For an unknown kind or options that cannot be; where the map is needed and there is none yet; where the
         mission would have to be a search.
     ProductUnavailableError
-        When the process that makes files of large maps was ended.
+        When the process that makes files of large maps was ended, or the disk has no room.
     """
     kind, chosen = product_kind(name), options or ProductOptions()
     needs = kind.needs
@@ -135,9 +136,16 @@ async def export(
         surveyed=await surveyed(live) if SURVEY in needs else Surveyed(),
         crossovers=(await check_of(live, snapshot)).check if snapshot and CROSSOVERS in needs else None,
     )
-    if snapshot is not None and snapshot.large:
-        return await compute.make(make_product, name, material, chosen)
-    return await live.in_thread(make_product, name, material, chosen)
+    try:
+        if snapshot is not None and snapshot.large:
+            return await compute.make(make_product, name, material, chosen)
+        return await live.in_thread(make_product, name, material, chosen)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise ProductUnavailableError(
+            f"the file cannot be made: {error.strerror}", "make room on the service's disk"
+        ) from None
 
 
 async def _sounding_file(

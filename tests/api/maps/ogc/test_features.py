@@ -333,3 +333,7 @@ def test_paging_goes_on_where_it_was_while_soundings_come(gis: Gis) -> None:
     ids = [one["id"] for one in page["features"] + following["features"]]
     assert ids == sorted(set(ids))
     assert len(ids) == SOUNDINGS + 1
+
+
+def test_after_a_number_that_no_sounding_has_there_are_none(gis: Gis) -> None:
+    assert gis.items("soundings", after="9" * 30)["features"] == []

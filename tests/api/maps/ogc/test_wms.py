@@ -20,6 +20,7 @@ from tests.api.maps.ogc.conftest import Gis, depth_m
 from tests.support.api.rest import make_client, mission_spec, running, soundings
 from tests.support.mapping.gis import Pixels, picture_of, tile_of
 from tests.support.missions.specs import FRAME
+from tests.support.storage.databases import query as rows_of
 
 LAYERS = ("depth", "uncertainty", "density", "coverage")
 ZOOM, WORLD_M = 19, 2 * np.pi * 6_378_137.0
@@ -394,3 +395,18 @@ async def test_another_process_shows_the_same_map(two: tuple[Server, Server]) ->
             ]
             assert "Depth: " in texts[0]
             assert texts[0] == texts[1]
+
+
+async def test_a_mission_that_cannot_be_read_is_left_out_of_the_map_of_all(server: Server, database_url: str) -> None:
+    async with make_client(server) as client:
+        ids = [(await client.post("/missions", json=mission_spec())).json()["id"] for _ in range(2)]
+        # As if its description had been allowed by an earlier version.
+        renamed = """update missions set spec = replace(spec, '"max_depth_m"', '"deepest"') where id = :id"""
+        await asyncio.to_thread(rows_of, database_url, renamed, id=ids[0])
+        wms = server.url + "/wms"
+        everything = await client.get(wms, params=query())
+        assert (everything.status_code, everything.headers["content-type"]) == (200, "image/png")
+        legend = {"REQUEST": "GetLegendGraphic", "LAYER": "depth", "FORMAT": "image/png"}
+        assert (await client.get(wms, params=legend)).content == (
+            await client.get(f"{wms}/missions/{ids[1]}", params=legend)
+        ).content
