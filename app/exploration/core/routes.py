@@ -24,7 +24,7 @@ SAME_CORNER = 0.03
 SAME_M = 1e-3
 """Places no farther apart are the same."""
 CLEAR_M = 1.0
-"""Who is too near to a zone goes so far away from where that begins."""
+"""Who is too near to a zone, or to a corner, goes so far beyond where that begins."""
 SWING = 3.94
 """Radii per radian by which two turns to the same side, taken as one, exceed a right angle: right for a reversal."""
 SHARP_RAD = 0.5
@@ -303,19 +303,21 @@ class FreeSpace:
     def corner(self, start: FloatArray, goal: FloatArray, still_m: float) -> FloatArray:
         """Return the first corner of a shortest way, (2,), that is farther than ``still_m`` from where the way begins.
 
-        Where that is inside a zone, by no more than that, a place ``CLEAR_M`` outside, straight away from the zone:
-        a leg to the next corner would lead along its border, inside. The goal, where no corner is farther away.
+        Where that one is not seen from where the way begins, inside a zone or a little before a corner, a place
+        ``CLEAR_M`` beyond what is nearer: a leg to the next corner would lead along a border, on the wrong side of it.
+        The goal, where no corner is farther away.
         """
         way = self.way(start, goal)
         away_m = np.hypot(*(way - start).T)
         far = away_m > still_m
         if far[0] or not far.any():
             return np.asarray(way[0] if far[0] else way[-1])
-        if away_m[0] > 0.0 and not self.holds(start):
+        onward = way[int(np.argmax(far))]
+        if away_m[0] > 0.0 and not self._sees(start, onward[None])[0]:
             clear = start + (1.0 + CLEAR_M / away_m[0]) * (way[0] - start)
             if self.holds(clear):
                 return np.asarray(clear)
-        return np.asarray(way[int(np.argmax(far))])
+        return np.asarray(onward)
 
     def _round(self, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return such a way where no straight leg leads to the goal."""

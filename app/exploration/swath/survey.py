@@ -359,7 +359,7 @@ class SwathSurvey:
         while choice:
             line, path, away_m = nearest_entry(left, choice, pose, flying.radius_m)
             path = self._led(simple(path, 0.1 * left.cell_m), flying, coverage)
-            if len(path) > 1 and not better_by_another(self._sweeps, asked, path, away_m):
+            if len(path) > 1 and not self._leaves(asked, path, away_m):
                 sweep.course = FlownLine(self._direction_rad, 1, path, overlap)
                 return True
             choice = [other for other in choice if other is not line]

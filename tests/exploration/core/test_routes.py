@@ -65,6 +65,26 @@ def test_who_is_a_little_too_near_to_a_zone_goes_straight_away_from_it(inside_m:
     np.testing.assert_allclose(corner, [49.0, 46.0], atol=1e-6)
 
 
+@pytest.mark.parametrize("before_m", [0.001, 0.04])
+@pytest.mark.parametrize(
+    ("start", "to", "goal"),
+    [
+        ((50.0, 45.0), (0.0, -1.0), (35.0, 46.0)),
+        ((60.0, 60.0), (0.0, 1.0), (41.0, 60.0)),
+    ],
+)
+def test_who_is_a_little_before_a_corner_gets_round_it(
+    start: tuple[float, float], to: tuple[float, float], goal: tuple[float, float], before_m: float
+) -> None:
+    limits = Constraints(area=AREA, keep_out=ZONES, max_step_m=100.0)
+    here = np.array(start) + before_m * np.array(to)
+    for _ in range(3):
+        corner = SPACE.corner(here, np.array(goal), 0.05)
+        assert limits.feasible(np.array([[*here, 0.0]]), np.array([[[*corner, 0.0]]])).all()
+        here = corner
+    np.testing.assert_allclose(here, goal)
+
+
 def test_legs_are_the_ways_from_stop_to_stop() -> None:
     stops = np.array([[5.0, 30.0], [55.0, 30.0], [90.0, 30.0], [5.0, 5.0]])
     legs = SPACE.legs(stops)

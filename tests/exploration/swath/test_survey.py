@@ -333,6 +333,21 @@ def test_lines_are_left_to_nobody_when_all_were_told_that_there_is_nothing() -> 
     assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is not None
 
 
+def test_a_bent_strip_is_left_to_nobody_when_all_were_told_that_there_is_nothing() -> None:
+    # One whose sonar sees less would sweep it, and others leave it to that one.
+    sea = Sea(np.full((100, 300), 8.0))
+    sea.seen[:] = True
+    survey = SwathSurvey(0.0, 1.0, 8.0)
+    far, near = np.array([5.0, 50.0, np.nan]), np.array([260.0, 50.0, np.nan])
+    team = {"far": far, "near": near}
+    for name, pose in team.items():
+        assert survey.next_leg(name, pose, FLYING, sea.coverage(), team, 20.0) is None
+    for k in range(40):
+        sea.seen[20 + k, 230 + k : 233 + k] = False
+        sea.seen[20 + k, 297 - k : 300 - k] = False
+    assert survey.next_leg("far", far, FLYING, sea.coverage(), team, 20.0) is not None
+
+
 def test_a_hole_beside_the_way_to_the_next_line_is_passed_at_once() -> None:
     sea = Sea(np.full((200, 300), 8.0))
     sea.seen[:60] = True
