@@ -26,6 +26,12 @@ class Timeline(NamedTuple):
         """Return the places (k, 3) at times (k,)."""
         return np.column_stack([np.interp(time_s, self.time_s, column) for column in self.place_m.T])
 
+    def since(self, begin_s: float) -> "Timeline":
+        """Return the part of the motion from a time on."""
+        later = self.time_s > begin_s
+        start = self.at(np.array([begin_s]))
+        return Timeline(np.append(begin_s, self.time_s[later]), np.vstack([start, self.place_m[later]]))
+
 
 SLOWEST_SHARE = 0.1
 """Part of its speed that a vehicle makes good at the least against a current, so that its way ends."""

@@ -126,7 +126,7 @@ def ways_aside(
 
 def _approach(leg: Timeline, begins_s: float, other: Timeline, limits: Limits) -> Approach | None:
     """Return how close a vehicle's last leg comes to another motion, if that is too close."""
-    nearest = closest_approach(_from(leg, begins_s), other, limits.min_vertical_separation_m)
+    nearest = closest_approach(leg.since(begins_s), other, limits.min_vertical_separation_m)
     if nearest.distance_m >= limits.min_separation_m:
         return None
     # Whoever is too close already may go farther away.
@@ -188,10 +188,3 @@ def _continued(
     takes_s = float(np.linalg.norm(way)) / speed_over_ground_mps(way, speed_mps, current_mps)
     arrives_s = motion.time_s[-1] + max(takes_s, 1e-3)
     return Timeline(np.append(motion.time_s, arrives_s), np.vstack([motion.place_m, target_m]))
-
-
-def _from(motion: Timeline, begin_s: float) -> Timeline:
-    """Return the part of a motion from a time on."""
-    later = motion.time_s > begin_s
-    start = motion.at(np.array([begin_s]))
-    return Timeline(np.append(begin_s, motion.time_s[later]), np.vstack([start, motion.place_m[later]]))

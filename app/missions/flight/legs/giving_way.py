@@ -8,9 +8,9 @@ counts is where they are, and where they will be in a moment.
 import asyncio
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import shapely
@@ -60,7 +60,9 @@ class _Imminent:
     least_m: float
     most_m: float
     around_m: float = 0.0
-    """How far from there it may be: it circles where it waits."""
+    """How far from there it may be where it waits: it circles there."""
+    waits_from_s: float = 0.0
+    """From when on it does."""
 
     @property
     def here_m(self) -> FloatArray:
@@ -118,7 +120,20 @@ class GivingWay:
         if member.waits_m is None:
             return self._going_on(member)
         depth_m = depth_now_m(member)
-        return _Imminent(member, self._motion_to(member, member.waits_m), depth_m, depth_m, self._circle_m(member))
+        return self._waiting(member, member.waits_m, depth_m, depth_m)
+
+    def _waiting(self, member: Member, place_m: FloatArray, least_m: float, most_m: float) -> _Imminent:
+        """Return where a vehicle will be that goes to a place (2,) and circles there."""
+        here = np.append(member.place_m(self._live.frame), depth_now_m(member))
+        if math.dist(place_m, here[:2]) < CLOSING_M:
+            motion = Timeline(np.zeros(1), here[None])
+        else:
+            motion = steered_ahead(self._live, member, [here, np.append(place_m, here[2])], WAITING_S)
+        around_m = self._circle_m(member)
+        away_m = np.hypot(*(motion.place_m[:, :2] - place_m).T)
+        there = np.flatnonzero(away_m <= around_m)
+        waits_from_s = float(motion.time_s[there[0] if len(there) else -1])
+        return _Imminent(member, motion, least_m, most_m, around_m, waits_from_s)
 
     def _going_on(self, member: Member) -> _Imminent:
         """Return where a vehicle will be on its way."""
@@ -128,6 +143,8 @@ class GivingWay:
         begins_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0)[:, :2].T))])[:-1]
         reach_m = (HORIZON_S + age_s) * self._live.spec.speed_of(member.spec)
         depths_m = [float(place[2]) for place in places[: 1 + int((begins_m < reach_m).sum())]]
+        if member.order is not None and not member.ordered:
+            depths_m.append(member.order.position.depth_m)  # it comes up where it is home
         around_m = self._circle_m(member) if len(places) == 1 else 0.0
         return _Imminent(member, motion, min(depths_m), max(depths_m), around_m)
 
@@ -170,8 +187,10 @@ class GivingWay:
 
     def _meeting(self, near: list[_Imminent]) -> Iterator[tuple[_Imminent, _Imminent]]:
         """Yield pairs that are about to pass too close to each other."""
-        least_m = self._live.spec.limits.min_separation_m
         for one, other in combinations(near, 2):
+            # Ways home are not planned apart, and what is known of the current is not exact.
+            homeward = one.member.withdrawal is not None and other.member.withdrawal is not None
+            least_m = (CLEAR if homeward else 1.0) * self._live.spec.limits.min_separation_m
             if not self._decided_together(one.member, other.member) and self._too_close(one, other, least_m):
                 yield one, other
 
@@ -182,7 +201,7 @@ class GivingWay:
     def _too_close(self, one: _Imminent, other: _Imminent, least_m: float) -> bool:
         """Whether two will be closer than that in a moment, and closer than they are now."""
         nearest_m = self._nearest_m(one, other)
-        now_m = math.dist(one.here_m, other.here_m) - one.around_m - other.around_m
+        now_m = math.dist(one.here_m, other.here_m) - _around_m(0.0, one, other)
         return nearest_m < min(least_m, now_m - CLOSING_M)
 
     def _nearest_m(self, one: _Imminent, other: _Imminent, until_s: float = HORIZON_S) -> float:
@@ -190,8 +209,13 @@ class GivingWay:
         apart_m = max(one.least_m - other.most_m, other.least_m - one.most_m)
         if apart_m >= VERTICAL_SHARE * self._live.spec.limits.min_vertical_separation_m:
             return math.inf
-        nearest_m = closest_approach(one.motion, other.motion, until_s=until_s).distance_m
-        return nearest_m - one.around_m - other.around_m
+        begins_s = sorted({0.0, *(min(it.waits_from_s, until_s) for it in (one, other))})
+        nearest_m = math.inf
+        for begin_s, end_s in pairwise([*begins_s, until_s]):
+            a, b = (it.motion if begin_s == 0.0 else it.motion.since(begin_s) for it in (one, other))
+            apart_m = closest_approach(a, b, until_s=end_s).distance_m
+            nearest_m = min(nearest_m, apart_m - _around_m(begin_s, one, other))
+        return nearest_m
 
     async def _keep_apart(self, one: _Imminent, other: _Imminent, near: dict[str, _Imminent]) -> None:
         """Have one of two give way: who only waits, else rather who surveys than who goes home, the last by name."""
@@ -201,27 +225,34 @@ class GivingWay:
             key=lambda it: (stands(it.member), it.member.withdrawal is None, it.member.name),
             reverse=True,
         )
-        best_m, best = self._nearest_m(one, other) + CLOSING_M, None
+        best, best_of_it = (-math.inf,) * 3, None
         enough_m = CLEAR * self._live.spec.limits.min_separation_m
         for it in pair:
             if not (self._asides.may_lead(it.member, Because.VEHICLE) or stands(it.member)):
                 continue
             others = [that for name, that in near.items() if name != it.member.name]
+            going_on_m = min(self._nearest_m(it, that) for that in others)
             for place_m in filter(partial(self._asides.is_clear, it.member), self._places(it.member)):
-                motion, around_m = self._motion_to(it.member, place_m), self._circle_m(it.member)
+                waiting = self._waiting(it.member, place_m, it.least_m, it.most_m)
                 # It circles where it waits.
-                if self._zones.entered_by(motion.place_m[:, :2]) or self._zones.near(place_m, around_m):
+                if self._zones.entered_by(waiting.motion.place_m[:, :2]) or self._zones.near(place_m, waiting.around_m):
                     continue
-                waiting = _Imminent(it.member, motion, it.least_m, it.most_m, around_m)
-                nearest_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
-                if nearest_m > best_m:
-                    best_m, best = nearest_m, (it.member, place_m)
-                if best_m >= enough_m:
+                soon_m = min(self._nearest_m(waiting, that) for that in others)
+                if soon_m <= going_on_m + CLOSING_M or min(soon_m, enough_m) < best[0]:
+                    continue
+                # Who passes later gives way, or is given way to, then. Best is where its circles are clear from now on.
+                later_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
+                circling = replace(waiting, waits_from_s=0.0)
+                always_m = min(self._nearest_m(circling, that, WAITING_S) for that in others)
+                found = (min(soon_m, enough_m), min(later_m, enough_m), min(always_m, enough_m))
+                if found > best:
+                    best, best_of_it = found, (it.member, place_m)
+                if best[2] >= enough_m:
                     break
-            if best_m >= enough_m:
+            if best[2] >= enough_m:
                 break
-        if best is not None:
-            member, place_m = best
+        if best_of_it is not None:
+            member, place_m = best_of_it
             await self._give_way(member, place_m, other.member if member is one.member else one.member)
 
     def _places(self, member: Member) -> list[FloatArray]:
@@ -247,13 +278,6 @@ class GivingWay:
         area, place = shapely.Polygon(self._constraints.area), shapely.Point(place_m)
         inside = area.contains(place) and area.exterior.distance(place) >= CIRCLE_M
         return inside and not self._zones.near(place_m, CIRCLE_M)
-
-    def _motion_to(self, member: Member, place_m: FloatArray) -> Timeline:
-        """Return a vehicle's motion to a place where it waits."""
-        here = np.append(member.place_m(self._live.frame), depth_now_m(member))
-        if math.dist(place_m, here[:2]) < CLOSING_M:
-            return Timeline(np.zeros(1), here[None])
-        return steered_ahead(self._live, member, [here, np.append(place_m, here[2])], WAITING_S)
 
     async def _give_way(self, member: Member, place_m: FloatArray, other: Member) -> None:
         stands = self._asides.may_stand_elsewhere(member)
@@ -281,6 +305,11 @@ class GivingWay:
             if clear or waited_s * self._time_scale >= PATIENCE_S:
                 near[name] = on
                 await self._asides.lead_on(member)
+
+
+def _around_m(time_s: float, *vehicles: _Imminent) -> float:
+    """Return how far vehicles together may be from where their motions have them at a time."""
+    return sum(it.around_m for it in vehicles if it.waits_from_s <= time_s)
 
 
 def _is_out(member: Member) -> bool:

@@ -186,6 +186,32 @@ async def test_who_surveys_gives_way_to_who_goes_home(scene: PlacedVehicles) -> 
     assert {order.vehicle for order in scene.ordered} == {"a"}
 
 
+async def test_of_two_side_by_side_whose_ways_close_in_one_goes_aside_in_time(scene: PlacedVehicles) -> None:
+    """Seen with 20 vehicles on their way home: nowhere was room for circles that were taken to begin at once."""
+    ways = {"a": ((20.0, 30.0, 3.0), (55.0, 30.0, 3.0)), "b": ((20.0, 36.5, 3.0), (55.0, 28.0, 3.0))}
+    for name, (at, to) in ways.items():
+        scene.put(name, at, to)
+    await scene.giving_way.look()
+    [order] = scene.ordered
+    [flies_on] = ways.keys() - {order.vehicle}
+    aside_m = scene.steers_m(order.vehicle, np.array(scene.where_m(order)))
+    on_m = scene.steers_m(flies_on, np.array(ways[flies_on][1][:2]))
+    seconds = min(len(aside_m), len(on_m))
+    assert np.hypot(*(aside_m[:seconds] - on_m[:seconds]).T).min() > scene.live.spec.limits.min_separation_m
+
+
+@pytest.mark.parametrize(("to_depth_m", "meets"), [(0.0, True), (3.0, False)], ids=["comes up", "stays down"])
+async def test_who_passes_above_a_vehicle_that_comes_up_at_home_keeps_off(
+    scene: PlacedVehicles, to_depth_m: float, meets: bool
+) -> None:
+    scene.put("a", (5.0, 30.0, 1.0), (50.0, 30.0, 1.0))
+    home = scene.put("b", (20.0, 30.0, 3.0), (20.0, 30.0, to_depth_m))
+    home.status = WaypointStatus.REACHED
+    home.withdrawal = Withdrawal(Response.RETURN, "its energy", led=True)
+    await scene.giving_way.look()
+    assert [order.vehicle for order in scene.ordered] == ["a"] * meets
+
+
 @pytest.mark.parametrize("clock_ahead_s", [0.0, 3600.0, -3600.0])
 async def test_a_vehicle_out_of_reach_is_taken_to_fly_its_leg(scene: PlacedVehicles, clock_ahead_s: float) -> None:
     scene.put("a", (30.0, 1.0, 3.0), (30.0, 55.0, 3.0), heard_s=120.0)
