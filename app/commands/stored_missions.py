@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from app.commands.command import CommandError, noted
+from app.commands.command import CommandError, check_database, noted
 
 T = TypeVar("T")
 
@@ -24,7 +24,9 @@ def with_missions(
     """Run something with the missions of a database; nothing is started, the links stay closed.
 
     A command that is ``changing`` a mission is named by that for the audit log, which it goes into with its result.
+    Raises CommandError where there is no database.
     """
+    check_database(settings)
     from app.missions.errors import MissionError
     from app.missions.service import MissionService
     from app.storage.database import Database as Store

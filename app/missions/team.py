@@ -93,6 +93,8 @@ class Withdrawal:
         Whether it waits below for ships to pass: it would come up where it is.
     done
         Whether it has flown its part, or its mission was flown to its end.
+    told
+        Whether the mission's log says so, that of an earlier run of the service too.
     """
 
     response: Response
@@ -102,6 +104,7 @@ class Withdrawal:
     asked: bool = False
     below: bool = False
     done: bool = False
+    told: bool = False
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored, so that a restart goes on with it."""
@@ -115,7 +118,7 @@ class Withdrawal:
             return None
         why, asked = stored["why"], stored.get("asked", False)
         done = stored.get("done", why in PART_DONE)
-        return cls(Response(stored["response"]), why, stored["over"], asked=asked, done=done)
+        return cls(Response(stored["response"]), why, stored["over"], asked=asked, done=done, told=True)
 
 
 @dataclass

@@ -445,10 +445,19 @@ async def test_a_service_that_restarts_goes_on_bringing_everybody_home(harbour: 
     await act(service, mission.id, "start")
     await until_step(service, mission.id, 2)
     await service.act(await service.get(mission.id), Action.ABORT, actor="Ana", return_home=True)
+
+    async def told() -> list[str]:
+        return [words for words in await words_of(service, mission, "recovery") if " goes home: " in words]
+
+    async def both_told() -> bool:
+        return len(await told()) == 2
+
+    await until(both_told, "both go home")
     service = await harbour.reopen()
     ended = await until_ended(service, mission.id)
     assert ended.state is MissionState.ABORTED
     assert ended.progress.step < 20, "nobody went on surveying"
+    assert len(await told()) == 2, "each is told of once"
     assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
 
 

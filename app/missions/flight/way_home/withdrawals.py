@@ -213,10 +213,13 @@ class Withdrawals:
             Response.SURFACE: "comes up where it is",
             Response.STOP: "is stopped",
         }
+        self._held.discard(member.name)
+        if withdrawal.told:
+            return
+        withdrawal.told = True
         words = f"{member.name} {does[withdrawal.response]}: {withdrawal.why}"
         facts = {"response": withdrawal.response, "energy_left_pct": energy_left_pct(member)}
         await self._live.journal.log(Level.INFO, "recovery", words, vehicle=member.name, **facts)
-        self._held.discard(member.name)
 
     async def _hold(self, member: Member) -> None:
         """Have a vehicle wait near where it is: once, and again when it was away since, or was stopped."""
