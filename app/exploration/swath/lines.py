@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import find_objects, label, uniform_filter1d
+from scipy.ndimage import find_objects, label
 
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.swath.raster import Flying, LineRaster
@@ -98,7 +98,7 @@ def lines(
         wish[columns[part] - whole[0]] = sign * np.where(sees_all[part], lies_m, target_m[part])
         width = np.interp(whole, columns[part], width_m[part])
         radius_m = bend_radius_m(width, flying)
-        wish = _worth(wish, width, raster.cell_m, flying, radius_m)
+        wish = _worth(wish, width, raster.cell_m, flying.radius_m, radius_m)
         line = Line(whole, sign * gentle(wish, raster.cell_m, radius_m))
         found.append(_in_sight(line, raster, open_cells, flying))
     return found
@@ -134,14 +134,23 @@ def _even_overlap(raster: LineRaster, open_cells: BoolArray, columns: IntArray, 
     return np.asarray(np.clip(2.0 - 2.0 * spacing * even, flying.overlap, max(flying.overlap, MOST_OVERLAP)))
 
 
+@njit(cache=True, nogil=True)
 def gentle(wish: FloatArray, cell_m: float, radius_m: float) -> FloatArray:
     """Return a line (n,) not above the wishes (n,), one a cell, that turns no farther than ``STEEPEST`` and smoothly.
 
     It is the largest one whose valleys have the radius; its tops are rounded by a mean over half of that.
     """
-    level = _valleys(np.ascontiguousarray(wish, dtype=np.float64), cell_m, radius_m)
-    width = 2 * int(0.25 * radius_m / cell_m) + 1
-    return np.asarray(uniform_filter1d(level, min(width, 2 * ((len(level) - 1) // 2) + 1), mode="nearest"))
+    level = _valleys(wish, cell_m, radius_m)
+    n = len(level)
+    half = min(int(0.25 * radius_m / cell_m), (n - 1) // 2)
+    rounded = np.empty(n)
+    total = level[0] * half
+    for k in range(half + 1):
+        total += level[k]
+    for k in range(n):
+        rounded[k] = total / (2 * half + 1)
+        total += level[min(k + half + 1, n - 1)] - level[max(k - half, 0)]
+    return rounded
 
 
 @njit(cache=True, nogil=True)
@@ -174,39 +183,48 @@ def _valleys(wish: FloatArray, cell_m: float, radius_m: float) -> FloatArray:
 
 def warm_up() -> None:
     """Compile what lays lines, or load it from the cache of an earlier start."""
-    _valleys(np.zeros(2), 1.0, 1.0)
+    gentle(_worth(np.zeros(2), np.ones(2), 1.0, 1.0, 1.0), 1.0, 1.0)
 
 
-def _worth(wish: FloatArray, width_m: FloatArray, cell_m: float, flying: Flying, radius_m: float) -> FloatArray:
+@njit(cache=True, nogil=True)
+def _worth(wish: FloatArray, width_m: FloatArray, cell_m: float, turning_m: float, radius_m: float) -> FloatArray:
     """Return the wishes (n,) without those that hold the whole line back more than it costs to come again for them.
 
-    ``width_m`` (n,) is how far a line sees to either side, ``radius_m`` the radius in which it bends.
+    ``width_m`` (n,) is how far a line sees to either side, ``turning_m`` the radius of turning circles, ``radius_m``
+    the one in which the line bends.
     """
+    n = len(wish)
     level = gentle(wish, cell_m, radius_m)
+    reach = int(0.5 * radius_m / cell_m) + 1
     for _ in range(MOST_LEFT):
-        binding = np.flatnonzero(wish <= level + 0.25 * cell_m)
-        groups = np.split(binding, np.flatnonzero(np.diff(binding) > 1) + 1)
-        best_m, best = 0.0, None
-        for group in groups:
-            if not len(group) or len(group) > 0.4 * len(wish):
+        best_m, best_wish, best_level = 0.0, wish, level
+        last = -1
+        while last + 1 < n:
+            first = last + 1
+            while first < n and wish[first] > level[first] + 0.25 * cell_m:
+                first += 1
+            last = first
+            while last + 1 < n and wish[last + 1] <= level[last + 1] + 0.25 * cell_m:
+                last += 1
+            if first >= n or last + 1 - first > 0.4 * n:
                 continue
-            first, last = group[0], group[-1]
             # With it go its neighbours that would hold the line back as much.
-            near = np.zeros(len(wish), dtype=bool)
-            reach = int(0.5 * radius_m / cell_m) + 1
-            near[max(0, first - reach) : last + reach + 1] = True
-            near &= wish <= level[first : last + 1].max() + 0.3 * width_m
-            without = np.where(near, np.inf, wish)
+            held_m = level[first : last + 1].max()
+            without, dropped = wish.copy(), 0
+            for k in range(max(0, first - reach), min(n, last + reach + 1)):
+                if wish[k] <= held_m + 0.3 * width_m[k]:
+                    without[k] = np.inf
+                    dropped += 1
             if not np.isfinite(without).any():
                 continue
             raised = gentle(without, cell_m, radius_m)
-            gained_m = float(((raised - level) / (2.0 * width_m)).sum()) * cell_m
-            again_m = COME_AGAIN_RADII * flying.radius_m + int(near.sum()) * cell_m + float(width_m.mean())
+            gained_m = ((raised - level) / (2.0 * width_m)).sum() * cell_m
+            again_m = COME_AGAIN_RADII * turning_m + dropped * cell_m + width_m.mean()
             if gained_m - again_m > best_m:
-                best_m, best = gained_m - again_m, (without, raised)
-        if best is None:
+                best_m, best_wish, best_level = gained_m - again_m, without, raised
+        if best_m == 0.0:
             break
-        wish, level = best
+        wish, level = best_wish, best_level
     return wish
 
 
@@ -218,15 +236,44 @@ def bend_radius_m(width_m: FloatArray, flying: Flying) -> float:
 def strips(raster: LineRaster, flying: Flying) -> tuple[BoolArray, BoolArray]:
     """Return which open cells are swept in lines, and which are left to fill: holes, and slivers of strips."""
     number, count = label(raster.open, np.ones((3, 3)))
-    swept = np.zeros(count + 1, dtype=bool)
     width_m = raster.half_width_m(flying)
-    for k, where in enumerate(find_objects(number), start=1):
-        inside = number[where] == k
-        thickest = int(inside.sum(axis=1).max()) * raster.cell_m
-        wide = thickest > STRIP * 2.0 * float(np.median(width_m[where][inside]))
-        swept[k] = wide or float(inside.sum()) > LARGE * float(raster.wanted.sum())
+    cells, thickest, least_m, most_m = _pieces(number.astype(np.int64), count, width_m)
+    swept = cells > LARGE * float(raster.wanted.sum())
+    thickest_m = thickest * raster.cell_m
+    swept |= thickest_m > STRIP * 2.0 * most_m
+    unsure = np.flatnonzero(~swept & (thickest_m > STRIP * 2.0 * least_m))
+    where = find_objects(number) if len(unsure) else []
+    for k in unsure:
+        inside = number[where[k - 1]] == k
+        swept[k] = thickest_m[k] > STRIP * 2.0 * float(np.median(width_m[where[k - 1]][inside]))
     large = np.asarray(swept[number])
     return large, np.asarray(raster.open & ~large)
+
+
+@njit(cache=True, nogil=True)
+def _pieces(number: IntArray, count: int, width_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return of each piece, by its number (along, across): its cells, the most of them in a column, and its widths.
+
+    Widths are the least and the most of ``width_m`` (along, across). All have length ``count`` + 1; what is of no piece
+    has number 0, and no cells.
+    """
+    cells, thickest, here = np.zeros(count + 1), np.zeros(count + 1), np.zeros(count + 1)
+    least_m, most_m = np.full(count + 1, np.inf), np.full(count + 1, -np.inf)
+    for i in range(number.shape[0]):
+        for j in range(number.shape[1]):
+            k = number[i, j]
+            if k > 0:
+                here[k] += 1.0
+                least_m[k] = min(least_m[k], width_m[i, j])
+                most_m[k] = max(most_m[k], width_m[i, j])
+        for j in range(number.shape[1]):
+            k = number[i, j]
+            if here[k] > 0.0:
+                cells[k] += here[k]
+                thickest[k] = max(thickest[k], here[k])
+                here[k] = 0.0
+    most_m[0] = np.inf
+    return cells, thickest, least_m, most_m
 
 
 def _extent(open_cells: BoolArray, sign: int) -> tuple[IntArray, IntArray, BoolArray]:

@@ -1,17 +1,19 @@
 """Lines of a swath survey: smooth, close enough to what was seen, and as far as that allows."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.ndimage import label
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.estimation.swath import SwathSonar
 from app.exploration.core.coverage import Coverage
-from app.exploration.swath.lines import STEEPEST, gentle, lines, strips
+from app.exploration.swath.lines import LARGE, STEEPEST, STRIP, gentle, lines, strips
 from app.exploration.swath.raster import Axes, Flying, raster_of
 
 FLYING = Flying(SwathSonar(), 2.0, 1.0, 5.0, 0.06)
@@ -92,6 +94,28 @@ def test_a_hole_does_not_hold_back_a_whole_line() -> None:
     together = lines(raster, raster.open, 1, FLYING)
     alone = lines(raster, large, 1, FLYING)
     assert np.allclose(together[0].across_m.max(), alone[0].across_m.max(), atol=1.0), "the hole waits"
+
+
+@given(
+    arrays(np.bool_, st.tuples(st.integers(1, 12), st.integers(1, 12))),
+    st.lists(st.floats(4.0, 20.0), min_size=12, max_size=12),
+)
+def test_strips_are_pieces_wider_than_a_part_of_the_swath_or_large(done: BoolArray, depths_m: list[float]) -> None:
+    """As the definition says it, piece by piece."""
+    rows, cols = done.shape
+    coverage = flat(rows, cols, np.array(depths_m[:cols]))
+    coverage.done[:] = done
+    raster = raster_of(coverage, 0.0, 1.0, 10.0)
+    flying = replace(FLYING, sonar=SwathSonar(math.radians(40.0)))
+    swept = np.zeros_like(raster.open)
+    number, count = label(raster.open, np.ones((3, 3)))
+    for k in range(1, count + 1):
+        piece = number == k
+        swath_m = 2.0 * np.median(flying.half_width_m(raster.depth_m[piece]))
+        swept |= piece & (piece.sum(axis=1).max() > STRIP * swath_m or piece.sum() > LARGE * raster.wanted.sum())
+    large, small = strips(raster, flying)
+    assert np.array_equal(large, swept)
+    assert np.array_equal(small, raster.open & ~swept)
 
 
 def test_a_line_goes_straight_on_where_little_is_left_beside_it() -> None:
