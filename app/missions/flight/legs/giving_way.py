@@ -70,6 +70,22 @@ class _Imminent:
         return self.motion.at(np.zeros(1))[0, :2]
 
 
+@dataclass(frozen=True, order=True)
+class _Room:
+    """How far a vehicle that gives way stays from all others, where more counts; the first counts most."""
+
+    soon_m: float
+    """In the next moment."""
+    later_m: float
+    """As long as it may wait: who passes later gives way, or is given way to, then."""
+    always_m: float
+    """As long, if it circled there from now on."""
+
+    def is_enough(self, enough_m: float) -> bool:
+        """Whether no other place can be better."""
+        return self.always_m >= enough_m
+
+
 class GivingWay:
     """Looks at the vehicles of one running mission, and has them give way.
 
@@ -180,7 +196,7 @@ class GivingWay:
         # What the current does to one it does to the other.
         reach_m = np.array([(WAITING_S + self._age_s(m)) * self._live.spec.speed_of(m.spec) for m in out])
         circles_m = np.array([self._circle_m(member) for member in out])
-        room_m = CLEAR * self._live.spec.limits.min_separation_m + circles_m + reach_m
+        room_m = self._enough_m + circles_m + reach_m
         near = np.hypot(*(here_m[:, None] - here_m[None]).T) < room_m[:, None] + reach_m[None] + circles_m[None]
         np.fill_diagonal(near, val=False)
         return [out[k] for k in np.flatnonzero(near.any(axis=1))]
@@ -190,7 +206,7 @@ class GivingWay:
         for one, other in combinations(near, 2):
             # Ways home are not planned apart, and what is known of the current is not exact.
             homeward = one.member.withdrawal is not None and other.member.withdrawal is not None
-            least_m = (CLEAR if homeward else 1.0) * self._live.spec.limits.min_separation_m
+            least_m = self._enough_m if homeward else self._live.spec.limits.min_separation_m
             if not self._decided_together(one.member, other.member) and self._too_close(one, other, least_m):
                 yield one, other
 
@@ -218,42 +234,61 @@ class GivingWay:
         return nearest_m
 
     async def _keep_apart(self, one: _Imminent, other: _Imminent, near: dict[str, _Imminent]) -> None:
-        """Have one of two give way: who only waits, else rather who surveys than who goes home, the last by name."""
+        """Have one of two give way, where that keeps it farthest from everybody."""
+        best: tuple[_Room, Member, FloatArray] | None = None
+        for it in self._who_may_give_way(one, other):
+            others = [that for name, that in near.items() if name != it.member.name]
+            going_on_m = min(self._nearest_m(it, that) for that in others)
+            for place_m in self._clear_places(it.member):
+                room = self._room(it, place_m, others, going_on_m, None if best is None else best[0])
+                if room is not None:
+                    best = room, it.member, place_m
+                    if room.is_enough(self._enough_m):
+                        break
+            if best is not None and best[0].is_enough(self._enough_m):
+                break
+        if best is not None:
+            _, member, place_m = best
+            await self._give_way(member, place_m, other.member if member is one.member else one.member)
+
+    def _who_may_give_way(self, one: _Imminent, other: _Imminent) -> list[_Imminent]:
+        """Return who only waits, else rather who surveys than who goes home, the last by name, first."""
         stands = self._asides.may_stand_elsewhere
         pair = sorted(
             (one, other),
             key=lambda it: (stands(it.member), it.member.withdrawal is None, it.member.name),
             reverse=True,
         )
-        best, best_of_it = (-math.inf,) * 3, None
-        enough_m = CLEAR * self._live.spec.limits.min_separation_m
-        for it in pair:
-            if not (self._asides.may_lead(it.member, Because.VEHICLE) or stands(it.member)):
-                continue
-            others = [that for name, that in near.items() if name != it.member.name]
-            going_on_m = min(self._nearest_m(it, that) for that in others)
-            for place_m in filter(partial(self._asides.is_clear, it.member), self._places(it.member)):
-                waiting = self._waiting(it.member, place_m, it.least_m, it.most_m)
-                # It circles where it waits.
-                if self._zones.entered_by(waiting.motion.place_m[:, :2]) or self._zones.near(place_m, waiting.around_m):
-                    continue
-                soon_m = min(self._nearest_m(waiting, that) for that in others)
-                if soon_m <= going_on_m + CLOSING_M or min(soon_m, enough_m) < best[0]:
-                    continue
-                # Who passes later gives way, or is given way to, then. Best is where its circles are clear from now on.
-                later_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
-                circling = replace(waiting, waits_from_s=0.0)
-                always_m = min(self._nearest_m(circling, that, WAITING_S) for that in others)
-                found = (min(soon_m, enough_m), min(later_m, enough_m), min(always_m, enough_m))
-                if found > best:
-                    best, best_of_it = found, (it.member, place_m)
-                if best[2] >= enough_m:
-                    break
-            if best[2] >= enough_m:
-                break
-        if best_of_it is not None:
-            member, place_m = best_of_it
-            await self._give_way(member, place_m, other.member if member is one.member else one.member)
+        return [it for it in pair if self._asides.may_lead(it.member, Because.VEHICLE) or stands(it.member)]
+
+    def _clear_places(self, member: Member) -> Iterator[FloatArray]:
+        """Yield where a vehicle may wait, each (2,)."""
+        return filter(partial(self._asides.is_clear, member), self._places(member))
+
+    @property
+    def _enough_m(self) -> float:
+        """How far vehicles are kept apart where there is room."""
+        return CLEAR * self._live.spec.limits.min_separation_m
+
+    def _room(
+        self, it: _Imminent, place_m: FloatArray, others: list[_Imminent], going_on_m: float, best: _Room | None
+    ) -> _Room | None:
+        """Return what room a vehicle has at a place (2,) and on the way there.
+
+        None where that is not more than the best, or hardly more than it has where it goes on, or zones are near.
+        """
+        waiting = self._waiting(it.member, place_m, it.least_m, it.most_m)
+        # It circles where it waits.
+        if self._zones.entered_by(waiting.motion.place_m[:, :2]) or self._zones.near(place_m, waiting.around_m):
+            return None
+        soon_m = min(self._nearest_m(waiting, that) for that in others)
+        if soon_m <= going_on_m + CLOSING_M or (best is not None and min(soon_m, self._enough_m) < best.soon_m):
+            return None
+        later_m = min(self._nearest_m(waiting, that, WAITING_S) for that in others)
+        circling = replace(waiting, waits_from_s=0.0)
+        always_m = min(self._nearest_m(circling, that, WAITING_S) for that in others)
+        room = _Room(*(min(room_m, self._enough_m) for room_m in (soon_m, later_m, always_m)))
+        return room if best is None or room > best else None
 
     def _places(self, member: Member) -> list[FloatArray]:
         """Return where a vehicle may wait, each (2,): where it is, else wherever its limits allow."""
@@ -298,10 +333,9 @@ class GivingWay:
                 continue
             waited_s = now_s - giving.since_s
             on = self._going_on(member)
-            least_m = CLEAR * self._live.spec.limits.min_separation_m
             others = (that for that in near.values() if that.member is not member)
             meets = (that for that in others if not self._decided_together(member, that.member))
-            clear = not any(self._too_close(on, that, least_m) for that in meets)
+            clear = not any(self._too_close(on, that, self._enough_m) for that in meets)
             if clear or waited_s * self._time_scale >= PATIENCE_S:
                 near[name] = on
                 await self._asides.lead_on(member)
