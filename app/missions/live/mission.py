@@ -51,7 +51,7 @@ from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import Sensor as SensorName
 from app.missions.spec.vehicle import VehicleSpec
-from app.missions.states import ENDED, MissionState
+from app.missions.states import ENDED, NOT_STARTED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
 from app.missions.team import Member, Swath, Team, Withdrawal
@@ -481,19 +481,25 @@ class LiveMission:
         return progress_of(self.search, self.team, self.frame)
 
     def _eta_s(self) -> float | None:
-        """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""
+        """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts.
+
+        A survey for a time or a distance takes what is left of that, as its vehicles fly; of steps, what steps took.
+        """
         if self.header.state in ENDED:
             return 0.0
         if self.search is not None:
             return max(self.search.left_s(), 0.0) / self._time_scale
-        if self.reports.leg_s is None:
-            return None
         if list(self.team) and not self.team.going_on:
             return 0.0  # what they still fly is their way home
+        left = remaining(self.spec, self.team)
+        if left.minutes is not None and self.header.state not in NOT_STARTED:
+            return 60.0 * left.minutes / self._time_scale
+        if self.reports.leg_s is None:
+            return None
         committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
         leg_m, flying = self.spec.limits.max_step_m, [*self.team.present, *self.team.held]
-        left = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
-        return (max(0.0, *left) + max(committed, default=0)) * self.reports.leg_s
+        legs = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
+        return (max(0.0, *legs) + max(committed, default=0)) * self.reports.leg_s
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""

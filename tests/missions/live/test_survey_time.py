@@ -16,6 +16,8 @@ from app.missions.team import Member, Withdrawal
 from tests.support.missions.harbour import act, sim_spec, until_state
 
 SPEED_MPS, MINUTES = 2.0, 30.0
+TIME_SCALE = 50.0
+"""Of the service."""
 WHOLE_M = MINUTES * 60.0 * SPEED_MPS
 
 
@@ -141,11 +143,25 @@ async def test_vehicles_that_wait_for_each_other_all_the_time_survey_for_their_m
     assert max(member.committed_m for member in live.team) < 240.0 * live.spec.speed_mps + 1.0
 
 
+@pytest.mark.parametrize("budget", [{"minutes": MINUTES}, {"km_per_vehicle": WHOLE_M / 1000.0}])
+async def test_a_survey_takes_as_long_as_is_left_of_its_budget(under_way: Made, budget: dict[str, float]) -> None:
+    """However long its legs took: they are as long as its lines are."""
+    vehicle = await under_way(**budget)
+    live = vehicle.live
+    live.reports.leg_s = 3.0
+    for time_s in (10.0, 11.0):
+        vehicle.reports(time_s, 30.0)
+    progress = live.progress()
+    assert progress.minutes_left is not None
+    assert progress.eta_s is not None
+    assert 0.9 * MINUTES < progress.minutes_left <= MINUTES
+    assert progress.eta_s == pytest.approx(60.0 * progress.minutes_left / TIME_SCALE)
+
+
 async def test_when_everybody_goes_home_no_leg_is_to_come(under_way: Callable[..., Awaitable[UnderWay]]) -> None:
     vehicle = await under_way(minutes=MINUTES)
     live = vehicle.live
-    live.reports.leg_s = 10.0
-    assert (live.progress().eta_s or 0.0) > 100.0
+    assert (live.progress().eta_s or 0.0) > 100.0 / TIME_SCALE
     vehicle.member.withdrawal = Withdrawal(Response.RETURN, "called home by Ana")
     assert live.progress().eta_s == 0.0
 
