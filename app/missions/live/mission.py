@@ -478,7 +478,8 @@ class LiveMission:
 
     def search_progress(self) -> SearchProgress | None:
         """Return how a search stands; None in a survey."""
-        return progress_of(self.search, self.team, self.frame)
+        ended_at = self.header.updated_at if self.header.state in ENDED else None
+        return progress_of(self.search, self.team, self.frame, ended_at)
 
     def _eta_s(self) -> float | None:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts."""

@@ -80,6 +80,8 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
     assert figures is not None
     assert sum(f["properties"]["area_m2"] for f in seen) == figures.found_cells
+    # No time runs any more: who looks a day later does not read that it was a day late.
+    assert figures.left_s == pytest.approx(found.left_s)
     service = await harbour.reopen()
     assert search_grid(await service.get(mission.id)) == before
     assert search_grid(await service.get(mission.id), after=before.version) is None
