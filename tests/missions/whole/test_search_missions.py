@@ -80,6 +80,9 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
     assert figures is not None
     assert sum(f["properties"]["area_m2"] for f in seen) == figures.found_cells
+    # It is as long as its time window, whatever number of steps it may take.
+    assert done.progress.minutes_left == pytest.approx(found.left_s / 60, abs=0.01)
+    assert done.progress.km_left_per_vehicle is None
     # No time runs any more: who looks a day later does not read that it was a day late.
     assert figures.left_s == pytest.approx(found.left_s)
     service = await harbour.reopen()
