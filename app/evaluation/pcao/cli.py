@@ -38,6 +38,7 @@ def pcao(
     """Rerun PCAO18's tables II to VI and figure 2 over many runs, beside its figures, and report."""
     from app.evaluation.pcao.plots import draw_learning, draw_time
     from app.evaluation.pcao.report import markdown
+    from app.evaluation.pcao.simulation.world import LANDMARKS, STEPS
     from app.evaluation.pcao.speed import speed_lines
     from app.evaluation.pcao.study import PARTS, Study
     from app.evaluation.runs.cluster import ClusterError
@@ -77,6 +78,9 @@ def pcao(
     found = study.findings(results.runs)
     command = f"bathyfleet evaluate pcao --seeds {seeds} --iterations {iterations} --searches {searches}"
     command += f" --team-runs {team_runs}" + (" --terrains FOLDER" if terrains else "")
+    command += "".join(
+        [f" --steps {steps}" if steps != STEPS else "", f" --landmarks {landmarks}" if landmarks != LANDMARKS else ""]
+    )
     command += "".join([f" --model {model.name}" if model else "", f" --only {only}" if only else ""])
     images = out / "images"
     images.mkdir(exist_ok=True)

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from app.evaluation.pcao.experiments import MAPS, TEAMS, PaperMap
+from app.evaluation.pcao.experiments import MAPS, TEAMS, CurveJob, PaperMap
 from app.evaluation.pcao.published import BEST, MEANS, TABLE2, TABLES
+from app.evaluation.pcao.simulation.world import LANDMARKS, STEPS
 from app.evaluation.runs.summary import spread
 from app.exploration.pcao.model import PcaoModel
 
@@ -26,6 +27,10 @@ class Findings:
     lacking: int = 0
     names: Mapping[str, str] = field(default_factory=dict)
     """Terrain that stands for each of the paper's maps, by the map's title; those that are at hand."""
+    landmarks: int = LANDMARKS
+    steps: int = STEPS
+    seeds: Sequence[int] = ()
+    """Of the flights."""
 
 
 def markdown(found: Findings, model: PcaoModel, facts: Mapping[str, str], speed: Sequence[str], pictures: bool) -> str:
@@ -36,10 +41,10 @@ def markdown(found: Findings, model: PcaoModel, facts: Mapping[str, str], speed:
               f"{', '.join(model.training.terrains)}; `{model.training.command}`"]  # fmt: skip
     lines += [f"- **incomplete**: {found.lacking} runs are still missing"] if found.lacking else []
     lines += [
-        "", "PCAO18's experiment: 3 vehicles with multibeam sonars, 1100 landmarks, 500 steps; remaining landmarks in "
-        "%, means ± half their 95 % interval (Student), and how many runs. Starts, landmarks and noise of these runs "
-        "were in no training. The paper's sea floors were never published, and its table I lost its numbers: what "
-        "stands for them, and how the sonar was chosen, says [PCAO](../pcao.md). `pcao` is the model above, "
+        "", f"PCAO18's experiment: 3 vehicles with multibeam sonars, {found.landmarks} landmarks, {found.steps} steps; "
+        f"remaining landmarks in %, means ± half their 95 % interval (Student), and how many runs. "
+        f"{_trained_with(found, model)} The paper's sea floors were never published, and its table I lost its numbers: "
+        "what stands for them, and how the sonar was chosen, says [PCAO](../pcao.md). `pcao` is the model above, "
         "with visits where it gets nowhere; the controllers of table II fly without. Mapping "
         "time is what the team really swims, tries included.", "",
     ]  # fmt: skip
@@ -56,6 +61,14 @@ def markdown(found: Findings, model: PcaoModel, facts: Mapping[str, str], speed:
         lines += ["## Learning (figure 2)", "", "![Learning](images/pcao-learning.png)", "", *_learning(found)]
     lines += [*_others(found), *_teams(found), "## Speed", "", *speed]
     return "\n".join(lines)
+
+
+def _trained_with(found: Findings, model: PcaoModel) -> str:
+    """Return whether flights were in a training: of the model, or of figure 2."""
+    both = sorted({*found.seeds} & {*model.training.seeds, *CurveJob.seeds})
+    if not both:
+        return "Starts, landmarks and noise of these runs were in no training."
+    return f"Starts, landmarks and noise of the seeds {', '.join(map(str, both))} were in a training."
 
 
 def _table2(found: Findings) -> list[str]:

@@ -107,5 +107,6 @@ class Study:
         return Findings(
             flights=[*every["tables"], *every["se500"]], table2=there(table2), curves=every["curves"],
             teams=every["teams"], others=every["others"], lacking=wanted - have,
-            names={title: terrain.name for title, terrain in self.maps.items()},
+            names={title: terrain.name for title, terrain in self.maps.items()}, landmarks=self.landmarks,
+            steps=self.steps, seeds=self.seeds,
         )  # fmt: skip

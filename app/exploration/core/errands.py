@@ -176,11 +176,18 @@ def errand_move(
 
 
 def _keeps_off(places: FloatArray, here: FloatArray, targets: Targets) -> NDArray[np.bool_]:
-    """Return which places (k, 3) are not too close to where any target is expected, or at least no closer than here."""
+    """Return which legs from ``here`` (3,) to places (k, 3) keep off where every target is expected, all along.
+
+    Where a vehicle is too close to one already, legs only lead away from it.
+    """
     kept = np.ones(len(places), dtype=np.bool_)
+    legs = places - here
+    squared = np.maximum((legs**2).sum(axis=1), 1e-12)
     for target in targets.state[np.isfinite(targets.state).all(axis=1), :3]:
-        distance = np.linalg.norm(places - target, axis=1)
-        kept &= distance >= min(targets.standoff_m, float(np.linalg.norm(here - target)) - 1e-9)
+        away = target - here
+        nearest = here + np.clip(legs @ away / squared, 0.0, 1.0)[:, None] * legs
+        distance = np.linalg.norm(nearest - target, axis=1)
+        kept &= distance >= min(targets.standoff_m, float(np.linalg.norm(away)) - 1e-9)
     return kept
 
 

@@ -51,8 +51,11 @@ def touched(shapes: Sequence[BaseGeometry], rows: int, cols: int, cell_m: float)
         west, south, east, north = np.array(shape.bounds) / cell_m
         if not np.isfinite([west, south, east, north]).all():
             continue  # nothing
+        bottom, left = max(0, int(np.floor(south))), max(0, int(np.floor(west)))
         top, right = min(rows, int(np.floor(north)) + 1), min(cols, int(np.floor(east)) + 1)
-        row, col = np.mgrid[max(0, int(np.floor(south))) : top, max(0, int(np.floor(west))) : right]
+        if top <= bottom or right <= left:
+            continue  # beyond the grid
+        row, col = np.mgrid[bottom:top, left:right]
         shapely.prepare(shape)
         boxes = shapely.box(cell_m * col, cell_m * row, cell_m * (col + 1), cell_m * (row + 1))
         cells[row, col] |= shapely.intersects(shape, boxes)

@@ -25,7 +25,7 @@ from app.missions.live.header import Ending, MissionHeader, StoredMission
 from app.missions.live.journals.journal import Counts, Journal
 from app.missions.live.journals.range_journal import RangeJournal
 from app.missions.live.journals.swath_intake import SwathIntake
-from app.missions.live.remaining import remaining
+from app.missions.live.remaining import remaining, within_window
 from app.missions.live.ships import ShipsAbout
 from app.missions.live.sounding_store import SoundingStore
 from app.missions.live.trails import Trails
@@ -450,7 +450,8 @@ class LiveMission:
         header, counts = self.header, self.journal.counts
         loop_time = asyncio.get_running_loop().time()
         running_s = loop_time - self.running_since_s if self.running_since_s is not None else 0.0
-        left = remaining(self.spec, self.team)
+        search = self.search_progress()
+        left = remaining(self.spec, self.team) if search is None else within_window(search)
         swept = self.builder.ensonified()
         return Progress(
             step=header.step,
@@ -473,12 +474,13 @@ class LiveMission:
             terms=header.terms or {},
             elapsed_s=header.elapsed_s + running_s,
             eta_s=self._eta_s(),
-            search=self.search_progress(),
+            search=search,
         )
 
     def search_progress(self) -> SearchProgress | None:
         """Return how a search stands; None in a survey."""
-        return progress_of(self.search, self.team, self.frame)
+        ended_at = self.header.updated_at if self.header.state in ENDED else None
+        return progress_of(self.search, self.team, self.frame, ended_at)
 
     def _eta_s(self) -> float | None:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts.

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
+from app.missions.views.search import SearchProgress
 
 
 @dataclass(frozen=True)
@@ -26,3 +27,8 @@ def remaining(spec: MissionSpec, team: Team) -> Remaining:
             minutes.append(left_m / spec.speed_of(member.spec) / 60.0)
             metres.append(left_m)
     return Remaining(round(max(minutes), 2), round(max(metres) / 1000, 3)) if metres else Remaining(None, None)
+
+
+def within_window(search: SearchProgress) -> Remaining:
+    """Return what is left of a search: its time window's rest, whatever number of steps it may take."""
+    return Remaining(round(max(search.left_s, 0.0) / 60.0, 2), None)

@@ -65,6 +65,16 @@ def _ways(search: Search, spec: MissionSpec) -> CheckView:
     far = ground.hoped(start)
     around = far[max(row - 1, 0) : row + 2, max(col - 1, 0) : col + 2]
     title, check = "Ways of the search", "search.ways"
+    least_m = search.spec.safety_m + search.spare_m + task.grid.cell_m
+    if search.spec.scanner.reach_m <= least_m:
+        return CheckView(
+            id=check,
+            title=title,
+            status=WARNING,
+            message=f"the scanner reaches {search.spec.scanner.reach_m:g} m, and legs keep {search.spec.safety_m:g} m "
+            "and half the arrival radius from what nobody has looked at: no vehicle gets away from where it is",
+            remedy=f"Make search.safety_m smaller, or search.scanner.reach_m larger than {least_m:g} m where it is",
+        )
     if task.grid.blueprint[row, col] or np.count_nonzero(around < UNREACHED) < 2:
         return CheckView(
             id=check,

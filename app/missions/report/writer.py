@@ -52,6 +52,11 @@ class Writer:
         return self.t(f"order_{name}")
 
     @property
+    def is_search(self) -> bool:
+        """Whether something was searched for."""
+        return self.answers.at("mission.progress.search") is not None
+
+    @property
     def is_swath(self) -> bool:
         """Whether swath sonars measured."""
         return self.answers.at("mission.progress.ensonified_pct") is not None

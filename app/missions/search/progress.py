@@ -1,6 +1,7 @@
 """How a search stands, as it is told to whoever watches."""
 
 import base64
+from datetime import datetime
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.search.state import Search
@@ -8,8 +9,10 @@ from app.missions.team import Team
 from app.missions.views.search import SearchGridView, SearchProgress
 
 
-def progress_of(search: Search | None, team: Team, frame: LocalFrame) -> SearchProgress | None:
-    """Return how a search stands; None when the mission is none."""
+def progress_of(
+    search: Search | None, team: Team, frame: LocalFrame, ended_at: datetime | None = None
+) -> SearchProgress | None:
+    """Return how a search stands, or how it stood when it ended; None when the mission is none."""
     if search is None:
         return None
     places = {member.name: member.place_m(frame) for member in team if member.report is not None}
@@ -20,7 +23,7 @@ def progress_of(search: Search | None, team: Team, frame: LocalFrame) -> SearchP
         explored_pct=100.0 * figures.explored_part,
         goal_pct=100.0 * figures.explored_goal_part,
         found_cells=figures.found_cells,
-        left_s=search.left_s(),
+        left_s=search.left_s(ended_at),
         began_at=search.began_at,
         back=[name for name, place in places.items() if search.way_to_entry_m(place) <= radius_m],
         out_of_contact=[name for name, place in places.items() if not search.contact(place)],

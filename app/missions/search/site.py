@@ -60,10 +60,12 @@ def site_of(spec: MissionSpec, search: SearchSpec) -> Site:
     margin_m = spec.limits.keep_out_margin_m
     known: list[BaseGeometry] = [Polygon(spec.to_local(obstacle)) for obstacle in search.obstacles]
     known += [Polygon(widened(zone, margin_m)) if margin_m > 0 else Polygon(zone) for zone in zones]
-    known.append(box(0.0, 0.0, cols * spec.cell_m, rows * spec.cell_m).difference(Polygon(area)))
+    outside = box(0.0, 0.0, cols * spec.cell_m, rows * spec.cell_m).difference(Polygon(area))
+    blueprint = _touched(known, rows, cols, spec.cell_m)
+    blueprint |= touched([_less(outside, spec.cell_m)], rows, cols, spec.cell_m)
     entry = _place(frame, search.entry)
     return Site(
-        grid=OccupancyGrid.from_blueprint(_touched(known, rows, cols, spec.cell_m), spec.cell_m),
+        grid=OccupancyGrid.from_blueprint(blueprint, spec.cell_m),
         scanner=Scanner(search.scanner.reach_m, search.scanner.resolution_deg),
         goal_m=_place(frame, search.goal),
         entry_m=entry,
@@ -91,5 +93,16 @@ def _place(frame: LocalFrame, lon_lat: tuple[float, float]) -> FloatArray:
 
 
 def _touched(shapes: Sequence[BaseGeometry], rows: int, cols: int, cell_m: float) -> BoolArray:
-    # Coordinates come from degrees and back: a quay that ends at a cell's border must not take the next cell, too.
-    return touched([shape.buffer(-0.01 * cell_m, join_style="mitre") for shape in shapes], rows, cols, cell_m)
+    less = [_less(shape, cell_m) for shape in shapes]
+    # A boom or a fence thinner than that is no less in the way.
+    return touched(
+        [whole if some.is_empty else some for whole, some in zip(shapes, less, strict=True)], rows, cols, cell_m
+    )
+
+
+def _less(shape: BaseGeometry, cell_m: float) -> BaseGeometry:
+    """Return a shape without its very edge.
+
+    Coordinates come from degrees and back: a quay that ends at a cell's border must not take the next cell, too.
+    """
+    return shape.buffer(-0.01 * cell_m, join_style="mitre")

@@ -209,11 +209,14 @@ class Search:
         """Return whether a place (2,) is within the transmitter's range."""
         return bool(in_contact(en_m, self.task(0.0)) >= 0.5)
 
-    def left_s(self) -> float:
-        """Return how much of the time window is left, seconds of vehicle time; all of it before the first step."""
+    def left_s(self, at: datetime | None = None) -> float:
+        """Return how much of the time window is left, seconds of vehicle time; all of it before the first step.
+
+        ``at``: when it ended, if it did; from then on no time runs.
+        """
         if self.began_at is None:
             return self.spec.window_s
-        return self.spec.window_s - (now() - self.began_at).total_seconds() * self._time_scale
+        return self.spec.window_s - ((at or now()) - self.began_at).total_seconds() * self._time_scale
 
     def way_to_entry_m(self, en_m: FloatArray) -> float:
         """Return the straight distance from a place (2,) to the entry."""

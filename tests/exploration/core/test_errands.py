@@ -10,6 +10,7 @@ import pytest
 from app.estimation import RangeSensor
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.errands import Errand, errand_move
 from app.exploration.core.information_need import lacking
 from app.exploration.core.moving_targets import FICTITIOUS_WEIGHT, Localization, Targets, dynamic_cost
 from app.exploration.core.problem import Belief
@@ -69,6 +70,22 @@ def test_fading_localization_brings_up_the_shallowest_vehicle(name: str) -> None
     low = Constraints(SQUARE, max_step_m=4.0, max_depth_m=20.0, min_altitude_m=0.5)
     flown = [at for _, at in fly(make(name), 3, limits=low, start=start, localization=localization((2.5, 1.0, 1.0)))]
     assert flown[-1][1, 2] == pytest.approx(0.0)
+
+
+def test_no_leg_towards_a_target_leads_across_it() -> None:
+    # Long steps end beyond it, as far away as asked, where the filter gains most by a look from the other side.
+    there, rng = np.array([150.0, 150.0, 4.0]), np.random.default_rng(0)
+    room = Constraints(3.0 * SQUARE, max_step_m=40.0, max_depth_m=20.0)
+    bottom = Bottom(0.0, 0.0, 10.0, np.full((30, 30), 18.0))
+    for _ in range(100):
+        bearing, sd = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(2.0, 9.0, 2)
+        here = there + rng.uniform(10.0, 55.0) * np.array([np.cos(bearing), np.sin(bearing), 0.0])
+        origin = np.array([here, [20.0, 20.0, 3.0]])
+        known = replace(targets(at=(tuple(there),), accuracy=5.0), standoff_m=10.0, relative_noise=0.01)
+        known = replace(known, covariance=np.diag([*sd**2, 1.0, 0.01, 0.01, 0.01])[None])
+        end = errand_move(0, Errand("a", 0), origin, origin, room, bottom, known, None, lambda options: options)
+        along = here + np.linspace(0.0, 1.0, 200)[:, None] * (end - here)
+        assert np.linalg.norm(along - there, axis=1).min() >= 10.0 - 1e-6
 
 
 def test_it_rises_early_enough_and_not_before() -> None:

@@ -1,6 +1,7 @@
 """Outlines of marked cells, and back."""
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -29,3 +30,8 @@ def test_a_shape_touches_the_cells_that_it_only_enters_and_none_beyond_the_grid(
     expected = np.zeros((4, 3), dtype=bool)
     expected[1:3, :2] = True
     np.testing.assert_array_equal(touched([shape, shapely.Polygon()], 4, 3, 1.0), expected)
+
+
+@pytest.mark.parametrize(("east", "north"), [(-40.0, 2.0), (40.0, 2.0), (2.0, -40.0), (2.0, 40.0), (40.0, -40.0)])
+def test_a_shape_beyond_the_grid_touches_no_cell(east: float, north: float) -> None:
+    assert not touched([shapely.box(east, north, east + 9.0, north + 9.0)], 4, 3, 1.0).any()

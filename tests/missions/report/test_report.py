@@ -30,6 +30,7 @@ from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.harbour import Harbour, act, sim_spec
+from tests.support.missions.searches import search_spec
 from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
 
@@ -120,6 +121,20 @@ async def test_a_mission_under_way_has_a_report_of_what_is_known(harbour: Harbou
     assert "Files are not summed" in page
     assert "data:image/svg+xml" in page
     await act(harbour.service, mission.id, "abort")
+
+
+async def test_a_report_of_a_search_tells_what_was_looked_at_and_by_when_all_had_to_be_back(harbour: Harbour) -> None:
+    mission = await harbour.service.create(search_spec(vehicles=[{"name": "a", "kind": "rest", "depth_m": 0}]))
+    live = await harbour.service.get(mission.id)
+    way = flown([(5.0, 5.0), (20.0, 5.0)], start_s=1_795_225_140.0, spacing_m=1.0)
+    await measure(live, [Measurement.model_validate(item) for item in measured("a", way)])
+    answers = await harbour.service.reports.answers(live)
+    page = html(contents.document_of(answers, Texts(Language.EN))).decode()
+    for figure in ("goal_pct", "explored_pct", "found_cells", "left_s"):
+        assert f'data-of="mission.progress.search.{figure}"' in page
+    assert "4000" in page.split("Time window")[1][:200]
+    # Nobody asked for a number of steps: a search is as long as its time window.
+    assert "Length asked for" not in page
 
 
 @given(

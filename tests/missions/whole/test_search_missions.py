@@ -80,6 +80,11 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert all(shape(f["geometry"]).intersects(pontoon.buffer(2e-5)) for f in seen)
     assert figures is not None
     assert sum(f["properties"]["area_m2"] for f in seen) == figures.found_cells
+    # It is as long as its time window, whatever number of steps it may take.
+    assert done.progress.minutes_left == pytest.approx(found.left_s / 60, abs=0.01)
+    assert done.progress.km_left_per_vehicle is None
+    # No time runs any more: who looks a day later does not read that it was a day late.
+    assert figures.left_s == pytest.approx(found.left_s)
     service = await harbour.reopen()
     assert search_grid(await service.get(mission.id)) == before
     assert search_grid(await service.get(mission.id), after=before.version) is None
@@ -219,6 +224,14 @@ def test_a_search_has_defaults_of_its_own() -> None:
     assert MissionSpec.model_validate(spec.model_dump(mode="json")) == spec
 
 
+def test_an_obstacle_is_in_the_way_however_thin_it_is() -> None:
+    spec = search_spec(search={"obstacles": [rectangle(4.5, 10.5, 20.5, 10.51)]})
+    assert spec.search is not None
+    known = Search(spec, spec.search, spec.frame(), 1.0).grid.blueprint
+    assert known[10, 4:21].all()
+    assert known.sum() == 17
+
+
 async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: MissionService) -> None:
     cases = [
         ({}, CheckStatus.OK, "to the goal area"),
@@ -229,6 +242,8 @@ async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: 
             "closer to the entry",
         ),
         ({"window_s": 60.0}, CheckStatus.WARNING, "there and back"),
+        # All that a look round shows is nearer to what nobody has looked at than legs may be.
+        ({"scanner": {"reach_m": 2.5}}, CheckStatus.WARNING, "the scanner reaches 2.5 m"),
     ]
     for change, status, words in cases:
         mission = await service.create(search_spec(search=change))

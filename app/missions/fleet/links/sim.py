@@ -193,7 +193,9 @@ class SimFleetLink(FleetLink):
         seed = [self._settings.seed, *launch.vehicle.encode()]
         started_s = now().timestamp()
         moving = [target for target in launch.targets if target.simulated is not None]
-        targets = [Target(target_in(target, terrain), terrain, started_s) for target in moving]
+        # Who joins later finds them where they have gone meanwhile.
+        since_s = started_s - self._under_way_s(launch.mission_id)
+        targets = [Target(target_in(target, terrain), terrain, since_s) for target in moving]
         body = SimulatedVehicle(
             launch.vehicle,
             terrain,
@@ -216,12 +218,17 @@ class SimFleetLink(FleetLink):
             out = launch.lookout
             noise = np.random.default_rng([*seed, 2])
             scanning = Scanning(out.world, out.reach_m, out.resolution_deg, SCAN_NOISE_M, noise, started_s)
-        deployed = DeployedVehicle(launch.mission_id, body, terrain, ranging, scanning)
+        deployed = DeployedVehicle(launch.mission_id, body, terrain, ranging, since_s, scanning)
         if launch.goes_on_from is not None:
             body.float_at(*terrain.frame.to_local(*launch.goes_on_from.place))
             deployed.battery.recharge(launch.goes_on_from.battery_pct)
         deployed.make_report()
         self._deployed[launch.vehicle] = deployed
+
+    def _under_way_s(self, mission_id: str) -> float:
+        """Return for how long a mission's targets have been under way, by its vehicles' clocks."""
+        there = [one for one in self._deployed.values() if one.mission_id == mission_id]
+        return max((one.body.time_s - one.targets_since_s for one in there), default=0.0)
 
     def recharge(self, vehicle: str, level_pct: float = 100.0) -> None:
         """Fill a vehicle's battery up to a level."""

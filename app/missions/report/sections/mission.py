@@ -30,6 +30,11 @@ def purpose(w: Writer) -> list[Block]:
         (t("fact_depths"), _range(w, "map.min_depth_m", "map.max_depth_m", 2, "m")),
         (t("fact_soundings"), w.number("mission.progress.soundings")),
     ]
+    if w.is_search:
+        found = "mission.progress.search"
+        facts.append((t("fact_goal_seen"), w.number(f"{found}.goal_pct", 1, "%")))
+        facts.append((t("fact_site_seen"), w.number(f"{found}.explored_pct", 1, "%")))
+        facts.append((t("fact_obstacles_found"), w.number(f"{found}.found_cells")))
     if answers.at("mission.progress.pings"):
         facts.append((t("fact_pings"), w.number("mission.progress.pings")))
         facts.append((t("fact_beams"), w.number("mission.progress.beams")))
@@ -101,9 +106,6 @@ def _angle(w: Writer, degrees: float, positive: str, negative: str) -> str:
 def times(w: Writer) -> list[Block]:
     """Return when it was, and how long."""
     t = w.t
-    budget = w.answers.at("mission.progress.budget")
-    (name,) = [name for name in ("minutes", "km_per_vehicle", "steps") if budget.get(name) is not None]
-    shown = w.number(f"mission.progress.budget.{name}", 0 if float(budget[name]).is_integer() else 1)
     return [
         Facts(
             [
@@ -111,13 +113,26 @@ def times(w: Writer) -> list[Block]:
                 (t("fact_first"), w.moment("period.first_time_s")),
                 (t("fact_last"), w.moment("period.last_time_s")),
                 (t("fact_running"), w.number("mission.progress.elapsed_s", 0, "s")),
-                (t(f"fact_budget_{name}"), shown),
+                *_length(w),
                 (t("fact_steps"), w.number("mission.progress.step")),
                 (t("fact_distance"), w.number("mission.progress.distance_m", 0, "m")),
             ]
         ),
         Paragraph(t("clocks")),
     ]
+
+
+def _length(w: Writer) -> list[tuple[str, Text]]:
+    """Return how long it was to be: by its budget, a search by its time window."""
+    if w.is_search:
+        return [
+            (w.t("fact_window"), w.number("mission.spec.search.window_s", 0, "s")),
+            (w.t("fact_window_left"), w.number("mission.progress.search.left_s", 0, "s")),
+        ]
+    budget = w.answers.at("mission.progress.budget")
+    (name,) = [name for name in ("minutes", "km_per_vehicle", "steps") if budget.get(name) is not None]
+    shown = w.number(f"mission.progress.budget.{name}", 0 if float(budget[name]).is_integer() else 1)
+    return [(w.t(f"fact_budget_{name}"), shown)]
 
 
 def vehicles(w: Writer) -> list[Block]:

@@ -15,6 +15,7 @@ from app.missions.fleet.interface import (
     LinkState,
     PingReport,
     Position,
+    RangeReport,
     SoundingReport,
     VehicleRefusedError,
     VehicleReport,
@@ -26,11 +27,13 @@ from app.missions.fleet.links.sim import FORSAKEN_S, SimFleetLink
 from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
+from app.missions.spec.targets import TargetSpec
 from app.missions.spec.vehicle import Sensor, VehicleSpec
 from simulator.floors import seafloors
 from simulator.floors.terrain import Terrain
 from simulator.floors.terrain_files import save_npz
 from simulator.sonars.swath import SwathSonar
+from simulator.targets import RangingNoise
 from simulator.vehicles.battery import BatterySpec
 from tests.support.missions.specs import LAT, LON
 from tests.support.waiting import until
@@ -62,6 +65,29 @@ async def test_it_tells_its_energy_and_the_current() -> None:
     assert info.report.battery_pct == 50.0
     assert info.report.energy_left_s == 3000.0
     assert info.report.current_mps == (0.1, -0.2)
+
+
+async def test_who_comes_later_ranges_to_a_target_where_it_is_by_now() -> None:
+    lat, lon = FLOOR.frame.to_geodetic(20, 80)
+    tag = {"start": (lon, lat), "depth_m": 1.0, "course_deg": 90.0, "speed_mps": 0.3}
+    target = TargetSpec.model_validate({"name": "tag", "simulated": tag})
+    exact = RangingNoise(0.0, 0.0)
+    link, events = SimFleetLink(SimulationSettings(), 20.0), list[FleetEvent]()
+    link._sink = events.append
+    first = replace(launch(BatterySpec()), targets=(target,), ranging=exact)
+    link.launch(first)
+    link._live_through(link._deployed[NAME], 100.0)
+    link.launch(replace(first, vehicle="t"))
+    for deployed in link._deployed.values():
+        link._live_through(deployed, 4.0)
+    for name in (NAME, "t"):
+        found = [e for e in events if isinstance(e, RangeReport) and e.vehicle == name][-1]
+        here, since_s = (
+            link._deployed[name].body.true_position,
+            104.0 - (link._deployed[name].body.time_s - found.time_s),
+        )
+        away = np.hypot(np.hypot(20.0 + 0.3 * since_s - here.east_m, 80.0 - here.north_m), 1.0 - here.depth_m)
+        assert found.range_m == pytest.approx(away, abs=0.5)
 
 
 async def test_one_that_is_asked_to_be_fast_is() -> None:

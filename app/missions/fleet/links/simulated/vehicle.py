@@ -39,11 +39,14 @@ class DeployedVehicle:
         body: SimulatedVehicle,
         terrain: Terrain,
         ranging: Ranging,
+        targets_since_s: float,
         scanning: Scanning | None = None,
     ) -> None:
         self.mission_id = mission_id
         self.body = body
         self.ranging = ranging
+        self.targets_since_s = targets_since_s
+        """When the targets that it ranges to began to move, by its clock."""
         self.scanning = scanning
         self.aground = False
         self.silent_since_s: float | None = None
