@@ -260,6 +260,7 @@ def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place
         source = rasterio.crs.CRS.from_wkt((crs.sub_crs_list[0] if crs.is_compound else crs).to_wkt())
     north_m = grid.south_m + grid.rows * grid.cell_m
     target = np.full((grid.rows, grid.cols), np.nan)
+    lat, lon = place.frame.to_geographic([grid.west_m, grid.west_m + grid.cols * grid.cell_m], [grid.south_m, north_m])
     try:
         reproject(
             values,
@@ -272,6 +273,9 @@ def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place
             dst_nodata=np.nan,
             # GDAL's bilinear kernel widens to an average where the source is finer.
             resampling=Resampling.bilinear,
+            # By itself GDAL takes longitudes from another meridian than Greenwich's for those of a place elsewhere, to
+            # which another way leads, or none.
+            AREA_OF_INTEREST=f"{lon[0]},{lat[0]},{lon[1]},{lat[1]}",
         )
     except (RasterioError, CPLE_BaseError):
         raise _no_way() from None

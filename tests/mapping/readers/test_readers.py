@@ -121,6 +121,22 @@ def test_a_grid_in_another_projection_is_placed_whatever_its_cells(cell_m: float
     assert any("averaged" in note for note in found.notes) == (cell_m < 2.0)
 
 
+@pytest.mark.parametrize("epsg", [20790, 4803], ids=["Portuguese National Grid", "degrees"])
+def test_a_grid_whose_longitudes_begin_at_lisbon_lies_where_it_should(epsg: int) -> None:
+    crs = pyproj.CRS.from_epsg(epsg)
+    to_file = pyproj.Transformer.from_crs(FRAME.crs, crs, always_xy=True)
+    west, south = to_file.transform(-20.0, -20.0)
+    cell = 0.5 if crs.is_projected else 5e-6
+    x, y = west + cell * (np.arange(400) + 0.5), south + cell * (np.arange(400) + 0.5)
+    east, north = to_file.transform(*np.meshgrid(x, y), direction="INVERSE")
+    z = depth_at(east, north)
+    grid = Raster(z, np.full(z.shape, 0.1), Affine(cell, 0, west, 0, cell, south), crs, "down")
+    s = place_soundings(grid, ReadOptions(), PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
+    sampled, _ = place_reference(grid, ReadOptions(), PLACE)
+    np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.05)
+
+
 def test_what_a_file_does_not_say_has_to_be_said(tmp_path: Path) -> None:
     write_grid(path := tmp_path / "a.asc", 4.0, None)
     path.with_suffix(".prj").unlink(missing_ok=True)
