@@ -1,6 +1,6 @@
 """From what a file holds to depths in the mission's frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyproj
@@ -30,6 +30,9 @@ from app.mapping.readers.types import (
 )
 from app.mapping.s44 import NORMAL_95, Order, max_tvu_m
 from app.mapping.types import Grid, Soundings
+
+SAME_UNIT = 1e-4
+"""Files seldom tell which of the feet theirs are, whose lengths differ by less than this: their systems do."""
 
 _BOTH = 0.99
 """Where this share of the values has one sign, the sign says which way they grow."""
@@ -99,7 +102,8 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
     depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
     _check_depths(depth, content)
     if isinstance(content, Raster):
-        sampled = _resampled(content, depth, _crs(content.crs, options, notes), place, place.grid)
+        crs = _crs(content.crs, options, notes)
+        sampled = _resampled(_in_unit_of(content, crs), depth, crs, place, place.grid)
     else:
         east, north = _to_local(content.x, content.y, _crs(content.crs, options, notes), place)
         cells = cell_numbers(place.grid, Soundings(east, north, depth, depth))
@@ -230,6 +234,7 @@ def _cells(
     raster: Raster, depth: FloatArray, options: ReadOptions, place: MapExtent, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     crs = _crs(raster.crs, options, notes)
+    raster = _in_unit_of(raster, crs)
     rows, cols = depth.shape
     # One cell in the middle, by its corner and the two beside it.
     col, row = 0.5 * cols + np.array([0.0, 1.0, 0.0]), 0.5 * rows + np.array([0.0, 0.0, 1.0])
@@ -244,6 +249,16 @@ def _cells(
     rows_known, cols_known = np.nonzero(np.isfinite(depth))
     east, north = _to_local(*_positions(raster, cols_known + 0.5, rows_known + 0.5), crs, place)
     return east, north, depth[rows_known, cols_known], raster.sd_m[rows_known, cols_known]
+
+
+def _in_unit_of(raster: Raster, crs: pyproj.CRS | None) -> Raster:
+    """Return a grid with positions in the unit of their system, None: the mission's frame."""
+    if raster.unit_m is None or (crs is not None and not crs.is_projected):
+        return raster
+    factor = raster.unit_m / (1.0 if crs is None else crs.axis_info[0].unit_conversion_factor)
+    if abs(factor - 1.0) < SAME_UNIT:
+        return raster
+    return replace(raster, transform=Affine.scale(factor) @ raster.transform)
 
 
 def _positions(raster: Raster, col: ArrayLike, row: ArrayLike) -> tuple[FloatArray, FloatArray]:
