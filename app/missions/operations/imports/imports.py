@@ -52,6 +52,17 @@ REASONS = {
     "WRECKS": "wreck",
     "UWTROC": "rock",
     "RESARE": "restricted area",
+    "SLCONS": "shoreline construction",
+    "PONTON": "pontoon",
+    "PILPNT": "pile",
+    "OFSPLF": "offshore platform",
+    "MORFAC": "mooring",
+    "MARCUL": "marine farm",
+    "FSHFAC": "fishing facility",
+    "HULKES": "hulk",
+    "FLODOC": "floating dock",
+    "DAMCON": "dam",
+    "GATCON": "gate",
 }
 """What objects of charts are, in words."""
 

@@ -1463,7 +1463,7 @@ class ProposedZoneView(Model):
     """What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it."""
 
     object: str
-    """The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE"""
+    """The chart's class, as LNDARE, OBSTRN, RESARE or PONTON"""
     reason: str
     """What it is, in words"""
     name: str

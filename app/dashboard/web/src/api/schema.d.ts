@@ -5092,7 +5092,7 @@ export interface components {
         ProposedZoneView: {
             /**
              * Object
-             * @description The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE
+             * @description The chart's class, as LNDARE, OBSTRN, RESARE or PONTON
              */
             object: string;
             /**
