@@ -181,7 +181,7 @@ class Imports:
             kept, merged = await live.in_thread(_kept, live, depths)
             notes = [f"{merged} depths were merged per cell of the map"] if merged else []
             row = await asyncio.to_thread(_row_of_site, live, kept, len(depths), dict(described or {}), notes)
-            if [one.digest for one in known] == [row.digest]:
+            if [(one.digest, one.summary["notes"]) for one in known] == [(row.digest, row.summary["notes"])]:
                 return
         if row is None and not known:
             return
