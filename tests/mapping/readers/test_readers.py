@@ -128,8 +128,8 @@ def test_a_grid_whose_longitudes_begin_at_lisbon_lies_where_it_should(epsg: int)
     west, south = to_file.transform(-20.0, -20.0)
     cell = 0.5 if crs.is_projected else 5e-6
     x, y = west + cell * (np.arange(400) + 0.5), south + cell * (np.arange(400) + 0.5)
-    east, north = to_file.transform(*np.meshgrid(x, y), direction="INVERSE")
-    z = depth_at(east, north)
+    across, up = np.meshgrid(x, y)
+    z = depth_at(*to_file.transform(across, up, direction="INVERSE"))
     grid = Raster(z, np.full(z.shape, 0.1), Affine(cell, 0, west, 0, cell, south), crs, "down")
     s = place_soundings(grid, ReadOptions(), PLACE).soundings
     np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
@@ -237,7 +237,8 @@ def test_axes_in_netcdf_have_the_unit_that_they_state(
     west, south = to_file.transform(-20.0, -20.0)
     number = cell_m * np.arange(int(100 / cell_m)) / factor
     x, y = west + number, south + number
-    east, north = to_file.transform(*np.meshgrid(x, y), direction="INVERSE")
+    across, up = np.meshgrid(x, y)
+    east, north = to_file.transform(across, up, direction="INVERSE")
     with netCDF4.Dataset(path := tmp_path / "a.nc", "w") as file:
         for name, values in (("y", y), ("x", x)):
             file.createDimension(name, len(values))
