@@ -221,7 +221,10 @@ def tide(
     table: Annotated[
         Path | None,
         typer.Argument(
-            exists=True, dir_okay=False, readable=True, help="Table of high and low waters (.tid); default: --level."
+            exists=True,
+            dir_okay=False,
+            readable=True,
+            help="Table of high and low waters, or of observed levels (.tid); default: --level.",
         ),
     ] = None,
     level: Annotated[float, typer.Option(help="Constant water level, metres, where there is no table.")] = 0.0,

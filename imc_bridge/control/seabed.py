@@ -9,6 +9,8 @@ import math
 from collections import deque
 from collections.abc import Iterator
 
+from imc_bridge.control.distances import distance_m
+
 EARTH_RADIUS_M = 6_371_000.0
 CELL_M = 5.0
 KEPT_PER_CELL = 9
@@ -20,7 +22,7 @@ _Cell = tuple[int, int]
 
 
 class Seabed:
-    """Soundings in square cells of 5 m.
+    """Soundings in square cells of 5 m, in rows along parallels; how many degrees a cell is wide is its row's own.
 
     A single reading may be a false echo, so the shallowest of a cell counts only when a second one, there or in a
     neighbouring cell, is hardly deeper.
@@ -28,16 +30,14 @@ class Seabed:
 
     def __init__(self) -> None:
         self._cells: dict[_Cell, deque[tuple[float, float]]] = {}
-        self._cos_lat: float | None = None
 
     def __len__(self) -> int:
         return len(self._cells)
 
     def add(self, now: float, lat_deg: float, lon_deg: float, bottom_depth_m: float) -> None:
         """Take a sounding in that arrived at ``now`` (seconds of the bridge's clock)."""
-        if self._cos_lat is None:
-            self._cos_lat = max(math.cos(math.radians(lat_deg)), 0.01)
-        cell = self._cell(*self._place_m(lat_deg, lon_deg))
+        row = _row(lat_deg)
+        cell = row, _col(row, lon_deg)
         readings = self._cells.get(cell)
         if readings is None:
             if len(self._cells) >= MAX_CELLS:
@@ -58,26 +58,26 @@ class Seabed:
         half_width_m
             The corridor reaches this far to the sides and beyond the ends.
         """
-        if self._cos_lat is None:
-            return None
         depths = [
             depth
-            for cell in self._corridor(self._place_m(*start_deg), self._place_m(*end_deg), half_width_m)
+            for cell in self._corridor(start_deg, end_deg, half_width_m)
             if (depth := self._depth(cell, now)) is not None
         ]
         return min(depths, default=None)
 
     def _corridor(self, start: tuple[float, float], end: tuple[float, float], half_width_m: float) -> Iterator[_Cell]:
-        length = math.dist(start, end)
-        steps = max(math.ceil(length / CELL_M), 1)
+        if not self._cells:
+            return
+        steps = max(math.ceil(distance_m(start, end) / CELL_M), 1)
         reach = math.ceil(half_width_m / CELL_M)
         seen: set[_Cell] = set()
         for k in range(steps + 1):
             share = k / steps
-            north = start[0] + share * (end[0] - start[0])
-            east = start[1] + share * (end[1] - start[1])
-            row, col = self._cell(north, east)
+            lat = start[0] + share * (end[0] - start[0])
+            lon = start[1] + share * (end[1] - start[1])
+            row = _row(lat)
             for i in range(row - reach, row + reach + 1):
+                col = _col(i, lon)
                 for j in range(col - reach, col + reach + 1):
                     if (i, j) not in seen:
                         seen.add((i, j))
@@ -92,8 +92,10 @@ class Seabed:
             return sorted(readings)[max(1, (len(readings) - 1) // 4)]
         (alone,) = readings
         row, col = cell
+        lon_deg = math.degrees((col + 0.5) * CELL_M / _radius_m(row))
         for i in (row - 1, row, row + 1):
-            for j in (col - 1, col, col + 1):
+            middle = _col(i, lon_deg)
+            for j in (middle - 1, middle, middle + 1):
                 if (i, j) != cell and any(d <= alone + CONFIRMED_WITHIN_M for d in self._fresh((i, j), now)):
                     return alone
         return None
@@ -102,10 +104,15 @@ class Seabed:
         readings = self._cells.get(cell)
         return [] if readings is None else [depth for at, depth in readings if now - at <= MAX_AGE_S]
 
-    def _place_m(self, lat_deg: float, lon_deg: float) -> tuple[float, float]:
-        cos_lat = 1.0 if self._cos_lat is None else self._cos_lat
-        return EARTH_RADIUS_M * math.radians(lat_deg), EARTH_RADIUS_M * math.radians(lon_deg) * cos_lat
 
-    @staticmethod
-    def _cell(north_m: float, east_m: float) -> _Cell:
-        return math.floor(north_m / CELL_M), math.floor(east_m / CELL_M)
+def _row(lat_deg: float) -> int:
+    return math.floor(EARTH_RADIUS_M * math.radians(lat_deg) / CELL_M)
+
+
+def _col(row: int, lon_deg: float) -> int:
+    return math.floor(_radius_m(row) * math.radians(lon_deg) / CELL_M)
+
+
+def _radius_m(row: int) -> float:
+    """Return the radius of a row's parallel."""
+    return EARTH_RADIUS_M * max(math.cos((row + 0.5) * CELL_M / EARTH_RADIUS_M), 0.01)

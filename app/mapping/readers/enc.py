@@ -37,8 +37,26 @@ Appendix A, chapter 2 (CATZOC). D and U state none."""
 NO_ZONE_POSITION_M = 500.0
 """Where nothing states how well positions are known, they may be as wrong as in zone C."""
 
-HAZARDS = ("LNDARE", "OBSTRN", "WRECKS", "UWTROC", "RESARE")
-"""Objects that vehicles should keep out of: land, dangers under water, and restricted areas."""
+NO_BOTTOM = {"2", "5", "7"}
+"""Of QUASOU: the depth is unknown, no bottom was found at it, or it is safe and the bottom lies somewhere below."""
+
+DOUBTFUL = {"3", "4", "8", "9"}
+"""Of QUASOU: doubtful, unreliable, or reported and not surveyed or not confirmed."""
+
+DANGERS = ("OBSTRN", "WRECKS", "UWTROC")
+"""What lies under water, where somebody surveyed it more or less well."""
+
+# fmt: off
+HAZARDS = (
+    "LNDARE", *DANGERS, "RESARE", "SLCONS", "PONTON", "PILPNT", "OFSPLF", "MORFAC", "MARCUL", "FSHFAC", "HULKES",
+    "FLODOC", "DAMCON", "GATCON",
+)
+# fmt: on
+"""Objects that vehicles should keep out of: land, dangers under water, restricted areas, and what stands or is moored
+there: piers and moles, pontoons, piles, platforms, moorings, farms, nets and weirs, hulks, docks, dams, gates."""
+
+SMALL_HOLE_M2 = 100.0
+"""Free water that is enclosed by something and smaller than this is taken for a part of it."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +87,8 @@ class Zone:
 def read_enc(content: bytes) -> Points:
     """Return the soundings (SOUNDG) and the corners of contours (DEPCNT) of a cell, with the quality of M_QUAL.
 
+    Soundings that met no bottom are left out, and doubtful ones are of no quality that is known (QUASOU).
+
     Raises
     ------
     ReadError
@@ -76,25 +96,31 @@ def read_enc(content: bytes) -> Points:
     """
     _check(content)
     quality = _Quality(content)
-    parts = []
+    places, doubtful, notes = np.empty((0, 3)), np.empty(0, np.bool_), []
     table = _layer(content, "SOUNDG")
     if table is not None and len(table.shapes):
-        parts.append(shapely.get_coordinates(table.shapes, include_z=True))
+        said = table.lists("QUASOU")
+        met = np.array([not NO_BOTTOM & one for one in said])
+        places, index = shapely.get_coordinates(table.shapes[met], include_z=True, return_index=True)
+        doubtful = np.array([bool(DOUBTFUL & one) for one in said])[met][index]
+        if not met.all():
+            notes.append(f"{np.sum(~met)} soundings that met no bottom, or whose depth is unknown, are left out")
     table = _layer(content, "DEPCNT")
     if table is not None and len(table.shapes):
         corners, index = shapely.get_coordinates(table.shapes, return_index=True)
-        parts.append(np.column_stack([corners, table.numbers("VALDCO")[index]]))
-    places = np.concatenate(parts) if parts else np.empty((0, 3))
-    places = places[np.isfinite(places).all(axis=1)]
+        places = np.concatenate([places, np.column_stack([corners, table.numbers("VALDCO")[index]])])
+        doubtful = np.append(doubtful, np.zeros(len(corners), np.bool_))
+    known = np.isfinite(places).all(axis=1)
+    places, doubtful = places[known], doubtful[known]
     if len(places) == 0:
         raise ReadError("file", "it has neither soundings (SOUNDG) nor contours (DEPCNT)", "send another cell")
     if len(places) > MAX_SOUNDINGS:
         raise ReadError("file", f"it has more than {MAX_SOUNDINGS} depths", "send a smaller cell")
     lon, lat, depth = places.T
     a, b, _ = quality.at(lon, lat)
-    sd = (a + b * np.maximum(depth, 0.0)) / NORMAL_95
+    sd = np.where(doubtful, np.nan, (a + b * np.maximum(depth, 0.0)) / NORMAL_95)
     lines = np.arange(1, len(places) + 1)
-    return Points(lon, lat, depth, sd, pyproj.CRS.from_epsg(4326), "down", lines)
+    return Points(lon, lat, depth, sd, pyproj.CRS.from_epsg(4326), "down", lines, notes=tuple(notes))
 
 
 def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[Zone], list[str]]:
@@ -132,10 +158,10 @@ def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[
             local = shapely.transform(near, lambda lonlat: _local(frame, lonlat))
             middle = shapely.get_coordinates(near.representative_point())
             [position_m] = quality.at(*middle.T)[2]
-            # Limits that somebody drew are where they are drawn, and coasts are not surveyed from the water.
-            position_m = 0.0 if kind in ("RESARE", "LNDARE") else float(position_m)
+            # Limits that somebody drew are where they are drawn, and what is to be seen is not surveyed from the water.
+            position_m = float(position_m) if kind in DANGERS else 0.0
             for part in _polygons(local.buffer(position_m + margin_m, quad_segs=4).intersection(box)):
-                ring = shapely.get_coordinates(Polygon(part.exterior).simplify(DETAIL_M))[:-1]
+                ring = shapely.get_coordinates(part.simplify(DETAIL_M))[:-1]
                 lat, lon = frame.to_geographic(ring[:, 0], ring[:, 1])
                 depth = float(depths[number])
                 told = Zone(
@@ -202,6 +228,11 @@ class _Table:
             return np.full(len(self.shapes), np.nan)
         values = self.columns[name]
         return np.array([_number(value) for value in values], dtype=np.float64)
+
+    def lists(self, name: str) -> list[set[str]]:
+        """Return the members of a list, each in words; none where it is not told."""
+        values = self.columns.get(name, [None] * len(self.shapes))
+        return [set() if value is None else set(np.atleast_1d(value).astype(str)) for value in values]
 
     def texts(self, name: str) -> list[str]:
         """Return a text, printable and short; empty where it is not told."""
@@ -271,4 +302,18 @@ def _around(frame: LocalFrame, box: BaseGeometry) -> BaseGeometry:
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:
-    return [part for part in getattr(geometry, "geoms", [geometry]) if isinstance(part, Polygon) and not part.is_empty]
+    """Return a geometry's polygons; what has a hole is cut through it, since zones have none."""
+    whole: list[Polygon] = []
+    rest = [part for part in getattr(geometry, "geoms", [geometry]) if isinstance(part, Polygon) and not part.is_empty]
+    while rest:
+        part = rest.pop()
+        holes = [hole for hole in part.interiors if Polygon(hole).area >= SMALL_HOLE_M2]
+        if not holes:
+            whole.append(Polygon(part.exterior))
+            continue
+        west, south, east, north = part.bounds
+        middle = Polygon(holes[0]).representative_point().x
+        for half in (shapely.box(west, south, middle, north), shapely.box(middle, south, east, north)):
+            cut = Polygon(part.exterior, holes).intersection(half)
+            rest += [one for one in getattr(cut, "geoms", [cut]) if isinstance(one, Polygon) and not one.is_empty]
+    return whole

@@ -1,6 +1,6 @@
 """From what a file holds to depths in the mission's frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyproj
@@ -30,6 +30,9 @@ from app.mapping.readers.types import (
 )
 from app.mapping.s44 import NORMAL_95, Order, max_tvu_m
 from app.mapping.types import Grid, Soundings
+
+SAME_UNIT = 1e-4
+"""Files seldom tell which of the feet theirs are, whose lengths differ by less than this: their systems do."""
 
 _BOTH = 0.99
 """Where this share of the values has one sign, the sign says which way they grow."""
@@ -99,7 +102,8 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
     depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
     _check_depths(depth, content)
     if isinstance(content, Raster):
-        sampled = _resampled(content, depth, _crs(content.crs, options, notes), place, place.grid)
+        crs = _crs(content.crs, options, notes)
+        sampled = _resampled(_in_unit_of(content, crs), depth, crs, place, place.grid)
     else:
         east, north = _to_local(content.x, content.y, _crs(content.crs, options, notes), place)
         cells = cell_numbers(place.grid, Soundings(east, north, depth, depth))
@@ -230,6 +234,7 @@ def _cells(
     raster: Raster, depth: FloatArray, options: ReadOptions, place: MapExtent, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     crs = _crs(raster.crs, options, notes)
+    raster = _in_unit_of(raster, crs)
     rows, cols = depth.shape
     # One cell in the middle, by its corner and the two beside it.
     col, row = 0.5 * cols + np.array([0.0, 1.0, 0.0]), 0.5 * rows + np.array([0.0, 0.0, 1.0])
@@ -246,6 +251,16 @@ def _cells(
     return east, north, depth[rows_known, cols_known], raster.sd_m[rows_known, cols_known]
 
 
+def _in_unit_of(raster: Raster, crs: pyproj.CRS | None) -> Raster:
+    """Return a grid with positions in the unit of their system, None: the mission's frame."""
+    if raster.unit_m is None or (crs is not None and not crs.is_projected):
+        return raster
+    factor = raster.unit_m / (1.0 if crs is None else crs.axis_info[0].unit_conversion_factor)
+    if abs(factor - 1.0) < SAME_UNIT:
+        return raster
+    return replace(raster, transform=Affine.scale(factor) @ raster.transform)
+
+
 def _positions(raster: Raster, col: ArrayLike, row: ArrayLike) -> tuple[FloatArray, FloatArray]:
     col, row = np.asarray(col, np.float64), np.asarray(row, np.float64)
     a, b, c, d, e, f = tuple(raster.transform)[:6]
@@ -260,6 +275,7 @@ def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place
         source = rasterio.crs.CRS.from_wkt((crs.sub_crs_list[0] if crs.is_compound else crs).to_wkt())
     north_m = grid.south_m + grid.rows * grid.cell_m
     target = np.full((grid.rows, grid.cols), np.nan)
+    lat, lon = place.frame.to_geographic([grid.west_m, grid.west_m + grid.cols * grid.cell_m], [grid.south_m, north_m])
     try:
         reproject(
             values,
@@ -272,6 +288,9 @@ def _resampled(raster: Raster, values: FloatArray, crs: pyproj.CRS | None, place
             dst_nodata=np.nan,
             # GDAL's bilinear kernel widens to an average where the source is finer.
             resampling=Resampling.bilinear,
+            # By itself GDAL takes longitudes from another meridian than Greenwich's for those of a place elsewhere, to
+            # which another way leads, or none.
+            AREA_OF_INTEREST=f"{lon[0]},{lat[0]},{lon[1]},{lat[1]}",
         )
     except (RasterioError, CPLE_BaseError):
         raise _no_way() from None

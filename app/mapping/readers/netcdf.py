@@ -11,7 +11,7 @@ from netCDF4 import Dataset
 from app.arrays import FloatArray
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
-from app.mapping.readers.units import metres_in
+from app.mapping.readers.units import known_metres_in, metres_in
 
 DEPTH_NAMES = ("depth", "elevation", "bathymetry", "z", "height", "topo", "band1")
 SD_NAMES = ("uncertainty", "sd", "depth_uncertainty", "standard_deviation")
@@ -66,7 +66,8 @@ def _read(file: Any) -> Raster:
         z, sd_values = z.T, sd_values.T
     step_x, step_y = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
     transform = Affine(step_x, 0.0, x[0] - 0.5 * step_x, 0.0, step_y, y[0] - 0.5 * step_y)
-    return Raster(z, sd_values, transform, _crs(file, variable, x_name, y_name), _direction(variable))
+    crs, unit_m = _crs(file, variable, x_name, y_name), _unit_m(file, x_name, y_name)
+    return Raster(z, sd_values, transform, crs, _direction(variable), unit_m)
 
 
 def _depth_variable(file: Any) -> Any:
@@ -101,6 +102,12 @@ def _axis(file: Any, name: str) -> FloatArray:
     if not np.all(np.isfinite(values)) or step == 0 or np.max(np.abs(values - even)) > REGULAR * abs(step):
         raise ReadError(_called(name), "its values are not evenly spaced", "regrid the file, or send it as XYZ")
     return values
+
+
+def _unit_m(file: Any, *names: str) -> float | None:
+    """Return how many metres the unit of axes has; None where they state none of length, or not the same."""
+    stated = {known_metres_in(getattr(file.variables[name], "units", "")) for name in names}
+    return stated.pop() if len(stated) == 1 else None
 
 
 def _is_eastward(file: Any, name: str) -> bool:

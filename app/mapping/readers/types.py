@@ -100,7 +100,8 @@ class Points:
 class Raster:
     """A grid. Arrays have shape (rows, cols), row 0 first in the file; NaN is unknown.
 
-    ``transform`` takes columns and rows to x and y of ``crs``.
+    ``transform`` takes columns and rows to x and y of ``crs``, in metres ``unit_m`` long where the file states their
+    unit beside it.
     """
 
     z: FloatArray
@@ -108,3 +109,4 @@ class Raster:
     transform: Affine
     crs: pyproj.CRS | None
     positive: Positive | None
+    unit_m: float | None = None

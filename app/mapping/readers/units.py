@@ -18,6 +18,11 @@ METRES_IN = {name: metres for metres, names in _METRES.items() for name in names
 """How many metres a unit has, by its name in small letters, words joined by underscores."""
 
 
+def known_metres_in(unit: object) -> float | None:
+    """Return how many metres a unit has; None for what is not known as one of length."""
+    return METRES_IN.get(_name(unit))
+
+
 def metres_in(unit: object, where: str) -> float:
     """Return how many metres a unit has; nothing said: metres.
 
@@ -26,8 +31,11 @@ def metres_in(unit: object, where: str) -> float:
     ReadError
         When it is no unit of length, or one that is not known; ``where`` has it.
     """
-    name = "_".join(str(unit or "").lower().split())
-    found = METRES_IN.get(name) if name else 1.0
+    found = known_metres_in(unit) if _name(unit) else 1.0
     if found is None:
         raise ReadError(where, "its unit is no known one of length", "write depths in metres, with the unit m")
     return found
+
+
+def _name(unit: object) -> str:
+    return "_".join(str(unit or "").lower().split())

@@ -37,9 +37,12 @@ COLUMNS = (
 )
 
 
-def header_line(datum: str) -> bytes:
-    """Return the begin of a file whose depths are counted from ``datum``: a comment and the names of the columns."""
-    return f"# depth_m: positive down, from {datum}\n".encode() + _lines([COLUMNS])
+def header_line(datum: str, left_out: str = "") -> bytes:
+    """Return the begin of a file whose depths are counted from ``datum``: a comment and the names of the columns.
+
+    ``left_out`` says what is not in it.
+    """
+    return f"# depth_m: positive down, from {datum}{left_out and f'; {left_out}'}\n".encode() + _lines([COLUMNS])
 
 
 def sounding_lines(rows: Iterable[Sequence[Any]]) -> bytes:

@@ -224,12 +224,21 @@ class Sites:
             await self._imports.begin_with(live, None)
             return
         newest = site.surveys[-1]
+        notes = [f"standard deviations as of {moment(site.model.at_s):%Y-%m-%d}, grown with the age of surveys"]
+        own = live.facts.vertical_datum
+        if site.datum.epsg != own.epsg:
+            notes.append(
+                f"the site's depths are below another datum ({site.datum.statement}) than the mission's "
+                f"({own.statement}), and differ by that: correct the mission to one datum by its tide"
+            )
         described = {
             "site": site.facts.id,
             "source": f"site {site.facts.name}, {len(site.surveys)} surveys, newest {newest.name}",
-            "notes": [f"standard deviations as of {moment(site.model.at_s):%Y-%m-%d}, grown with the age of surveys"],
+            "notes": notes,
         }
         await self._imports.begin_with(live, rows, described)
+        for note in notes[1:]:
+            await live.journal.log(Level.WARNING, "site", note)
 
     # What is known of a site
 

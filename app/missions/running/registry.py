@@ -1,6 +1,7 @@
 """The missions that this process has in memory."""
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -9,6 +10,7 @@ from functools import partial
 import structlog
 from pydantic import ValidationError
 from sqlalchemy import delete, select
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.compute.compute import Compute
@@ -37,6 +39,8 @@ from app.storage.queries import sites as site_queries
 from app.storage.queries import soundings as sounding_queries
 
 ENDED_MISSIONS_IN_MEMORY = 8
+LOOKED_AT_EVERY_S = 5.0
+"""How often it is looked whether an ended mission in memory is still stored: it may be pruned meanwhile."""
 
 log = structlog.get_logger(__name__)
 
@@ -74,6 +78,7 @@ class MissionRegistry:
         self._left: dict[str, MissionSummary] = {}
         # Known to exist, whoever has them; another process may have deleted one meanwhile.
         self._seen: set[str] = set()
+        self._looked_s: dict[str, float] = {}
         self._loading = asyncio.Lock()
 
     def share(
@@ -125,7 +130,7 @@ class MissionRegistry:
         MissionNotFoundError, MissionElsewhereError, MissionUnreadableError
         """
         live = self._live.get(mission_id)
-        if live is not None:
+        if live is not None and not await self._was_removed(live):
             return live
         async with self._loading:
             if mission_id in self._live:
@@ -158,6 +163,32 @@ class MissionRegistry:
                 self._maps.survey(live)
             await self._taken_up(live)
             return live
+
+    async def _was_removed(self, live: LiveMission) -> bool:
+        """Tell whether a mission that ended is stored no more, and put it away then."""
+        if live.header.state not in ENDED or time.monotonic() < self._looked_s.get(live.id, 0.0) + LOOKED_AT_EVERY_S:
+            return False
+        self._looked_s[live.id] = time.monotonic()
+        try:
+            async with self._database.reading() as session:
+                there = await session.scalar(select(MissionRow.id).where(MissionRow.id == live.id))
+        except SQLAlchemyError:
+            return False  # what is in memory can be shown meanwhile
+        if there is not None or self._live.get(live.id) is not live:
+            return False
+        self._maps.forget(live.id)
+        await self._put_away(live, "the mission was removed")
+        return True
+
+    async def _put_away(self, live: LiveMission, why: str) -> None:
+        """Forget a mission that is stored no more."""
+        self._left.pop(live.id, None)
+        self._seen.discard(live.id)
+        self._looked_s.pop(live.id, None)
+        if self._live.pop(live.id, None) is not None:
+            live.abandon(why)
+        if self._ownership is not None:
+            await self._ownership.release([live.id])
 
     async def try_out(self, row: MissionRow) -> None:
         """Open a mission as it is to be stored, and put it away. Raises InvalidRequestError where it cannot be opened.
@@ -195,12 +226,7 @@ class MissionRegistry:
         self._maps.forget(live.id)
         async with live.database.writing() as session:
             await _delete(session, live.id)
-        self._left.pop(live.id, None)
-        self._seen.discard(live.id)
-        if self._live.pop(live.id, None) is not None:
-            live.abandon("the mission was deleted")
-        if self._ownership is not None:
-            await self._ownership.release([live.id])
+        await self._put_away(live, "the mission was deleted")
 
     async def delete_unreadable(self, mission_id: str) -> None:
         """Remove a mission that cannot be opened, whatever its state: nobody could end it. Raises ConflictError.

@@ -119,7 +119,7 @@ class Corrections:
             statement = f"instantaneous water level (tide: {source}{sound})"
             return VerticalDatum(INSTANTANEOUS_WATER_LEVEL, statement)
         if self.table is None:
-            how = f"level {tide.level_m:+.2f} m (tide: {source}"
+            how = f"level {tide.level_m:+.2f} m (tide: {'source not stated' if tide.is_unnamed else source}"
         else:
             named = "" if tide.is_unnamed else f", {source}"
             how = f"tide table {printable(self.table.name)} (sha256 {self.table.digest[:12]}{named}"

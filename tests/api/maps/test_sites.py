@@ -237,6 +237,26 @@ async def test_surveys_below_another_datum_are_not_mixed(client: httpx.AsyncClie
     assert (await client.get(f"/sites/{site}/changes")).status_code == 200
 
 
+async def test_a_mission_that_begins_with_depths_below_another_datum_is_told_so(client: httpx.AsyncClient) -> None:
+    site = await new_site(client)
+    first = await surveyed(client, site, START_S)
+    tide = {"level_m": 1.0, "source": "gauge"}
+    assert (await client.put(f"/missions/{first}/tide", json=tide)).status_code == 200
+    second = await new_mission(client, site)
+    (prior,) = await get(client, f"/missions/{second}/imports")
+    assert [note for note in prior["notes"] if "below another datum" in note and "EPSG:5861" in note]
+    told = (await client.get(f"/missions/{second}/events", headers={"Accept": "application/json"})).json()
+    assert [line for line in told if "below another datum" in line["message"] and line["level"] == "warning"]
+
+    third = await new_mission(client, site, tide=tide)
+    (prior,) = await get(client, f"/missions/{third}/imports")
+    assert not [note for note in prior["notes"] if "datum" in note]
+    assert (await client.put(f"/missions/{second}/tide", json=tide)).status_code == 200
+    assert (await client.put(f"/missions/{second}/site", json={"site": site})).status_code == 200
+    (prior,) = await get(client, f"/missions/{second}/imports")
+    assert not [note for note in prior["notes"] if "datum" in note]
+
+
 async def test_a_mission_may_begin_without_the_depths_of_its_site_or_join_it_later(client: httpx.AsyncClient) -> None:
     site = await new_site(client)
     old = await surveyed(client, None, START_S)

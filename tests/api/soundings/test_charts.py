@@ -7,6 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.mapping.readers.enc import HAZARDS
 from tests.support.api.rest import mission_spec
 from tests.support.mapping.enc import Cell
 from tests.support.missions.specs import AREA
@@ -27,6 +28,8 @@ async def cell(tmp_path: Path) -> bytes:
     made.soundings([(WEST + 1e-4 * i, SOUTH + 1e-4 * i, 9.0 + i) for i in range(4)])
     made.point("UWTROC", (WEST + 2e-4, SOUTH + 2e-4), VALSOU=1.5, OBJNAM="<b>Rock</b>")
     made.area("LNDARE", square(WEST - 0.005, SOUTH - 0.005, 0.005), OBJNAM="Quay")
+    for kind in set(HAZARDS) - {"UWTROC", "LNDARE"}:
+        made.area(kind, square(WEST, SOUTH, 1e-4))
     return await asyncio.to_thread(made.write, tmp_path / "cell.000")
 
 
@@ -50,7 +53,8 @@ async def test_zones_are_proposed_and_nothing_changes(
     answer = await client.post("/chart-zones", content=cell, params=ENDS | {"margin_m": 2.0})
     assert answer.status_code == 200, answer.text
     zones = {zone["object"]: zone for zone in answer.json()["zones"]}
-    assert set(zones) == {"UWTROC", "LNDARE"}
+    assert set(zones) == set(HAZARDS)
+    assert all(zone["reason"] for zone in zones.values())
     rock = zones["UWTROC"]
     assert (rock["reason"], rock["depth_m"], rock["position_m"], rock["name"]) == ("rock", 1.5, 5.0, "<b>Rock</b>")
     assert (await client.get("/missions")).json() == before

@@ -57,6 +57,10 @@ async def test_a_tide_set_afterwards_corrects_what_was_measured_before(client: h
     (one, *_) = await rows(client, path)
     assert float(one["depth_m"]) == pytest.approx(float(one["raw_depth_m"]) - 0.5 + 2.0)
     assert (await client.get(f"{path}/quality")).json()["common_sd_m"] == 0.1
+    said = (await client.get(f"{path}/map")).json()["vertical_datum"]
+    assert said == "EPSG:5715 MSL depth, by level +0.50 m (tide: source not stated; datum offset +2.000 m)"
+    report = (await client.get(f"{path}/report.html")).text
+    assert "none applied</" not in report.partition("Sound speed")[0]
 
 
 async def test_soundings_are_corrected_and_written_piece_by_piece(

@@ -58,6 +58,19 @@ async def test_pings_are_accepted_beside_soundings_and_stored_once(client: httpx
     assert "bathyfleet_beams_total" in metrics
 
 
+async def test_files_of_soundings_say_that_beams_are_elsewhere(client: httpx.AsyncClient, path: str) -> None:
+    await post(client, path, [soundings(1, "plain")[0]])
+    for file in ("csv", "xyz"):
+        assert "pings" not in (await client.get(f"{path}/soundings.{file}")).text
+    await post(client, path, [posted_ping(0), posted_ping(1)])
+    for file in ("csv", "xyz"):
+        lines = (await client.get(f"{path}/soundings.{file}")).text.splitlines()
+        [told] = [line for line in lines if "pings" in line]
+        assert told.startswith("#")
+        assert "the beams of 2 pings of swath sonars are not among these: see pings" in told
+        assert len([line for line in lines if not line.startswith("#")]) == (2 if file == "csv" else 1)
+
+
 async def test_a_batch_whose_answer_was_lost_is_answered_again(client: httpx.AsyncClient, path: str) -> None:
     items = [posted_ping(number) for number in range(20)]
     key = {"Idempotency-Key": "line-1"}

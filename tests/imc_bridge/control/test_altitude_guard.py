@@ -97,6 +97,32 @@ def test_shoal_on_the_way_that_another_vehicle_has_found_counts_at_once() -> Non
     assert limit(guard, 15.0, towards=[east(60), east(130)]).depth_m == 5.0
 
 
+@pytest.mark.parametrize("lat", [0.0, 41.185, -33.9, 60.4, 78.2])
+@pytest.mark.parametrize("first", [None, (0.0, 0.0), (80.0, 10.0)])
+def test_a_corridor_is_as_wide_wherever_the_first_sounding_was(lat: float, first: tuple[float, float] | None) -> None:
+    east_m, north_m, lon = 1.0 / (111_194.9 * math.cos(math.radians(lat))), 1.0 / 111_194.9, 151.3
+    seabed = Seabed()
+    if first is not None:
+        seabed.add(0.0, *first, 30.0)
+    for _ in range(2):
+        seabed.add(0.0, lat, lon, 8.0)
+    for off_m, found in ((9.0, 8.0), (-9.0, 8.0), (21.0, None), (-21.0, None)):
+        along = [(lat + north * north_m, lon + off_m * east_m) for north in (-50.0, 50.0)]
+        assert seabed.shallowest(0.0, along[0], along[1], 10.0) == found
+        across = [(lat + off_m * north_m, lon + east * east_m) for east in (-50.0, 50.0)]
+        assert seabed.shallowest(0.0, across[0], across[1], 10.0) == found
+
+
+def test_a_lonely_echo_is_confirmed_by_one_in_the_next_row() -> None:
+    for lat in (-60.4, 41.185, 78.2):
+        for east in range(12):
+            east_m, lon = 1.0 / (111_194.9 * math.cos(math.radians(lat))), 179.0
+            seabed, place = Seabed(), (lat, lon + east * east_m)
+            seabed.add(0.0, *place, 4.0)
+            seabed.add(0.0, lat + 5.0 / 111_194.9, place[1], 5.0)
+            assert seabed.shallowest(0.0, place, place, 10.0) == 4.0
+
+
 def test_one_false_echo_ahead_does_not_count_and_a_second_one_beside_it_does() -> None:
     guard = guard_over(*[20.0] * 10)
     guard._seabed.add(0.0, *east(60), 4.0)

@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.readers.enc import NO_ZONE_POSITION_M, ZONES_OF_CONFIDENCE, Zone, read_enc, read_zones
+from app.mapping.readers.enc import HAZARDS, NO_ZONE_POSITION_M, ZONES_OF_CONFIDENCE, Zone, read_enc, read_zones
 from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_soundings
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.readers.warm_up import SMALL_CELL, SMALL_CELL_AT
 from app.mapping.s44 import NORMAL_95
 from app.mapping.types import Grid
+from app.missions.operations.imports.imports import REASONS
 from tests.support.mapping.enc import Cell
 
 LAT, LON = 41.18, -8.70
@@ -76,6 +77,31 @@ def test_what_nobody_stated_has_to_be_said(tmp_path: Path, quality: dict[str, in
     assert place_soundings(found, ReadOptions(sd_m=1.5), PLACE).soundings.sd_m == pytest.approx([1.5])
 
 
+@pytest.mark.parametrize(
+    ("quality", "found_m", "stated"),
+    [
+        ([5], [], 0),
+        ([2], [], 0),
+        ([7], [], 0),
+        ([8, 3], [50.0], 0),
+        ([4], [50.0], 0),
+        ([9], [50.0], 0),
+        ([6], [50.0], 1),
+    ],
+)
+def test_soundings_that_met_no_bottom_are_none_and_doubtful_ones_state_no_quality(
+    quality: list[int], found_m: list[float], stated: int, tmp_path: Path
+) -> None:
+    cell = Cell()
+    cell.area("M_QUAL", square(-500, -500, 1000), CATZOC=2)
+    cell.soundings(deep((0, 0, 10.0)))
+    cell.soundings(deep((100, 0, 50.0)), QUASOU=quality)
+    found = read_enc(cell.write(tmp_path / "cell.000"))
+    assert sorted(found.z.tolist()) == [10.0, *found_m]
+    assert np.isfinite(found.sd_m).sum() == 1 + stated
+    assert [note.split()[0] for note in found.notes] == ([] if found_m else ["1"])
+
+
 def test_depth_areas_are_no_soundings(tmp_path: Path) -> None:
     cell = Cell()
     cell.area("DEPARE", square(-100, -100, 200), DRVAL1=5.0, DRVAL2=10.0)
@@ -104,6 +130,35 @@ def test_dangers_are_proposed_as_large_as_their_place_is_uncertain(tmp_path: Pat
     assert named["LNDARE"].depth_m is None
     assert local(named["RESARE"]).bounds == pytest.approx((190, 190, 310, 310), abs=1.5)
     assert zones[0].kind == "WRECKS", "the nearest first"
+
+
+def test_what_people_built_or_moored_is_proposed_where_it_is_charted(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.area("M_QUAL", square(-500, -500, 1000), CATZOC=4)
+    cell.area("MARCUL", square(-400, -400, 50), OBJNAM="Mussel farm")
+    cell.area("PONTON", square(-200, -400, 50))
+    cell.line("SLCONS", [at(0, -400), at(60, -400)], OBJNAM="Jetty")
+    cell.line("FSHFAC", [at(0, -200), at(60, -200)])
+    for east, kind in enumerate(("OFSPLF", "PILPNT", "MORFAC")):
+        cell.point(kind, at(100 * east, 100))
+    zones, _ = read_zones(cell.write(tmp_path / "cell.000"), PLACE, 10.0)
+    named = {zone.kind: zone for zone in zones}
+    assert set(named) == {"MARCUL", "PONTON", "SLCONS", "FSHFAC", "OFSPLF", "PILPNT", "MORFAC"}
+    assert {zone.position_m for zone in zones} == {0.0}
+    assert local(named["MARCUL"]).bounds == pytest.approx((-410, -410, -340, -340), abs=1.5)
+    assert local(named["SLCONS"]).bounds == pytest.approx((-10, -410, 70, -390), abs=1.5)
+    assert set(REASONS) == set(HAZARDS)
+
+
+def test_water_that_land_encloses_stays_free(tmp_path: Path) -> None:
+    cell = Cell()
+    around = square(-450, -450, 900)
+    slit = [(-450, 1), (-100, 1), (-100, 100), (100, 100), (100, -100), (-100, -100), (-100, -1), (-450, -1)]
+    cell.area("LNDARE", [*around, *(at(*place) for place in slit)])
+    zones, _ = read_zones(cell.write(tmp_path / "cell.000"), PLACE, 10.0)
+    land = shapely.union_all([local(zone) for zone in zones])
+    assert land.symmetric_difference(shapely.box(-460, -460, 460, 460) - shapely.box(-90, -90, 90, 90)).area < 2000.0
+    assert not land.contains(shapely.Point(0, 0))
 
 
 def test_a_chart_that_states_no_quality_says_so(tmp_path: Path) -> None:

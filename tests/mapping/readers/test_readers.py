@@ -121,6 +121,22 @@ def test_a_grid_in_another_projection_is_placed_whatever_its_cells(cell_m: float
     assert any("averaged" in note for note in found.notes) == (cell_m < 2.0)
 
 
+@pytest.mark.parametrize("epsg", [20790, 4803], ids=["Portuguese National Grid", "degrees"])
+def test_a_grid_whose_longitudes_begin_at_lisbon_lies_where_it_should(epsg: int) -> None:
+    crs = pyproj.CRS.from_epsg(epsg)
+    to_file = pyproj.Transformer.from_crs(FRAME.crs, crs, always_xy=True)
+    west, south = to_file.transform(-20.0, -20.0)
+    cell = 0.5 if crs.is_projected else 5e-6
+    x, y = west + cell * (np.arange(400) + 0.5), south + cell * (np.arange(400) + 0.5)
+    across, up = np.meshgrid(x, y)
+    z = depth_at(*to_file.transform(across, up, direction="INVERSE"))
+    grid = Raster(z, np.full(z.shape, 0.1), Affine(cell, 0, west, 0, cell, south), crs, "down")
+    s = place_soundings(grid, ReadOptions(), PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
+    sampled, _ = place_reference(grid, ReadOptions(), PLACE)
+    np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.05)
+
+
 def test_what_a_file_does_not_say_has_to_be_said(tmp_path: Path) -> None:
     write_grid(path := tmp_path / "a.asc", 4.0, None)
     path.with_suffix(".prj").unlink(missing_ok=True)
@@ -197,6 +213,49 @@ def test_depths_in_netcdf_have_the_unit_that_they_state(unit: str, metres: float
     s = place_soundings(read_path(path), ReadOptions(crs="local"), PLACE).soundings
     np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m))
     np.testing.assert_allclose(s.sd_m, 0.01 * s.depth_m)
+
+
+@pytest.mark.parametrize(
+    ("unit", "crs", "metres"),
+    [
+        ("km", UTM, 1000.0),
+        ("km", None, 1000.0),
+        ("m", UTM, 1.0),
+        ("feet", UTM, 0.3048),
+        ("km", pyproj.CRS.from_epsg(2264), 1000.0),
+        ("feet", pyproj.CRS.from_epsg(2264), 1200 / 3937),
+        ("none that is known", UTM, 1.0),
+    ],
+)
+@pytest.mark.parametrize("cell_m", [0.5, 5.0])
+def test_axes_in_netcdf_have_the_unit_that_they_state(
+    unit: str, crs: pyproj.CRS | None, metres: float, cell_m: float, tmp_path: Path
+) -> None:
+    frame = FRAME if crs is None or crs == UTM else LocalFrame(34.2, -77.9)
+    to_file = pyproj.Transformer.from_crs(frame.crs, crs or UTM, always_xy=True)
+    factor = (crs or UTM).axis_info[0].unit_conversion_factor
+    west, south = to_file.transform(-20.0, -20.0)
+    number = cell_m * np.arange(int(100 / cell_m)) / factor
+    x, y = west + number, south + number
+    across, up = np.meshgrid(x, y)
+    east, north = to_file.transform(across, up, direction="INVERSE")
+    with netCDF4.Dataset(path := tmp_path / "a.nc", "w") as file:
+        for name, values in (("y", y), ("x", x)):
+            file.createDimension(name, len(values))
+            axis = file.createVariable(name, "f8", (name,))
+            axis.units = unit
+            axis[:] = values * factor / metres
+        depth = file.createVariable("depth", "f8", ("y", "x"))
+        depth[:] = depth_at(east, north)
+        if crs is not None:
+            depth.grid_mapping = "crs"
+            file.createVariable("crs", "i4").crs_wkt = crs.to_wkt()
+    place = MapExtent(frame, GRID, margin_m=6.0)
+    options = ReadOptions(sd_m=0.3, crs=None if crs else "EPSG:32629")
+    s = place_soundings(read_path(path), options, place).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
+    sampled, _ = place_reference(read_path(path), options, place)
+    np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.05)
 
 
 def test_a_unit_that_is_none_of_length_is_refused(tmp_path: Path) -> None:

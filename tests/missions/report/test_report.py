@@ -28,6 +28,7 @@ from app.missions.report.sections.maps import MOST_HOLIDAYS
 from app.missions.report.texts import Language, Texts
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
+from app.missions.spec.vehicle import VehicleSpec
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.harbour import Harbour, act, sim_spec
 from tests.support.missions.searches import search_spec
@@ -77,6 +78,17 @@ async def test_what_there_is_no_room_for_is_counted(harbour: Harbour, live: Live
     assert "250 more are not listed." in page
     printed = text_of(pdf(document))
     assert "400 more are in holidays.geojson." in printed.replace("\r\n", " ")
+
+
+async def test_the_sonar_of_a_vehicle_that_joined_later_is_not_said_to_be_the_usual_one(
+    harbour: Harbour, live: LiveMission
+) -> None:
+    sonar = {"name": "later", "kind": "rest", "sensor": "multibeam", "sonar": {"aperture_deg": 60}}
+    await harbour.service.team_changes.join(live, VehicleSpec.model_validate(sonar), actor="operator")
+    answers = await harbour.service.reports.answers(live)
+    page = html(contents.document_of(answers, Texts(Language.PT))).decode()
+    assert "later" in page
+    assert "predefinido" not in page
 
 
 async def test_letters_of_other_languages_stay_and_marks_that_turn_the_writing_are_shown(

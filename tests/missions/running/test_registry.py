@@ -11,11 +11,13 @@ from app.missions.errors import (
     MissionNotFoundError,
     MissionUnreadableError,
 )
+from app.missions.running import registry
 from app.missions.service import MissionService
 from app.missions.spec.base import PolygonGeometry
 from app.storage.database import Database
 from app.storage.models import MissionRow, StepRow
-from tests.support.missions.harbour import Harbour, sim_spec
+from app.storage.upkeep.retention import remove
+from tests.support.missions.harbour import Harbour, act, sim_spec
 
 FAR = PolygonGeometry.model_validate({"coordinates": [[[8, 41], [8, 42], [9, 42], [8, 41]]]})
 """A zone that no description is allowed to have."""
@@ -62,6 +64,22 @@ async def test_nobody_finds_a_mission_that_was_deleted(service: MissionService) 
     await service.delete_stored(mission_id)
     with pytest.raises(MissionNotFoundError):
         await service.check_exists(mission_id)
+
+
+async def test_a_mission_that_was_pruned_beside_the_service_is_gone_from_memory_too(
+    harbour: Harbour, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "LOOKED_AT_EVERY_S", 0.0)
+    service = harbour.service
+    pruned, kept = [(await service.create(sim_spec(name))).id for name in ("a", "b")]
+    for mission_id in (pruned, kept):
+        await act(service, mission_id, "abort")
+    assert await remove(database, pruned, -1.0)
+    with pytest.raises(MissionNotFoundError):
+        await service.get(pruned)
+    with pytest.raises(MissionNotFoundError):
+        await service.check_exists(pruned)
+    assert (await service.get(kept)).id == kept
 
 
 async def test_what_cannot_be_opened_is_not_stored(service: MissionService) -> None:

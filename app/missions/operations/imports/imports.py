@@ -52,6 +52,17 @@ REASONS = {
     "WRECKS": "wreck",
     "UWTROC": "rock",
     "RESARE": "restricted area",
+    "SLCONS": "shoreline construction",
+    "PONTON": "pontoon",
+    "PILPNT": "pile",
+    "OFSPLF": "offshore platform",
+    "MORFAC": "mooring",
+    "MARCUL": "marine farm",
+    "FSHFAC": "fishing facility",
+    "HULKES": "hulk",
+    "FLODOC": "floating dock",
+    "DAMCON": "dam",
+    "GATCON": "gate",
 }
 """What objects of charts are, in words."""
 
@@ -170,7 +181,7 @@ class Imports:
             kept, merged = await live.in_thread(_kept, live, depths)
             notes = [f"{merged} depths were merged per cell of the map"] if merged else []
             row = await asyncio.to_thread(_row_of_site, live, kept, len(depths), dict(described or {}), notes)
-            if [one.digest for one in known] == [row.digest]:
+            if [(one.digest, one.summary["notes"]) for one in known] == [(row.digest, row.summary["notes"])]:
                 return
         if row is None and not known:
             return

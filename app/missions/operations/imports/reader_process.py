@@ -57,7 +57,12 @@ class _Zone(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    kind: Literal["LNDARE", "OBSTRN", "WRECKS", "UWTROC", "RESARE"]
+    # fmt: off
+    kind: Literal[
+        "LNDARE", "OBSTRN", "WRECKS", "UWTROC", "RESARE", "SLCONS", "PONTON", "PILPNT", "OFSPLF", "MORFAC", "MARCUL",
+        "FSHFAC", "HULKES", "FLODOC", "DAMCON", "GATCON",
+    ]
+    # fmt: on
     name: Annotated[str, Field(max_length=60)]
     depth_m: Annotated[float, Field(ge=MIN_DEPTH_M, le=MAX_DEPTH_M)] | None
     position_m: Annotated[float, Field(ge=0, le=1000)]

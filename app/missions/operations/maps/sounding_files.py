@@ -26,7 +26,7 @@ RAW = ("lon_deg", "lat_deg", "raw_depth_m", "sd_m", "time_s", "position_sd_m")
 async def all_lines(live: LiveMission) -> FileContent:
     """Return every sounding, rejected ones included, as CSV."""
     await live.journal.flush()
-    content = FileContent(header_line(live.facts.vertical_datum.statement))
+    content = FileContent(header_line(live.facts.vertical_datum.statement, _left_out(live)))
     query = sounding_queries.columns_query(live.id, COLUMNS)
     await read_in_pieces(live.database, query, lambda rows: content.add(sounding_lines(rows)))
     return content
@@ -35,19 +35,27 @@ async def all_lines(live: LiveMission) -> FileContent:
 async def accepted_xyz(live: LiveMission) -> FileContent:
     """Return the accepted soundings as XYZ text: longitude, latitude, depth, deviation."""
     await live.journal.flush()
-    content, facts = FileContent(), live.facts
+    facts, left_out = live.facts, _left_out(live)
+    content = FileContent(f"# {left_out}\n".encode() if left_out else b"")
+    begin_bytes = content.size_bytes
 
     def take(rows: FloatArray) -> None:
         soundings = Soundings.of_rows(rows[:, :4])
         datum = facts.vertical_datum.statement
         text = soundings_xyz(
-            soundings, facts.frame, vertical_datum=datum, geographic=True, headed=not content.size_bytes
+            soundings, facts.frame, vertical_datum=datum, geographic=True, headed=content.size_bytes == begin_bytes
         )
         content.add(text)
 
     take(np.zeros((0, 5)))  # the header, also where nothing was accepted
     await read_numbers(live.database, sounding_queries.accepted_query(live.id), take)
     return content
+
+
+def _left_out(live: LiveMission) -> str:
+    """Return what of a mission's measurements is in no file of soundings; empty: nothing."""
+    pings = live.journal.counts.pings
+    return f"the beams of {pings} pings of swath sonars are not among these: see pings" if pings else ""
 
 
 async def crowdsourced(live: LiveMission, provider: Provider | None, vehicle: str) -> FileContent:

@@ -1,7 +1,10 @@
 """What soundings were corrected by, and what was taken in from elsewhere."""
 
+from app.missions.report.answers import Answers
 from app.missions.report.document import Block, Facts, Paragraph, Table, Text
+from app.missions.report.texts import NONE
 from app.missions.report.writer import Writer
+from app.missions.spec.water import Tide
 
 
 def _adjustment(w: Writer) -> list[tuple[str, Text]]:
@@ -35,6 +38,12 @@ def _offsets(w: Writer) -> Table:
     return Table(columns, rows, numbers=(1, 2, 3), caption=w.t("caption_offsets"))
 
 
+def _is_unnamed(answers: Answers) -> bool:
+    """Whether a water level was applied of which nobody said where it comes from."""
+    tide = Tide.model_validate(answers.at("corrections.tide"))
+    return tide.is_unnamed and (tide.is_applied or answers.at("corrections.tide_table") is not None)
+
+
 def corrections(w: Writer) -> list[Block]:
     """Return water level, sound speed, systematic errors, the adjustment of tracks, and imports."""
     t, answers = w.t, w.answers
@@ -52,7 +61,7 @@ def corrections(w: Writer) -> list[Block]:
     else:
         facts.append((t("fact_tide_level"), w.number(f"{tide}.level_m", 2, "m", signed=True)))
     facts += [
-        (t("fact_tide_source"), w.string(f"{tide}.source")),
+        (t("fact_tide_source"), NONE if _is_unnamed(answers) else w.string(f"{tide}.source")),
         (t("fact_tide_sd"), w.number(f"{tide}.sd_m", 2, "m")),
         (t("fact_datum"), w.string("corrections.vertical_datum")),
         (t("fact_datum_offset"), w.number(f"{tide}.datum_offset_m", 2, "m", signed=True)),

@@ -4,6 +4,7 @@ import numpy as np
 
 from app.missions.report.charts import overview
 from app.missions.report.document import SVG, Block, Facts, Figure, Paragraph, Shown, Table, Text
+from app.missions.report.texts import NONE
 from app.missions.report.writer import Writer
 from app.missions.states import ENDED
 
@@ -159,9 +160,11 @@ def vehicles(w: Writer) -> list[Block]:
         if vehicle["sensor"] == "multibeam":
             sonar = None if place is None else f"mission.spec.vehicles.{place}.sonar"
             known = sonar is not None and answers.at(sonar) is not None
+            # Nothing tells the sonar of a vehicle that joined later.
+            otherwise = NONE if place is None else t("usual")
             columns = (("aperture_deg", 0, "°"), ("beams", 0, ""), ("rate_hz", 1, "Hz"), ("range_m", 0, "m"))
             cells: list[Text] = [
-                w.number(f"{sonar}.{field}", decimals, unit) if known else t("usual")
+                w.number(f"{sonar}.{field}", decimals, unit) if known else otherwise
                 for field, decimals, unit in columns
             ]
             sonars.append([w.string(f"{own}.name"), *cells])

@@ -10,13 +10,14 @@ from app.missions.views.base import View
 
 
 class TideCorrection(Tide):
-    """A mission's tide: a constant level, or a table of high and low waters in its place."""
+    """A mission's tide: a constant level, or a table of high and low waters or observed levels in its place."""
 
     table: str | None = Field(
         default=None,
         max_length=8_000_000,
-        description="Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels "
-        "between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m",
+        description="Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water, or per "
+        "observed level. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings "
+        "beyond the table, or in a gap of it, are rejected until a table covers them. Null: level_m",
     )
     table_name: str = Field(default="", max_length=200, description="Its name; default: the harbour that it states")
 

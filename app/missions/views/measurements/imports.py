@@ -62,7 +62,7 @@ class ZoneOptions(BaseModel):
 class ProposedZoneView(View):
     """What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it."""
 
-    object: str = Field(description="The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE")
+    object: str = Field(description="The chart's class, as LNDARE, OBSTRN, RESARE or PONTON")
     reason: str = Field(description="What it is, in words")
     name: str = Field(description="What the chart calls it; it may be empty")
     depth_m: float | None = Field(description="Least depth over it, as charted; null: not known")

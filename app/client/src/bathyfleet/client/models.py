@@ -1463,7 +1463,7 @@ class ProposedZoneView(Model):
     """What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it."""
 
     object: str
-    """The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE"""
+    """The chart's class, as LNDARE, OBSTRN, RESARE or PONTON"""
     reason: str
     """What it is, in words"""
     name: str
@@ -2198,7 +2198,7 @@ class Tide(Model):
 
 
 class TideCorrection(Model):
-    """A mission's tide: a constant level, or a table of high and low waters in its place."""
+    """A mission's tide: a constant level, or a table of high and low waters or observed levels in its place."""
 
     level_m: float = 0.0
     """Water level above the zero of the tide gauge or table (chart datum), metres"""
@@ -2213,8 +2213,9 @@ class TideCorrection(Model):
     datum_offset_m: float = 0.0
     """How far that datum lies above the zero that levels count from; added to every depth"""
     table: str | None = None
-    """Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels between two
-    are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m
+    """Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water, or per observed
+    level. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings beyond the
+    table, or in a gap of it, are rejected until a table covers them. Null: level_m
     """
     table_name: str = ""
     """Its name; default: the harbour that it states"""

@@ -5092,7 +5092,7 @@ export interface components {
         ProposedZoneView: {
             /**
              * Object
-             * @description The chart's class: LNDARE, OBSTRN, WRECKS, UWTROC or RESARE
+             * @description The chart's class, as LNDARE, OBSTRN, RESARE or PONTON
              */
             object: string;
             /**
@@ -6726,7 +6726,7 @@ export interface components {
         };
         /**
          * TideCorrection
-         * @description A mission's tide: a constant level, or a table of high and low waters in its place.
+         * @description A mission's tide: a constant level, or a table of high and low waters or observed levels in its place.
          */
         TideCorrection: {
             /**
@@ -6761,7 +6761,7 @@ export interface components {
             datum_offset_m: number;
             /**
              * Table
-             * @description Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water. Levels between two are a half cosine; soundings beyond the table are rejected until it covers them. Null: level_m
+             * @description Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water, or per observed level. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings beyond the table, or in a gap of it, are rejected until a table covers them. Null: level_m
              */
             table?: string | null;
             /**
