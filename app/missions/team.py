@@ -133,6 +133,8 @@ class Member:
     """What its swath sonar saw last."""
     heard_s: float | None = None
     """When that was, Unix seconds by the service's clock."""
+    clock_ahead_s: float | None = None
+    """By how much its clock was ahead of ours at most, its seconds; None: not known yet."""
     stored_battery_pct: float | None = None
     """What its battery held when another process heard it last."""
     flown: Flown = field(default_factory=Flown)
@@ -323,6 +325,7 @@ class Team:
         member = Member(spec, slot, self.capabilities_of(spec.kind), energy=self.energy_of(spec))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
+            member.clock_ahead_s = before.clock_ahead_s
             member.stored_battery_pct = before.stored_battery_pct
             member.legs, member.committed_m, member.spared = before.legs, before.committed_m, before.spared
             member.flown, member.late_m = before.flown, before.late_m

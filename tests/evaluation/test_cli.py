@@ -54,6 +54,13 @@ def test_several_runs_print_runs_and_a_summary(terrain: Terrain) -> None:
     assert spread["min"] <= spread["mean"] <= spread["max"]
 
 
+def test_where_there_is_little_room_no_name_of_a_column_is_cut_off(terrain: Terrain) -> None:
+    few = ("--terrain", terrain, "--landmarks", "20", "--steps", "2", "--planner", "random")
+    result = CliRunner().invoke(evaluate_app, ["explore", *few], env={"COLUMNS": "60"})
+    assert result.exit_code == 0
+    assert "…" not in result.stdout
+
+
 def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain: Terrain) -> None:
     arguments = ("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "3", "--planner", "random,lawnmower",
                  "--seeds", "0:2", "--json")  # fmt: skip

@@ -331,7 +331,7 @@ def _fields_at(annotation: object, path: Sequence[str | int]) -> set[str]:
         return set().union(*(_fields_at(branch, path) for branch in get_args(annotation)))
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if not path:
-            return set(annotation.model_fields)
+            return {field.alias or name for name, field in annotation.model_fields.items()}
         field = annotation.model_fields.get(str(path[0]))
         return _fields_at(field.annotation, path[1:]) if field else set()
     if path and isinstance(path[0], int) and get_args(annotation):

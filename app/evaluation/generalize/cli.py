@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import orjson
 import typer
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from app.evaluation.generalize.tasks import TASKS, FloorJob
 from app.evaluation.runs.cluster import ClusterError
@@ -63,7 +63,7 @@ def generalize(
     if as_json:
         typer.echo(orjson.dumps(told).decode())
         return
-    table = Table(*COLUMNS)
+    table = Table(*(Column(name, overflow="fold") for name in COLUMNS))
     for name, of in told.items():
         figures = (f"{of[column]:.3g}" for column in ("mean", "ci95", "greatest"))
         table.add_row(name, str(of["floors"]), *figures, f"{of['kept']} of {of['floors']}", of["worst"][0]["floor"])

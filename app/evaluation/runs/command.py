@@ -10,7 +10,7 @@ import typer
 from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
+from rich.table import Column, Table
 
 from app.evaluation.runs.cluster import ClusterError
 from app.evaluation.runs.jobs import Job, run_jobs
@@ -77,7 +77,8 @@ def compare(
         document = runs[0] if single else {"runs": runs, "summary": summarise(runs)}
         typer.echo(orjson.dumps(document).decode())
         return
-    table = Table(*columns)
+    # Where there is little room a name takes more lines: cut off, several would read the same.
+    table = Table(*(Column(name, overflow="fold") for name in columns))
     for row in runs:
         table.add_row(*(f"{row[c]:.3g}" if isinstance(row[c], float) else str(row[c]) for c in columns))
     Console().print(table)

@@ -21,6 +21,8 @@ from app.missions.alarms.message import Message
 PATIENCE_S = 15.0
 """An attempt that takes longer has failed."""
 LONGEST_ERROR = 300
+MOST_MAILED = 1000
+"""E-mails of which is known who has them; of others all are written to again."""
 
 
 class DeliveryError(Exception):
@@ -47,6 +49,8 @@ class Channels:
         self._client: httpx.AsyncClient | None = None
         self._trust: ssl.SSLContext | None = None
         self._opening = asyncio.Lock()
+        self._mailed: dict[str, set[str]] = {}
+        """Addresses that have a message, by its id, while the mail server refuses others."""
 
     async def send(self, recipient: str, message: Message, at: datetime) -> None:
         """Make one attempt. Raises DeliveryError."""
@@ -95,10 +99,12 @@ class Channels:
     async def _mail(self, people: MailRecipient, message: Message, at: datetime) -> None:
         server = self._settings.smtp
         trust = None if server.security == "none" else await self._context()
+        have_it = self._mailed.get(message.id, set())
+        left = [address for address in people.to if address not in have_it]
         refused, _ = await aiosmtplib.send(
             message.email(server.sender, people.to, at),
             sender=server.sender,
-            recipients=list(people.to),
+            recipients=left,
             hostname=server.host,
             port=server.port,
             username=server.user or None,
@@ -110,8 +116,15 @@ class Channels:
             tls_context=trust,
             timeout=PATIENCE_S,
         )
-        if len(refused) == len(people.to):
-            raise DeliveryError("the mail server refused every address")
+        if not refused:
+            self._mailed.pop(message.id, None)
+            return
+        while len(self._mailed) >= MOST_MAILED:
+            self._mailed.pop(next(iter(self._mailed)))
+        self._mailed[message.id] = have_it | set(left) - set(refused)
+        # Who has it is not written to again; whoever is to be told and was not is tried until told.
+        answers = "; ".join(f"{address}: {answer.code} {answer.message}" for address, answer in refused.items())
+        raise DeliveryError(f"the mail server refused {' '.join(answers.split())}"[:LONGEST_ERROR])
 
     async def _publish(self, topic: Topic, message: Message, at: datetime) -> None:
         broker = self._settings.mqtt

@@ -160,6 +160,7 @@ class LiveMission:
             self.boundaries,
             self.waypoints,
             self.changed,
+            time_scale,
         )
         self._measured_late: Callable[[], None] = _nothing
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)

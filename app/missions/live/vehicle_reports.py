@@ -44,6 +44,8 @@ SURFACE_M = 0.7
 """Who is not deeper can receive satellites."""
 LONGEST_SILENCE_S = 6 * 3600.0
 """A vehicle was under way, surveyed and used energy, in a silence that was not longer."""
+CLOCK_SET_S = 60.0
+"""A vehicle's clock that gets farther ahead of ours than ever by more than that was set forward."""
 PACE_MEMORY = 0.9
 """Weight of the past in the running mean of a leg's duration."""
 
@@ -64,6 +66,7 @@ class VehicleReports:
         boundaries: Boundaries,
         waypoints: WaypointViews,
         changed: asyncio.Event,
+        time_scale: float,
     ) -> None:
         self._mission_id = mission_id
         self._frame = frame
@@ -74,6 +77,7 @@ class VehicleReports:
         self._boundaries = boundaries
         self._waypoints = waypoints
         self._changed = changed
+        self._time_scale = time_scale
         self.leg_s: float | None = None
         """How long a leg takes, running mean on the wall clock."""
 
@@ -92,10 +96,11 @@ class VehicleReports:
                 if place is None:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
+                passed_s = self._passed_s(member, event)
                 if running:
-                    self._count_time(member, event, spec, standing=standing)
-                    self._count_way(member, event, place, spec)
-                self._count_energy(member, event, spec.surface_policy)
+                    self._count_time(member, passed_s, spec, standing=standing)
+                    self._count_way(member, passed_s, place, spec)
+                self._count_energy(member, event, passed_s, spec.surface_policy)
                 member.report, member.heard_s = event, now().timestamp()
                 if running and member.flown.phase is Phase.SURVEY:
                     member.count_late(spec, self._frame)
@@ -130,14 +135,27 @@ class VehicleReports:
                 self._receive_waypoint(member, event)
         self._changed.set()
 
-    def _count_time(self, member: Member, report: VehicleReport, spec: MissionSpec, *, standing: bool) -> None:
+    def _passed_s(self, member: Member, report: VehicleReport) -> float:
+        """Return how much time has passed for a vehicle since its last report, without what its clock was set by.
+
+        What comes late, after a silence, is behind our clock and catches up with it: its clock was not set.
+        """
+        passed_s = 0.0 if member.report is None else report.time_s - member.report.time_s
+        ahead_s, most_s = report.time_s - self._time_scale * now().timestamp(), member.clock_ahead_s
+        if most_s is None or passed_s < 0.0:
+            member.clock_ahead_s = ahead_s
+            return passed_s
+        member.clock_ahead_s = max(ahead_s, most_s)
+        was_set = ahead_s > most_s + CLOCK_SET_S and not member.capabilities.simulated
+        return max(passed_s - (ahead_s - most_s), 0.0) if was_set else passed_s
+
+    def _count_time(self, member: Member, passed_s: float, spec: MissionSpec, *, standing: bool) -> None:
         """Note what a vehicle is at, and count how long it has surveyed since its last report."""
         member.flown.phase = self._phase(member, member.way_left_m(spec))
-        passed_s = 0.0 if member.report is None else report.time_s - member.report.time_s
         if member.flown.phase is Phase.SURVEY and 0.0 < passed_s <= LONGEST_SILENCE_S and not standing:
             member.flown.survey_s += passed_s
 
-    def _count_way(self, member: Member, report: VehicleReport, place: tuple[float, float], spec: MissionSpec) -> None:
+    def _count_way(self, member: Member, passed_s: float, place: tuple[float, float], spec: MissionSpec) -> None:
         """Add what a vehicle has flown since its last report, if that can have been."""
         flown = member.flown
         way_left_m = member.way_left_m(spec)
@@ -145,9 +163,8 @@ class VehicleReports:
         surveys = member.withdrawal is None or member.withdrawal.response is Response.HOLD
         flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if surveys else 0.0)
         before = None if member.report is None else local_place(self._frame, member.report.position)
-        if member.report is None or before is None:
+        if before is None:
             return
-        passed_s = report.time_s - member.report.time_s
         if not 0.0 < passed_s <= LONGEST_GAP_S or math.dist(before, place) > FASTEST_MPS * passed_s:
             return
         leg = None
@@ -157,14 +174,15 @@ class VehicleReports:
         if not member.ordered and member.legs and way_left_m > 0.0 and member.withdrawal is None:
             flown.idle_s += passed_s
 
-    def _count_energy(self, member: Member, report: VehicleReport, policy: SurfacePolicy | None) -> None:
+    def _count_energy(
+        self, member: Member, report: VehicleReport, passed_s: float, policy: SurfacePolicy | None
+    ) -> None:
         """Count what a vehicle has used since its last report."""
-        energy, before = member.energy, member.report
+        energy = member.energy
         energy.take_level(report.battery_pct, report.battery_confidence_pct, report.energy_left_s)
         if self._header.state not in AT_SEA:
             energy.begin()
             return
-        passed_s = 0.0 if before is None else report.time_s - before.time_s
         if 0.0 < passed_s <= LONGEST_SILENCE_S:
             energy.pass_time(passed_s, report.speed_mps)
             _count_submersion(member, report.position.depth_m, passed_s, policy)

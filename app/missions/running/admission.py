@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from shapely import Polygon, unary_union
+
 from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
 from app.missions.errors import InvalidRequestError
 from app.missions.spec.mission import MissionKind, MissionSpec
@@ -55,6 +57,21 @@ def check_limits(spec: MissionSpec) -> None:
             f"{limits.min_separation_m:g} m: no two vehicles could keep to both, also not one above the other by "
             f"limits.min_vertical_separation_m, {limits.min_vertical_separation_m:g} m",
             "make limits.com_range_m larger than limits.min_separation_m",
+        )
+    _check_room(spec)
+
+
+def _check_room(spec: MissionSpec) -> None:
+    """Refuse keep-out zones beside which no cell of the area is left. Raises InvalidRequestError."""
+    if not spec.keep_out:
+        return
+    margin_m = spec.limits.keep_out_margin_m
+    zones = unary_union([Polygon(spec.to_local(zone)).buffer(margin_m) for zone in spec.keep_out])
+    if Polygon(spec.local_inner_area()).difference(zones).area < spec.cell_m**2:
+        raise InvalidRequestError(
+            "keep_out",
+            f"the zones with their margin of {margin_m:g} m leave nothing of the area",
+            "make the zones or limits.keep_out_margin_m smaller",
         )
 
 

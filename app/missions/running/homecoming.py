@@ -69,6 +69,8 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
         raise ConflictError(f"the mission is {live.header.state}: nobody is led", states.remedy(live.header.state))
     if member.withdrawal is None and await live.part(OrderBook).cancel(member, actor):
         return
+    if member.withdrawal is None and live.header.state is MissionState.PAUSED:
+        raise ConflictError("the mission is paused: nobody is led", states.remedy(live.header.state))
     if member.withdrawal is None:
         raise ConflictError(f"vehicle {name!r} is surveying", "nothing has to be done")
     live.refuse_ending()
@@ -81,7 +83,7 @@ async def send_on(live: LiveMission, supervisor: MissionSupervisor, name: str, a
         if member.is_home:
             member.energy.renew()
         member.withdrawal = None
-        member.flown.phase = Phase.TRANSIT
+        member.flown.phase = Phase.TRANSIT if live.header.state is MissionState.RUNNING else Phase.STOPPED
         member.ahead.clear()
         member.set_order(None)
     await live.journal.log(Level.INFO, "recovery", f"{name} goes on with the survey", vehicle=name, actor=actor)

@@ -78,6 +78,9 @@ async def test_an_action_takes_no_unknown_fields(client: httpx.AsyncClient, miss
     answer = await client.post(f"/missions/{mission['id']}/start", json={"nota": "x"})
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["expected"] == "did you mean note?"
+    answer = await client.post(f"/missions/{mission['id']}/finish", json={"return_home": True})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["expected"] == "did you mean return?"
     assert (await client.get(f"/missions/{mission['id']}")).json()["state"] == "ready"
 
 

@@ -11,7 +11,7 @@ import pytest
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarm_settings import AlarmSettings
 from app.missions.views.alarms import DeliveryState
-from tests.support.missions.alarms import PASSWORD, Watch, broker, mail_server, make_certificate
+from tests.support.missions.alarms import PASSWORD, Clock, Watch, broker, mail_server, make_certificate
 
 pytestmark = pytest.mark.filterwarnings("ignore:Session.login_data is deprecated")
 
@@ -54,6 +54,26 @@ async def test_an_email_goes_by_starttls_with_a_login(keep_watch: Keep, tmp_path
     assert "To do:     recover it where it comes up" in first.get_payload()
     assert "acknowledged: a is lost" in second["Subject"]
     assert "Acknowledged by Ana" in second.get_payload()
+
+
+async def test_whose_address_was_refused_is_mailed_again_and_nobody_else(
+    keep_watch: Keep, clock: Clock, tmp_path: Path
+) -> None:
+    certificate = make_certificate(tmp_path)
+    with mail_server(certificate) as (box, port):
+        box.refused = {"mate@ship.example"}
+        watch = await keep_watch(by_mail(port, certificate))
+        alarm = await watch.raise_alarm(AlarmKind.LEAK)
+        await watch.look()
+        [delivery] = (await watch.report(alarm)).deliveries
+        assert delivery.state is DeliveryState.WAITING
+        assert delivery.error == "the mail server refused mate@ship.example: 550 5.1.1 no such mailbox"
+        box.refused = set()
+        clock.advance(10)
+        await watch.look()
+        [delivery] = (await watch.report(alarm)).deliveries
+        assert (delivery.state, delivery.attempts) == (DeliveryState.DELIVERED, 2)
+    assert [mail["X-RcptTo"] for mail in box.mails] == ["captain@ship.example", "mate@ship.example"]
 
 
 async def test_no_email_goes_to_a_server_that_nobody_vouches_for_or_with_a_wrong_password(

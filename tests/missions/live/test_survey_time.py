@@ -1,11 +1,13 @@
 """What the time in which a vehicle surveys takes of a mission that lasts so many minutes."""
 
 from collections.abc import Awaitable, Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
-from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointOrder
+from app.missions.clock import told_by
+from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, VehicleReport, WaypointOrder
 from app.missions.fleet.interface import WaypointStatus as Status
 from app.missions.flown import Phase
 from app.missions.live.mission import LiveMission
@@ -30,15 +32,15 @@ class UnderWay:
         self.member.link = LinkState.ENGAGED
         self.member.legs, self.member.committed_m = 1, 100.0
         self.member.target_m = np.array([10.0, 110.0])
-        self.member.order = WaypointOrder(live.id, 1, "a", self._at(110.0), SPEED_MPS, 3.0, 1.0)
+        self.member.order = WaypointOrder(live.id, 1, "a", self.at(110.0), SPEED_MPS, 3.0, 1.0)
         self.member.status = Status.ACKNOWLEDGED
         self.reports(0.0, 10.0)
 
     def reports(self, time_s: float, north_m: float, *, standing: bool = False, running: bool = True) -> None:
-        report = VehicleReport("a", time_s, self._at(north_m))
+        report = VehicleReport("a", time_s, self.at(north_m))
         self.live.reports.take(report, self.live.spec, running=running, standing=standing)
 
-    def _at(self, north_m: float) -> Position:
+    def at(self, north_m: float) -> Position:
         lat, lon = self.live.frame.to_geographic(np.array(10.0), np.array(north_m))
         return Position(float(lat), float(lon), 2.0)
 
@@ -94,6 +96,33 @@ async def test_a_silence_is_time_too(under_way: Made) -> None:
     vehicle = await under_way()
     vehicle.reports(600.0, 110.0)
     assert vehicle.left_m == pytest.approx(WHOLE_M - 600.0 * SPEED_MPS, abs=0.1)
+
+
+async def test_a_clock_that_is_set_forward_is_no_time_and_no_energy(under_way: Made, service: MissionService) -> None:
+    vehicle = await under_way()
+    vehicle.member.capabilities = LinkCapabilities()
+    report = partial(VehicleReport, "a", position=vehicle.at(10.0), speed_mps=SPEED_MPS, battery_pct=90.0)
+    used_s = vehicle.member.energy.used_s
+
+    def told(clock_s: float, at_s: float) -> float:
+        with told_by(lambda: 1.7e9 + at_s / service.settings.time_scale):
+            vehicle.live.reports.take(report(time_s=clock_s), vehicle.live.spec, running=True)
+        return vehicle.member.flown.survey_s
+
+    vehicle.member.report = vehicle.member.clock_ahead_s = None
+    assert told(100.0, 0.0) == 0.0
+    assert told(110.0, 10.0) == 10.0
+    assert told(3720.0, 20.0) == pytest.approx(20.0), "it was set forward by an hour"
+    assert told(3730.0, 30.0) == pytest.approx(30.0)
+    assert told(140.0, 40.0) == pytest.approx(30.0), "it was set back"
+    assert told(3750.0, 50.0) == pytest.approx(40.0), "and forward again"
+    assert told(4350.0, 650.0) == pytest.approx(640.0), "a silence is time"
+    for late_s in (4450.0, 4550.0, 4650.0):
+        told(late_s, 1250.0)
+    assert vehicle.member.flown.survey_s == pytest.approx(940.0), (
+        "what comes late, all at once, tells of time that has passed"
+    )
+    assert vehicle.member.energy.used_s - used_s == pytest.approx(940.0, abs=1.0)
 
 
 @pytest.mark.parametrize("how", ["standing", "paused", "surfacing", "held", "on its way there"])

@@ -7,6 +7,7 @@ import pytest
 from app.missions.errors import InvalidRequestError
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec
+from tests.support.missions.specs import rectangle
 
 
 @pytest.mark.parametrize(
@@ -37,6 +38,16 @@ async def test_limits_that_contradict_each_other_are_refused(
         await service.create(sim_spec("a", "b", **changes))
     assert caught.value.field == field
     assert await service.rows() == []
+
+
+async def test_zones_that_leave_nothing_of_the_area_are_refused(service: MissionService) -> None:
+    """Such a mission was taken, engaged its vehicles, and failed with its first leg."""
+    zone = rectangle(6.0, 6.0, 54.0, 54.0)
+    with pytest.raises(InvalidRequestError, match=r"margin of 10 m leave nothing of the area") as caught:
+        await service.create(sim_spec("a", side_m=60.0, keep_out=[zone]))
+    assert caught.value.field == "keep_out"
+    narrow = {"max_step_m": 8.0, "keep_out_margin_m": 2.0}
+    assert (await service.create(sim_spec("a", side_m=60.0, keep_out=[zone], limits=narrow))).state == "ready"
 
 
 @pytest.mark.parametrize(

@@ -220,6 +220,17 @@ async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: Mission
     await act(service, mission.id, "abort")
 
 
+async def test_resuming_a_vehicle_of_a_paused_mission_says_that_it_is_paused(service: MissionService) -> None:
+    mission = await service.create(recovered("a", point=OUTSIDE))
+    await act(service, mission.id, "start")
+    await act(service, mission.id, "pause")
+    live = await service.get(mission.id)
+    with pytest.raises(ConflictError, match="the mission is paused") as refused:
+        await service.send_on(live, "a", "Ana")
+    assert refused.value.remedy == "It is paused: resume, finish or abort it"
+    await act(service, mission.id, "abort")
+
+
 async def test_what_a_vehicle_is_at_is_known_when_its_clock_has_jumped(service: MissionService) -> None:
     mission = await service.create(recovered("a", point=OUTSIDE, steps=1000))
     await act(service, mission.id, "start")

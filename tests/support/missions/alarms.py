@@ -107,12 +107,21 @@ def hook(*statuses: int) -> Iterator[Hook]:
 
 
 class Mailbox(Message):
-    """Keeps what the mail server took."""
+    """Keeps what the mail server took. ``refused``: addresses that it does not know."""
 
     def __init__(self) -> None:
         super().__init__(EmailMessage)
         self.mails: list[EmailMessage] = []
         self.encrypted: list[bool] = []
+        self.refused: set[str] = set()
+
+    async def handle_RCPT(  # noqa: N802 - the library's name
+        self, _server: Any, _session: Any, envelope: Any, address: str, _options: list[str]
+    ) -> str:
+        if address in self.refused:
+            return "550 5.1.1 no such mailbox"
+        envelope.rcpt_tos.append(address)
+        return "250 OK"
 
     async def handle_DATA(self, server: Any, session: Any, envelope: Any) -> str:  # noqa: N802 - the library's name
         self.encrypted.append(session.ssl is not None)

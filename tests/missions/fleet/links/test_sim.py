@@ -24,7 +24,7 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.sim import FORSAKEN_S, SimFleetLink
-from app.missions.fleet.links.simulated.launch import Launch
+from app.missions.fleet.links.simulated.launch import MOST_CELLS, Launch, lay
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.targets import TargetSpec
@@ -55,6 +55,17 @@ def order(step: int, east_m: float, north_m: float, speed_mps: float = 1.0) -> W
 def has_arrived(events: list[FleetEvent], step: int = 1) -> bool:
     reached = [e for e in events if isinstance(e, WaypointReport) and e.status is WaypointStatus.REACHED]
     return step in [report.step for report in reached]
+
+
+def test_the_floor_of_a_large_area_has_wider_cells() -> None:
+    """At 1 m that of 20 km x 20 km took all memory of the machine, and with it the service."""
+    large = replace(launch(BatterySpec()), width_m=5000.4, height_m=2000.0)
+    floor = lay(SimulationSettings(family="flat"), large)
+    assert floor.z_m.size <= MOST_CELLS
+    assert floor.cell_m == 2
+    assert 0 < floor.width_m - large.width_m <= 2
+    assert 0 < floor.height_m - large.height_m <= 2
+    assert lay(SimulationSettings(family="flat"), launch(BatterySpec())).cell_m == 1
 
 
 async def test_it_tells_its_energy_and_the_current() -> None:

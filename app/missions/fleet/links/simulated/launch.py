@@ -15,6 +15,9 @@ from simulator.targets import RangingNoise
 from simulator.targets import TargetSpec as SimulatedTarget
 from simulator.vehicles.battery import BatterySpec
 
+MOST_CELLS = 4_000_000
+"""Of a generated sea floor: its cells are 1 m wide, over larger areas wider."""
+
 
 @dataclass(frozen=True)
 class Lookout:
@@ -84,12 +87,14 @@ def lay(settings: SimulationSettings, launch: Launch) -> Terrain:
     if settings.terrain is not None:
         terrain = load_terrain(settings.terrain)
         return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
+    cell_m = max(1, math.ceil(math.sqrt(launch.width_m * launch.height_m / MOST_CELLS)))
     # Whole cells that cover the area to its border and a little more.
     return generate(
         settings.family,
         settings.seed,
-        width_m=math.ceil(launch.width_m + 1e-3),
-        height_m=math.ceil(launch.height_m + 1e-3),
+        width_m=cell_m * max(2, math.ceil((launch.width_m + 1e-3) / cell_m)),
+        height_m=cell_m * max(2, math.ceil((launch.height_m + 1e-3) / cell_m)),
+        cell_m=cell_m,
         origin=launch.south_west,
     )
 
