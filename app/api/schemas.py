@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from app.api.http.json_text import Bounds
-from app.api.http.problems import MAX_ERRORS, field_problem
+from app.api.http.problems import MAX_ERRORS, SUGGESTION, FieldProblem, field_problem
 from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
 from app.missions.soundings.measurement import Measurement
@@ -101,7 +101,11 @@ def _item(value: object) -> Measurement | str:
         _suggestions.set(left - len(entries))
         model = Measurement if left >= len(entries) else None
         faults = [field_problem(entry, location="body", path=entry["loc"], model=model) for entry in entries]
-        return "; ".join(f"{f.field}: {f.message}; expected {f.expected}" for f in faults)
+        return "; ".join(f"{f.field}: {f.message}; {_what_is_right(f)}" for f in faults)
+
+
+def _what_is_right(fault: FieldProblem) -> str:
+    return fault.expected if fault.expected.startswith(SUGGESTION) else f"expected {fault.expected}"
 
 
 def _each_item(items: object, check: ValidatorFunctionWrapHandler) -> list[Measurement | str]:

@@ -149,10 +149,14 @@ class TargetEstimator:
         )
 
     def process_noise(self, acceleration_sd: float | None = None, time: float = 1.0) -> FloatArray:
-        """Return the noise of some time, (6, 6): the velocity's change acts half on the way meanwhile."""
-        G = np.vstack([0.5 * time * np.eye(3), np.eye(3)]) * self._axes
+        """Return the noise of some time, (6, 6), as that of so many units of it one after the other.
+
+        The change of the velocity within one acts half on the way meanwhile.
+        """
         sd = self.acceleration_sd if acceleration_sd is None else acceleration_sd
-        return np.asarray(sd**2 * time * G @ G.T)
+        place = time**3 / 3.0 - time / 12.0 if time > 1.0 else 0.25 * time**3
+        moved, axes = 0.5 * time**2, np.diag(self._axes**2)
+        return np.asarray(sd**2 * np.kron([[place, moved], [moved, time]], axes))
 
     @property
     def _axes(self) -> FloatArray:

@@ -37,6 +37,16 @@ def pursuit(seed: int, steps: int, estimator: Any, vehicles: int = 3, *, found: 
         yield truth, track, positions
 
 
+@pytest.mark.parametrize("pieces", [60, 24, 600])
+def test_what_is_foretold_for_a_time_is_as_sure_in_however_many_pieces(pieces: int) -> None:
+    estimator = TargetEstimator(acceleration_sd=0.013, vertical=0.3)
+    track = TargetTrack(np.zeros((1, 6)), 0.01 * np.eye(6)[None], np.ones(1))
+    at_once, step_by_step = estimator.predict(track, 60.0), track
+    for _ in range(pieces):
+        step_by_step = estimator.predict(step_by_step, 60.0 / pieces)
+    np.testing.assert_allclose(step_by_step.sd_m, at_once.sd_m, rtol=1e-3)
+
+
 def test_a_single_range_update_is_that_of_a_slow_reference() -> None:
     """Joseph form in plain numpy, mean and variance of the range by brute force over the prior."""
     rng = np.random.default_rng(4)

@@ -54,6 +54,7 @@ MAX_SHOWN_ENTRIES = 5
 """Of a list or an object only so many are shown, and so many within each."""
 MAX_SUGGESTED = 64
 """To longer names than any field has none is looked for that is like it."""
+SUGGESTION = "did you mean"
 
 
 class FieldProblem(BaseModel):
@@ -307,7 +308,7 @@ def field_problem(
         name = str(path[-1])
         close = difflib.get_close_matches(name, known, n=1) if known and len(name) <= MAX_SUGGESTED else []
         message = "There is no such field"
-        expected = f"did you mean {close[0]}?" if close else "one of " + ", ".join(known) if known else "no such field"
+        expected = f"{SUGGESTION} {close[0]}?" if close else "one of " + ", ".join(known) if known else "no such field"
     elif kind == "value_error":
         # The validators' own messages end with what would be right.
         head, separator, tail = message.rpartition(": ")

@@ -49,11 +49,11 @@ class StateDefinition(_Part):
 class Training(_Part):
     """How the controller came about."""
 
-    command: str = Field(default="", max_length=2000, description="What makes it again")
+    command: str = Field(default="", max_length=200_000, description="What makes it again")
     bathyfleet: str = Field(default="", max_length=40, description="The version that trained it")
     method: str = Field(default="", max_length=40, description="pcao, cma or random")
     seed: int = Field(default=0, ge=0, description="Of the optimiser")
-    terrains: tuple[str, ...] = Field(default=(), max_length=1000)
+    terrains: tuple[str, ...] = Field(default=(), max_length=10_000)
     seeds: tuple[int, ...] = Field(default=(), max_length=10_000, description="Of the Monte-Carlo runs on each terrain")
     robots: int = Field(default=3, ge=1)
     landmarks: int = Field(default=1100, ge=1)

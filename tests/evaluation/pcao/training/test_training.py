@@ -22,7 +22,7 @@ from app.evaluation.pcao.training.scoring import LocalScorer
 from app.evaluation.pcao.training.training import Checkpoint, CheckpointError, make_optimiser, train
 from app.exploration.core.objective import objective
 from app.exploration.pcao.controller import gains
-from app.exploration.pcao.model import PcaoModel, default_model
+from app.exploration.pcao.model import PcaoModel, Training, default_model
 from simulator.floors.terrain import TerrainError
 
 SMALL: dict[str, Any] = {"robots": 2, "landmarks": 60, "steps": 12}
@@ -211,6 +211,13 @@ def test_the_train_command_writes_a_model_that_evaluations_fly_with(tmp_path: Pa
     flown = CliRunner().invoke(app, [*explore, "--landmarks", "30", "--model", str(out), "--json"])
     assert flown.exit_code == 0, flown.output
     assert orjson.loads(flown.stdout)["planner"] == "pcao"
+
+
+def test_a_training_on_many_sea_floors_can_be_written_down() -> None:
+    many = tuple(f"harbour:{k}" for k in range(2000))
+    training = Training(command=f"bathyfleet train --out FILE --terrains {','.join(many)}", terrains=many)
+    model = PcaoModel.of(default_model().parameters, training)
+    assert PcaoModel.model_validate_json(model.model_dump_json()).training == training
 
 
 def test_what_is_no_model_is_refused_with_the_reason(tmp_path: Path) -> None:
