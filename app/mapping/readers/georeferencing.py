@@ -80,7 +80,7 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: MapEx
     high_n = place.grid.south_m + place.grid.rows * place.grid.cell_m + place.margin_m
     near = (east >= low_e) & (east <= high_e) & (north >= low_n) & (north <= high_n) & np.isfinite(depth)
     if not near.any():
-        raise ReadError("file", "none of its depths lies near the mission's area", "check the file and its crs")
+        raise _none_near(content, options, place)
     if near.sum() > MAX_SOUNDINGS:
         raise ReadError("file", f"{near.sum()} depths are more than {MAX_SOUNDINGS}", "thin the file")
     if not near.all():  # else two million soundings need not be copied
@@ -117,6 +117,21 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
         raise ReadError("file", "none of its depths lies in the mission's grid", "check the file and its crs")
     _check_side(sampled, options)
     return sampled, notes
+
+
+def _none_near(content: Points | Raster, options: ReadOptions, place: MapExtent) -> ReadError:
+    """Return what is wrong with a file that has no depth near the mission's grid."""
+    if isinstance(content, Raster):
+        crs = _crs(content.crs, options, [])
+        grid = _in_unit_of(content, crs)
+        if np.isfinite(_resampled(grid, content.z, crs, place, place.grid)).any():
+            return ReadError(
+                "file",
+                f"its cells of {_cell_m(grid, crs, place):.3g} m are too large: the area lies among them, and none has "
+                "its middle near",
+                "send a finer grid, or depths about the area as XYZ",
+            )
+    return ReadError("file", "none of its depths lies near the mission's area", "check the file and its crs")
 
 
 def with_margin(place: MapExtent) -> Grid:
@@ -235,12 +250,7 @@ def _cells(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     crs = _crs(raster.crs, options, notes)
     raster = _in_unit_of(raster, crs)
-    rows, cols = depth.shape
-    # One cell in the middle, by its corner and the two beside it.
-    col, row = 0.5 * cols + np.array([0.0, 1.0, 0.0]), 0.5 * rows + np.array([0.0, 0.0, 1.0])
-    east, north = _to_local(*_positions(raster, col, row), crs, place)
-    sides = np.array([east[1:] - east[0], north[1:] - north[0]])
-    size = float(np.sqrt(abs(np.linalg.det(sides))))
+    size = _cell_m(raster, crs, place)
     if size < 0.99 * place.grid.cell_m:
         grid, wide = place.grid, with_margin(place)
         notes.append(f"cells of {size:.3g} m were averaged to the map's {grid.cell_m:g} m")
@@ -249,6 +259,16 @@ def _cells(
     rows_known, cols_known = np.nonzero(np.isfinite(depth))
     east, north = _to_local(*_positions(raster, cols_known + 0.5, rows_known + 0.5), crs, place)
     return east, north, depth[rows_known, cols_known], raster.sd_m[rows_known, cols_known]
+
+
+def _cell_m(raster: Raster, crs: pyproj.CRS | None, place: MapExtent) -> float:
+    """Return how large a grid's cells are, as the side of a square."""
+    rows, cols = raster.z.shape
+    # One cell in the middle, by its corner and the two beside it.
+    col, row = 0.5 * cols + np.array([0.0, 1.0, 0.0]), 0.5 * rows + np.array([0.0, 0.0, 1.0])
+    east, north = _to_local(*_positions(raster, col, row), crs, place)
+    sides = np.array([east[1:] - east[0], north[1:] - north[0]])
+    return float(np.sqrt(abs(np.linalg.det(sides))))
 
 
 def _in_unit_of(raster: Raster, crs: pyproj.CRS | None) -> Raster:

@@ -137,6 +137,20 @@ def test_a_grid_whose_longitudes_begin_at_lisbon_lies_where_it_should(epsg: int)
     np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.05)
 
 
+def test_a_grid_too_coarse_for_the_area_is_told_from_one_elsewhere(tmp_path: Path) -> None:
+    to_utm = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True)
+    west, south = to_utm.transform(25.0, 20.0)
+    z, sd = np.full((4, 4), 9.0), np.full((4, 4), 0.5)
+    # The area lies about a corner of its cells, whose middles are 325 m away.
+    coarse = Raster(z, sd, Affine(460.0, 0, west - 920.0, 0, 460.0, south - 920.0), UTM, "down")
+    with pytest.raises(ReadError, match=r"cells of 460 m.*none has its middle near") as caught:
+        place_soundings(coarse, ReadOptions(), PLACE)
+    assert "finer" in caught.value.remedy
+    elsewhere = Raster(z, sd, Affine(460.0, 0, west + 5000.0, 0, 460.0, south), UTM, "down")
+    with pytest.raises(ReadError, match="none of its depths lies near"):
+        place_soundings(elsewhere, ReadOptions(), PLACE)
+
+
 def test_what_a_file_does_not_say_has_to_be_said(tmp_path: Path) -> None:
     write_grid(path := tmp_path / "a.asc", 4.0, None)
     path.with_suffix(".prj").unlink(missing_ok=True)
