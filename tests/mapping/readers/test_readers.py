@@ -394,6 +394,19 @@ def test_other_endings_are_refused(name: str) -> None:
         ending(name)
 
 
+@pytest.mark.parametrize("step_deg", [1 / 3600, 1 / 10_800])
+def test_axes_of_single_precision_are_even_but_for_their_rounding(step_deg: float, tmp_path: Path) -> None:
+    lat, lon = FRAME.origin_lat_deg + step_deg * np.arange(-9, 30), FRAME.origin_lon_deg + step_deg * np.arange(-9, 30)
+    east, north = FRAME.to_local(*np.meshgrid(lat, lon, indexing="ij"))
+    with netCDF4.Dataset(path := tmp_path / "a.nc", "w") as file:
+        for name, values in (("lat", lat), ("lon", lon)):
+            file.createDimension(name, len(values))
+            file.createVariable(name, "f4", (name,))[:] = values
+        file.createVariable("depth", "f4", ("lat", "lon"))[:] = depth_at(east, north)
+    s = place_soundings(read_path(path), SD, PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
+
+
 def test_uneven_axes_are_refused_by_name(tmp_path: Path) -> None:
     with netCDF4.Dataset(path := tmp_path / "a.nc", "w") as file:
         for name in ("y", "x"):
