@@ -137,6 +137,45 @@ def test_a_grid_whose_longitudes_begin_at_lisbon_lies_where_it_should(epsg: int)
     np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.05)
 
 
+@pytest.mark.parametrize("around", ["EPSG:32629", "degrees", "degrees from 0 to 360"])
+def test_hills_beside_the_area_keep_no_grid_from_being_read(around: str) -> None:
+    crs = UTM if around == "EPSG:32629" else pyproj.CRS.from_epsg(4326)
+    to_file = pyproj.Transformer.from_crs(FRAME.crs, crs, always_xy=True)
+    cell = 5.0 if crs == UTM else 5e-5
+    x, y = (at + cell * (np.arange(120) - 60) for at in to_file.transform(25.0, 20.0))
+    across, up = np.meshgrid(x, y)
+    east, north = to_file.transform(across, up, direction="INVERSE")
+    z = -depth_at(east, north)
+    z[north > 100.0] = 250.0
+    west = x[0] + (360.0 if "360" in around else 0.0)
+    grid = Raster(z, np.full(z.shape, 0.1), Affine(cell, 0, west - cell / 2, 0, cell, y[0] - cell / 2), crs, "up")
+    found = place_soundings(grid, ReadOptions(), PLACE)
+    s = found.soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
+    assert any("above the water" in note for note in found.notes)
+    sampled, _ = place_reference(grid, ReadOptions(), PLACE)
+    np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.1)
+    z[(north > 30.0) & (north < 40.0)] = 250.0
+    for place in (place_soundings, place_reference):
+        with pytest.raises(ReadError, match="its depth is not between"):
+            place(grid, ReadOptions(), PLACE)
+
+
+def test_a_grid_whose_cells_have_no_size_is_refused() -> None:
+    grid = Raster(np.full((3, 3), 9.0), np.full((3, 3), 0.1), Affine(0.0, 0, 0, 0, 5.0, 0), UTM, "down")
+    with pytest.raises(ReadError, match="no size"):
+        place_soundings(grid, ReadOptions(), PLACE)
+
+
+def test_hills_beside_the_area_keep_no_list_from_being_read() -> None:
+    words = "east_m,north_m,elevation,sd\n5,8,-6,0.1\n20,30,-9,0.1\n20,{north},250,0.1"
+    found = place_soundings(read_words(words.format(north=3000)), ReadOptions(), PLACE)
+    assert found.soundings.depth_m.tolist() == [6.0, 9.0]
+    assert any("above the water" in note for note in found.notes)
+    with pytest.raises(ReadError, match="its depth is not between"):
+        place_soundings(read_words(words.format(north=30)), ReadOptions(), PLACE)
+
+
 def test_a_grid_too_coarse_for_the_area_is_told_from_one_elsewhere(tmp_path: Path) -> None:
     to_utm = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True)
     west, south = to_utm.transform(25.0, 20.0)
