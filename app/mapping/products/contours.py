@@ -56,7 +56,7 @@ def find_contours(bathymetry: BathymetricMap, frame: LocalFrame, interval_m: flo
     )
     contours = []
     for multiple in np.arange(first, last + 1.0):
-        level = float(multiple * interval_m)
+        level = float(multiple * interval_m) + 0.0  # no minus before the datum's zero
         lines = []
         for line in cast("list[FloatArray]", generator.lines(level)):
             if len(line) >= 2:

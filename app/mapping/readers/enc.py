@@ -47,11 +47,13 @@ DANGERS = ("OBSTRN", "WRECKS", "UWTROC")
 """What lies under water, where somebody surveyed it more or less well."""
 
 # fmt: off
-HAZARDS = (
-    "LNDARE", *DANGERS, "RESARE", "SLCONS", "PONTON", "PILPNT", "OFSPLF", "MORFAC", "MARCUL", "FSHFAC", "HULKES",
-    "FLODOC", "DAMCON", "GATCON",
+BUILT = (
+    "SLCONS", "PONTON", "PILPNT", "OFSPLF", "MORFAC", "MARCUL", "FSHFAC", "HULKES", "FLODOC", "DAMCON", "GATCON",
 )
 # fmt: on
+"""What stands or is moored in the water; where it lies along the shore, within land's own zone, it makes none."""
+
+HAZARDS = ("LNDARE", *DANGERS, "RESARE", *BUILT)
 """Objects that vehicles should keep out of: land, dangers under water, restricted areas, and what stands or is moored
 there: piers and moles, pontoons, piles, platforms, moorings, farms, nets and weirs, hulks, docks, dams, gates."""
 
@@ -144,6 +146,7 @@ def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[
     )
     around = _around(frame, box.buffer(NO_ZONE_POSITION_M + margin_m))
     found: list[tuple[float, Zone]] = []
+    land: list[BaseGeometry] = []
     for kind in HAZARDS:
         table = _layer(content, kind)
         if table is None:
@@ -160,7 +163,12 @@ def read_zones(content: bytes, place: MapExtent, margin_m: float) -> tuple[list[
             [position_m] = quality.at(*middle.T)[2]
             # Limits that somebody drew are where they are drawn, and what is to be seen is not surveyed from the water.
             position_m = float(position_m) if kind in DANGERS else 0.0
-            for part in _polygons(local.buffer(position_m + margin_m, quad_segs=4).intersection(box)):
+            about = local.buffer(position_m + margin_m, quad_segs=4)
+            if kind == "LNDARE":
+                land.append(about.buffer(DETAIL_M))
+            elif kind in BUILT and any(one.contains(about) for one in land):
+                continue
+            for part in _polygons(about.intersection(box)):
                 ring = shapely.get_coordinates(part.simplify(DETAIL_M))[:-1]
                 lat, lon = frame.to_geographic(ring[:, 0], ring[:, 1])
                 depth = float(depths[number])

@@ -12,7 +12,7 @@ from rasterio._err import CPLE_BaseError
 from rasterio.errors import RasterioError
 from rasterio.warp import Resampling, reproject
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.mapping.kriging.cell_index import cell_numbers
 from app.mapping.readers.types import (
     LOCAL,
@@ -68,19 +68,21 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: MapEx
     notes = list(content.notes) if isinstance(content, Points) else []
     positive = _positive(content, options, notes)
     depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
-    _check_depths(depth, content)
+    crs = _crs(content.crs, options, notes)
     if isinstance(content, Points):
-        east, north = _to_local(content.x, content.y, _crs(content.crs, options, notes), place)
-        depth, sd, found = depth, content.sd_m, len(content.z) if content.found is None else content.found
+        east, north = _to_local(content.x, content.y, crs, place)
+        near = _is_near(east, north, place)
+        _check_depths(depth, near, content, notes)
+        sd, found = content.sd_m, len(content.z) if content.found is None else content.found
     else:
+        raster = _in_unit_of(content, crs)
+        _check_depths(depth, _cells_near(raster, crs, place), content, notes)
         found = int(np.isfinite(depth).sum())
-        east, north, depth, sd = _cells(content, depth, options, place, notes)
-    low_e, low_n = place.grid.west_m - place.margin_m, place.grid.south_m - place.margin_m
-    high_e = place.grid.west_m + place.grid.cols * place.grid.cell_m + place.margin_m
-    high_n = place.grid.south_m + place.grid.rows * place.grid.cell_m + place.margin_m
-    near = (east >= low_e) & (east <= high_e) & (north >= low_n) & (north <= high_n) & np.isfinite(depth)
+        east, north, depth, sd = _cells(raster, depth, crs, place, notes)
+        near = _is_near(east, north, place)
+    near &= np.isfinite(depth)
     if not near.any():
-        raise ReadError("file", "none of its depths lies near the mission's area", "check the file and its crs")
+        raise _none_near(content, options, place)
     if near.sum() > MAX_SOUNDINGS:
         raise ReadError("file", f"{near.sum()} depths are more than {MAX_SOUNDINGS}", "thin the file")
     if not near.all():  # else two million soundings need not be copied
@@ -100,12 +102,14 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
     notes = list(content.notes) if isinstance(content, Points) else []
     positive = _positive(content, options, notes)
     depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
-    _check_depths(depth, content)
+    crs = _crs(content.crs, options, notes)
     if isinstance(content, Raster):
-        crs = _crs(content.crs, options, notes)
-        sampled = _resampled(_in_unit_of(content, crs), depth, crs, place, place.grid)
+        raster = _in_unit_of(content, crs)
+        _check_depths(depth, _cells_near(raster, crs, place), content, notes)
+        sampled = _resampled(raster, depth, crs, place, place.grid)
     else:
-        east, north = _to_local(content.x, content.y, _crs(content.crs, options, notes), place)
+        east, north = _to_local(content.x, content.y, crs, place)
+        _check_depths(depth, _is_near(east, north, place), content, notes)
         cells = cell_numbers(place.grid, Soundings(east, north, depth, depth))
         n = place.grid.rows * place.grid.cols
         inside = cells >= 0
@@ -117,6 +121,21 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
         raise ReadError("file", "none of its depths lies in the mission's grid", "check the file and its crs")
     _check_side(sampled, options)
     return sampled, notes
+
+
+def _none_near(content: Points | Raster, options: ReadOptions, place: MapExtent) -> ReadError:
+    """Return what is wrong with a file that has no depth near the mission's grid."""
+    if isinstance(content, Raster):
+        crs = _crs(content.crs, options, [])
+        grid = _in_unit_of(content, crs)
+        if np.isfinite(_resampled(grid, content.z, crs, place, place.grid)).any():
+            return ReadError(
+                "file",
+                f"its cells of {_cell_m(grid, crs, place):.3g} m are too large: the area lies among them, and none has "
+                "its middle near",
+                "send a finer grid, or depths about the area as XYZ",
+            )
+    return ReadError("file", "none of its depths lies near the mission's area", "check the file and its crs")
 
 
 def with_margin(place: MapExtent) -> Grid:
@@ -149,9 +168,51 @@ def _positive(content: Points | Raster, options: ReadOptions, notes: list[str]) 
     )
 
 
-def _check_depths(depth: FloatArray, content: Points | Raster) -> None:
+def _is_near(east: FloatArray, north: FloatArray, place: MapExtent) -> BoolArray:
+    low_e, low_n = place.grid.west_m - place.margin_m, place.grid.south_m - place.margin_m
+    high_e = place.grid.west_m + place.grid.cols * place.grid.cell_m + place.margin_m
+    high_n = place.grid.south_m + place.grid.rows * place.grid.cell_m + place.margin_m
+    return np.asarray((east >= low_e) & (east <= high_e) & (north >= low_n) & (north <= high_n))
+
+
+def _cells_near(raster: Raster, crs: pyproj.CRS | None, place: MapExtent) -> BoolArray:
+    """Return which cells of a grid, (rows, cols), lie about the mission's grid: a rectangle that holds all of it."""
+    wide = with_margin(place)
+    along = np.linspace(0.0, 1.0, 9)
+    across, up = np.meshgrid(
+        wide.west_m + along * wide.cols * wide.cell_m, wide.south_m + along * wide.rows * wide.cell_m
+    )
+    x, y = across, up
+    if crs is not None:
+        horizontal = crs.sub_crs_list[0] if crs.is_compound else crs
+        try:
+            x, y = pyproj.Transformer.from_crs(place.frame.crs, horizontal, always_xy=True).transform(across, up)
+        except ProjError:
+            raise _no_way() from None
+        if horizontal.is_geographic:
+            middle, _ = raster.transform @ (0.5 * raster.z.shape[1], 0.5 * raster.z.shape[0])
+            x = x + 360.0 * np.round((middle - x) / 360.0)
+    if raster.transform.is_degenerate:
+        raise ReadError("file", "its cells have no size", "check its georeferencing")
+    a, b, c, d, e, f = tuple(~raster.transform)[:6]
+    col, row = a * x + b * y + c, d * x + e * y + f
+    near = np.zeros(raster.z.shape, np.bool_)
+    if np.isfinite(col).all() and np.isfinite(row).all():
+        low_col, low_row = (max(int(np.floor(ends.min())) - 1, 0) for ends in (col, row))
+        near[low_row : max(int(row.max()) + 2, 0), low_col : max(int(col.max()) + 2, 0)] = True
+    return near
+
+
+def _check_depths(depth: FloatArray, near: BoolArray, content: Points | Raster, notes: list[str]) -> None:
+    """Refuse depths that cannot be; heights of land away from the area become unknown."""
     with np.errstate(invalid="ignore"):
+        land = (depth < MIN_DEPTH_M) & ~near
+        depth[land] = np.nan
         wrong = (depth < MIN_DEPTH_M) | (depth > MAX_DEPTH_M)
+    if land.any():
+        notes.append(
+            f"{land.sum()} values more than {-MIN_DEPTH_M:g} m above the water, away from the area, are left out"
+        )
     if wrong.any():
         index = np.unravel_index(int(np.argmax(wrong)), depth.shape)
         raise ReadError(
@@ -231,16 +292,9 @@ def _no_way() -> ReadError:
 
 
 def _cells(
-    raster: Raster, depth: FloatArray, options: ReadOptions, place: MapExtent, notes: list[str]
+    raster: Raster, depth: FloatArray, crs: pyproj.CRS | None, place: MapExtent, notes: list[str]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    crs = _crs(raster.crs, options, notes)
-    raster = _in_unit_of(raster, crs)
-    rows, cols = depth.shape
-    # One cell in the middle, by its corner and the two beside it.
-    col, row = 0.5 * cols + np.array([0.0, 1.0, 0.0]), 0.5 * rows + np.array([0.0, 0.0, 1.0])
-    east, north = _to_local(*_positions(raster, col, row), crs, place)
-    sides = np.array([east[1:] - east[0], north[1:] - north[0]])
-    size = float(np.sqrt(abs(np.linalg.det(sides))))
+    size = _cell_m(raster, crs, place)
     if size < 0.99 * place.grid.cell_m:
         grid, wide = place.grid, with_margin(place)
         notes.append(f"cells of {size:.3g} m were averaged to the map's {grid.cell_m:g} m")
@@ -249,6 +303,16 @@ def _cells(
     rows_known, cols_known = np.nonzero(np.isfinite(depth))
     east, north = _to_local(*_positions(raster, cols_known + 0.5, rows_known + 0.5), crs, place)
     return east, north, depth[rows_known, cols_known], raster.sd_m[rows_known, cols_known]
+
+
+def _cell_m(raster: Raster, crs: pyproj.CRS | None, place: MapExtent) -> float:
+    """Return how large a grid's cells are, as the side of a square."""
+    rows, cols = raster.z.shape
+    # One cell in the middle, by its corner and the two beside it.
+    col, row = 0.5 * cols + np.array([0.0, 1.0, 0.0]), 0.5 * rows + np.array([0.0, 0.0, 1.0])
+    east, north = _to_local(*_positions(raster, col, row), crs, place)
+    sides = np.array([east[1:] - east[0], north[1:] - north[0]])
+    return float(np.sqrt(abs(np.linalg.det(sides))))
 
 
 def _in_unit_of(raster: Raster, crs: pyproj.CRS | None) -> Raster:

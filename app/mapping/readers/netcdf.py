@@ -98,8 +98,12 @@ def _axis(file: Any, name: str) -> FloatArray:
         raise ReadError(_called(name), "it is not an axis of at least two values", "give each axis its coordinates")
     values = _values(variable)
     even = np.linspace(values[0], values[-1], len(values))
-    step = (values[-1] - values[0]) / (len(values) - 1)
-    if not np.all(np.isfinite(values)) or step == 0 or np.max(np.abs(values - even)) > REGULAR * abs(step):
+    step = abs(values[-1] - values[0]) / (len(values) - 1)
+    most = REGULAR * step
+    if variable.dtype == np.float32:
+        # Degrees of single precision are rounded to a metre or so, which is more than that of a fine grid's cells.
+        most += min(float(np.spacing(np.float32(np.max(np.abs(values))))), 0.5 * step)
+    if not np.all(np.isfinite(values)) or step == 0 or np.max(np.abs(values - even)) > most:
         raise ReadError(_called(name), "its values are not evenly spaced", "regrid the file, or send it as XYZ")
     return values
 

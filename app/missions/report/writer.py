@@ -1,5 +1,7 @@
 """Values of answers in the words and numbers of a report's language."""
 
+import math
+
 from app.missions.report.answers import Answers, as_value
 from app.missions.report.document import Shown
 from app.missions.report.texts import NONE, Texts
@@ -24,6 +26,12 @@ class Writer:
         """Return the number at a place of an answer."""
         value = self.answers.at(source)
         return Shown(self.t.number(value, decimals, unit, signed=signed), source, as_value(value))
+
+    def share(self, source: str, unit: str = "%") -> Shown:
+        """Return the percentage at a place of an answer, rounded down: 99.96 % of the cells is not all of them."""
+        value = self.answers.at(source)
+        floored = None if value is None else math.floor(round(10.0 * value, 6)) / 10.0
+        return Shown(self.t.number(floored, 1, unit), source, as_value(value))
 
     def moment(self, source: str) -> Shown:
         """Return the time at a place of an answer."""

@@ -19,6 +19,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import Fit, LayerSource, file_layers
 from app.mapping.products.contours import contours_geojson, find_contours
 from app.mapping.products.geotiff import NODATA, geotiff
+from app.mapping.products.kml import contours_kml
 from app.mapping.products.pictures.colours import depth_range, palette
 from app.mapping.products.pictures.overlay import overlay_corners, overlay_png
 from app.mapping.products.pictures.picture import picture_png
@@ -196,6 +197,13 @@ def test_contours_of_a_plane_are_straight_and_at_their_depth(bathymetry: Bathyme
             np.testing.assert_allclose(
                 5.0 + 0.1 * (east + 10.0) + 0.02 * north, feature["properties"]["depth_m"], atol=1e-3
             )
+
+
+def test_the_contour_of_the_datum_has_no_minus(bathymetry: BathymetricMap) -> None:
+    dried = replace(bathymetry, depth_m=bathymetry.depth_m - 6.2)
+    contours = find_contours(dried, FRAME, 1.0)
+    assert str(contours[0].depth_m) == "0.0"
+    assert b"<name>0 m</name>" in contours_kml(contours, title="t", vertical_datum=DATUM)
 
 
 def test_too_many_contours_are_refused_with_a_suggestion(bathymetry: BathymetricMap) -> None:

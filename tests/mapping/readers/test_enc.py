@@ -150,6 +150,16 @@ def test_what_people_built_or_moored_is_proposed_where_it_is_charted(tmp_path: P
     assert set(REASONS) == set(HAZARDS)
 
 
+def test_what_is_built_along_the_shore_makes_no_zone_of_its_own(tmp_path: Path) -> None:
+    cell = Cell()
+    cell.area("LNDARE", square(-400, -400, 300))
+    cell.line("SLCONS", [at(-400, -100), at(-100, -100), at(-100, -400)], OBJNAM="Quay wall")
+    cell.line("SLCONS", [at(-100, -200), at(0, -200)], OBJNAM="Jetty")
+    cell.point("WRECKS", at(-105, -300))
+    zones, _ = read_zones(cell.write(tmp_path / "cell.000"), PLACE, 10.0)
+    assert {(zone.kind, zone.name) for zone in zones} == {("LNDARE", ""), ("SLCONS", "Jetty"), ("WRECKS", "")}
+
+
 def test_water_that_land_encloses_stays_free(tmp_path: Path) -> None:
     cell = Cell()
     around = square(-450, -450, 900)

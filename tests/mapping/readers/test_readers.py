@@ -137,6 +137,59 @@ def test_a_grid_whose_longitudes_begin_at_lisbon_lies_where_it_should(epsg: int)
     np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.05)
 
 
+@pytest.mark.parametrize("around", ["EPSG:32629", "degrees", "degrees from 0 to 360"])
+def test_hills_beside_the_area_keep_no_grid_from_being_read(around: str) -> None:
+    crs = UTM if around == "EPSG:32629" else pyproj.CRS.from_epsg(4326)
+    to_file = pyproj.Transformer.from_crs(FRAME.crs, crs, always_xy=True)
+    cell = 5.0 if crs == UTM else 5e-5
+    x, y = (at + cell * (np.arange(120) - 60) for at in to_file.transform(25.0, 20.0))
+    across, up = np.meshgrid(x, y)
+    east, north = to_file.transform(across, up, direction="INVERSE")
+    z = -depth_at(east, north)
+    z[north > 100.0] = 250.0
+    west = x[0] + (360.0 if "360" in around else 0.0)
+    grid = Raster(z, np.full(z.shape, 0.1), Affine(cell, 0, west - cell / 2, 0, cell, y[0] - cell / 2), crs, "up")
+    found = place_soundings(grid, ReadOptions(), PLACE)
+    s = found.soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
+    assert any("above the water" in note for note in found.notes)
+    sampled, _ = place_reference(grid, ReadOptions(), PLACE)
+    np.testing.assert_allclose(sampled, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)), atol=0.1)
+    z[(north > 30.0) & (north < 40.0)] = 250.0
+    for place in (place_soundings, place_reference):
+        with pytest.raises(ReadError, match="its depth is not between"):
+            place(grid, ReadOptions(), PLACE)
+
+
+def test_a_grid_whose_cells_have_no_size_is_refused() -> None:
+    grid = Raster(np.full((3, 3), 9.0), np.full((3, 3), 0.1), Affine(0.0, 0, 0, 0, 5.0, 0), UTM, "down")
+    with pytest.raises(ReadError, match="no size"):
+        place_soundings(grid, ReadOptions(), PLACE)
+
+
+def test_hills_beside_the_area_keep_no_list_from_being_read() -> None:
+    words = "east_m,north_m,elevation,sd\n5,8,-6,0.1\n20,30,-9,0.1\n20,{north},250,0.1"
+    found = place_soundings(read_words(words.format(north=3000)), ReadOptions(), PLACE)
+    assert found.soundings.depth_m.tolist() == [6.0, 9.0]
+    assert any("above the water" in note for note in found.notes)
+    with pytest.raises(ReadError, match="its depth is not between"):
+        place_soundings(read_words(words.format(north=30)), ReadOptions(), PLACE)
+
+
+def test_a_grid_too_coarse_for_the_area_is_told_from_one_elsewhere(tmp_path: Path) -> None:
+    to_utm = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True)
+    west, south = to_utm.transform(25.0, 20.0)
+    z, sd = np.full((4, 4), 9.0), np.full((4, 4), 0.5)
+    # The area lies about a corner of its cells, whose middles are 325 m away.
+    coarse = Raster(z, sd, Affine(460.0, 0, west - 920.0, 0, 460.0, south - 920.0), UTM, "down")
+    with pytest.raises(ReadError, match=r"cells of 460 m.*none has its middle near") as caught:
+        place_soundings(coarse, ReadOptions(), PLACE)
+    assert "finer" in caught.value.remedy
+    elsewhere = Raster(z, sd, Affine(460.0, 0, west + 5000.0, 0, 460.0, south), UTM, "down")
+    with pytest.raises(ReadError, match="none of its depths lies near"):
+        place_soundings(elsewhere, ReadOptions(), PLACE)
+
+
 def test_what_a_file_does_not_say_has_to_be_said(tmp_path: Path) -> None:
     write_grid(path := tmp_path / "a.asc", 4.0, None)
     path.with_suffix(".prj").unlink(missing_ok=True)
@@ -378,6 +431,19 @@ def test_a_grid_without_any_value_names_its_band(tmp_path: Path) -> None:
 def test_other_endings_are_refused(name: str) -> None:
     with pytest.raises(ReadError, match="has no ending that is read"):
         ending(name)
+
+
+@pytest.mark.parametrize("step_deg", [1 / 3600, 1 / 10_800])
+def test_axes_of_single_precision_are_even_but_for_their_rounding(step_deg: float, tmp_path: Path) -> None:
+    lat, lon = FRAME.origin_lat_deg + step_deg * np.arange(-9, 30), FRAME.origin_lon_deg + step_deg * np.arange(-9, 30)
+    east, north = FRAME.to_local(*np.meshgrid(lat, lon, indexing="ij"))
+    with netCDF4.Dataset(path := tmp_path / "a.nc", "w") as file:
+        for name, values in (("lat", lat), ("lon", lon)):
+            file.createDimension(name, len(values))
+            file.createVariable(name, "f4", (name,))[:] = values
+        file.createVariable("depth", "f4", ("lat", "lon"))[:] = depth_at(east, north)
+    s = place_soundings(read_path(path), SD, PLACE).soundings
+    np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=0.05)
 
 
 def test_uneven_axes_are_refused_by_name(tmp_path: Path) -> None:

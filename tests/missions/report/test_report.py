@@ -91,6 +91,18 @@ async def test_the_sonar_of_a_vehicle_that_joined_later_is_not_said_to_be_the_us
     assert "predefinido" not in page
 
 
+async def test_nearly_all_is_not_said_to_be_all(harbour: Harbour, live: LiveMission) -> None:
+    answers = await harbour.service.reports.answers(live)
+    rest = copy.deepcopy(dict(answers.rest))
+    rest["mission"]["progress"]["coverage_pct"] = 94.97
+    for share in rest["quality"]["tvu"]:
+        share["cells_pct"] = share["sounded_pct"] = 99.96
+    page = html(contents.document_of(replace(answers, rest=rest), Texts(Language.EN))).decode()
+    assert [page.count(text) for text in ("94.9\u00a0%", "95.0\u00a0%")] == [2, 0]
+    assert page.count("99.9\u00a0%") == 2 * len(rest["quality"]["tvu"])
+    assert "100.0\u00a0%" not in page
+
+
 async def test_letters_of_other_languages_stay_and_marks_that_turn_the_writing_are_shown(
     harbour: Harbour, live: LiveMission
 ) -> None:

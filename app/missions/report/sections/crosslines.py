@@ -17,12 +17,12 @@ _AGREEMENT = (
     ("rms_m", 3, False),
     ("p95_m", 3, False),
     ("max_m", 3, False),
-    ("within_pct", 1, False),
 )
 
 
 def _agreement(w: Writer, source: str) -> list[Text]:
-    return [w.number(f"{source}.{name}", decimals, signed=signed) for name, decimals, signed in _AGREEMENT]
+    told: list[Text] = [w.number(f"{source}.{name}", decimals, signed=signed) for name, decimals, signed in _AGREEMENT]
+    return [*told, w.share(f"{source}.within_pct", "")]
 
 
 def crosslines(w: Writer) -> list[Block]:
@@ -42,7 +42,7 @@ def crosslines(w: Writer) -> list[Block]:
     blocks: list[Block] = [Facts(facts)]
     if answers.at(f"{own}.statistics") is None:
         return [*blocks, Paragraph(t("crossings_none"), note=True)]
-    columns = [t(f"column_{name}") for name, *_ in _AGREEMENT[:-1]] + [t("column_within", order=order)]
+    columns = [t(f"column_{name}") for name, *_ in _AGREEMENT] + [t("column_within", order=order)]
     numbers = tuple(range(1, 1 + len(columns)))
     rows: list[list[Text]] = [[t("all_crossings"), *_agreement(w, f"{own}.statistics")]]
     if answers.at(f"{own}.at_crosslines") is not None:

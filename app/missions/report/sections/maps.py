@@ -88,13 +88,13 @@ def density(w: Writer) -> list[Block]:
     facts: list[tuple[str, Text]]
     if w.is_swath:
         facts = [
-            (t("fact_ensonified"), w.number("mission.progress.ensonified_pct", 1, "%")),
-            (t("fact_dense"), w.number("mission.progress.dense_pct", 1, "%")),
+            (t("fact_ensonified"), w.share("mission.progress.ensonified_pct")),
+            (t("fact_dense"), w.share("mission.progress.dense_pct")),
             (t("fact_holidays"), w.number("mission.progress.holidays")),
         ]
     else:
         facts = [
-            (t("fact_coverage"), w.number("mission.progress.coverage_pct", 1, "%")),
+            (t("fact_coverage"), w.share("mission.progress.coverage_pct")),
             (t("fact_accuracy"), w.number("mission.spec.accuracy_m", 2, "m")),
         ]
     blocks: list[Block] = [Facts(facts), Paragraph(t("coverage_swath" if w.is_swath else "coverage_single"))]

@@ -40,11 +40,11 @@ def purpose(w: Writer) -> list[Block]:
         facts.append((t("fact_pings"), w.number("mission.progress.pings")))
         facts.append((t("fact_beams"), w.number("mission.progress.beams")))
     if not w.is_swath:
-        facts.append((t("fact_coverage"), w.number("mission.progress.coverage_pct", 1, "%")))
+        facts.append((t("fact_coverage"), w.share("mission.progress.coverage_pct")))
     else:
         # What beams met says nothing of how well it is known.
-        facts.append((t("fact_ensonified"), w.number("mission.progress.ensonified_pct", 1, "%")))
-        facts.append((t("fact_dense"), w.number("mission.progress.dense_pct", 1, "%")))
+        facts.append((t("fact_ensonified"), w.share("mission.progress.ensonified_pct")))
+        facts.append((t("fact_dense"), w.share("mission.progress.dense_pct")))
         facts.append((t("fact_holidays"), w.number("mission.progress.holidays")))
     return [*blocks, Facts(facts)]
 

@@ -13,9 +13,9 @@ def s44(w: Writer) -> list[Block]:
         rows.append(
             [
                 w.order(one["order"]),
-                w.number(f"{own}.cells_pct", 1, "%"),
-                w.number(f"{own}.sounded_pct", 1, "%"),
-                w.number(f"{own}.horizontal_pct", 1, "%"),
+                w.share(f"{own}.cells_pct"),
+                w.share(f"{own}.sounded_pct"),
+                w.share(f"{own}.horizontal_pct"),
             ]
         )
     columns = [t(f"column_{name}") for name in ("order", "tvu_cells", "tvu_sounded", "thu_cells")]
