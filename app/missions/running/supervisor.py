@@ -77,6 +77,19 @@ class MissionSupervisor:
         """
         return self._acting.setdefault(mission_id, asyncio.Lock())
 
+    async def stop_first(self, live: LiveMission) -> None:
+        """Stop the vehicles of a mission that is to be paused or aborted, where another one holds its lock for long.
+
+        Who joins a mission, or sends a vehicle on, writes that down under the lock: a database that hangs would keep
+        vehicles at sea meanwhile.
+        """
+        acting = self.acting(live.id)
+        try:
+            async with asyncio.timeout(PATIENCE_S), acting:
+                return
+        except TimeoutError:
+            await self.halt(live)
+
     def run(self, live: LiveMission) -> None:
         """Begin the flight."""
         live.set_off()
