@@ -96,6 +96,24 @@ async def started(service: MissionService, spec: MissionSpec) -> str:
 # Life
 
 
+async def test_a_vehicle_is_stopped_while_who_joins_waits_for_a_disk(service: MissionService) -> None:
+    live = await service.get(await started(service, sim_spec("a", "b", steps=1000)))
+    await until_step(service, live.id, 1)
+    async with service.database.writing():
+        joining = asyncio.create_task(
+            service.team_changes.join(live, VehicleSpec(name="c", kind=VehicleKind.SIM), "Ana")
+        )
+        await asyncio.sleep(0)
+        stopping = asyncio.create_task(service.team_changes.stop_one(live, "a", "Bo"))
+        await until(lambda: service.hub.info((VehicleKind.SIM, "a")).state is LinkState.READY, "it is stopped")
+        assert not joining.done()
+    [stop] = await stopping
+    await joining
+    assert (stop.vehicle, stop.acknowledged) == ("a", True)
+    assert sorted(live.team.members) == ["b", "c"]
+    await act(service, live.id, "abort")
+
+
 @pytest.mark.parametrize("action", ["abort", "pause"])
 async def test_vehicles_are_stopped_while_who_joins_waits_for_a_disk(service: MissionService, action: str) -> None:
     live = await service.get(await started(service, sim_spec("a", "b", steps=1000)))
