@@ -313,6 +313,9 @@ class MissionService:
             The latter when a vehicle is not ready or takes part in another mission, or none has a recovery point to go
             to.
         """
+        stops_all = action in (Action.PAUSE, Action.ABORT) and not return_home
+        if stops_all and live.header.state is MissionState.RUNNING and await self._supervisor.held_up(live):
+            await self._supervisor.halt(live)
         async with self._supervisor.acting(live.id):
             target = states.move(live.header.state, action)
             stops: list[StopReceipt] = []

@@ -54,9 +54,11 @@ def test_several_runs_print_runs_and_a_summary(terrain: Terrain) -> None:
     assert spread["min"] <= spread["mean"] <= spread["max"]
 
 
-def test_where_there_is_little_room_no_name_of_a_column_is_cut_off(terrain: Terrain) -> None:
-    few = ("--terrain", terrain, "--landmarks", "20", "--steps", "2", "--planner", "random")
-    result = CliRunner().invoke(evaluate_app, ["explore", *few], env={"COLUMNS": "60"})
+def test_where_there_is_little_room_no_name_of_a_column_is_cut_off(
+    terrain: Terrain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    result = call("explore", "--terrain", terrain, "--landmarks", "20", "--steps", "2", "--planner", "random")
     assert result.exit_code == 0
     assert "…" not in result.stdout
 

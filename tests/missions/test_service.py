@@ -96,6 +96,46 @@ async def started(service: MissionService, spec: MissionSpec) -> str:
 # Life
 
 
+async def test_a_vehicle_is_stopped_while_who_joins_waits_for_a_disk(service: MissionService) -> None:
+    live = await service.get(await started(service, sim_spec("a", "b", steps=1000)))
+    await until_step(service, live.id, 1)
+    async with service.database.writing():
+        joining = asyncio.create_task(
+            service.team_changes.join(live, VehicleSpec(name="c", kind=VehicleKind.SIM), "Ana")
+        )
+        await asyncio.sleep(0)
+        stopping = asyncio.create_task(service.team_changes.stop_one(live, "a", "Bo"))
+        await until(lambda: service.hub.info((VehicleKind.SIM, "a")).state is LinkState.READY, "it is stopped")
+        assert not joining.done()
+    [stop] = await stopping
+    await joining
+    assert (stop.vehicle, stop.acknowledged) == ("a", True)
+    assert sorted(live.team.members) == ["b", "c"]
+    await act(service, live.id, "abort")
+
+
+@pytest.mark.parametrize("action", ["abort", "pause"])
+async def test_vehicles_are_stopped_while_who_joins_waits_for_a_disk(service: MissionService, action: str) -> None:
+    live = await service.get(await started(service, sim_spec("a", "b", steps=1000)))
+    await until_step(service, live.id, 1)
+    async with service.database.writing():  # a long transaction: nobody else can write
+        joining = asyncio.create_task(
+            service.team_changes.join(live, VehicleSpec(name="c", kind=VehicleKind.SIM), "Ana")
+        )
+        await asyncio.sleep(0)
+        stopping = asyncio.create_task(act(service, live.id, action))
+        await until(lambda: not any(member.engaged for member in live.team), "the vehicles are stopped")
+        assert not joining.done()
+        assert live.header.state is S.RUNNING, "that waits"
+    await joining
+    assert (await stopping).mission.state == {"abort": S.ABORTED, "pause": S.PAUSED}[action]
+    assert not any(member.engaged for member in live.team)
+    if action == "pause":
+        await act(service, live.id, "resume")
+        await until(lambda: live.team.members["c"].legs > 0, "all go on, with who joined")
+        await act(service, live.id, "abort")
+
+
 async def test_a_mission_with_a_described_multibeam_runs_to_its_end(service: MissionService) -> None:
     vehicles = [{"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": {"aperture_deg": 90, "beams": 32}}]
     mission_id = await started(service, sim_spec(steps=3, vehicles=vehicles))

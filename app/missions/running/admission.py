@@ -66,7 +66,10 @@ def _check_room(spec: MissionSpec) -> None:
     if not spec.keep_out:
         return
     margin_m = spec.limits.keep_out_margin_m
-    zones = unary_union([Polygon(spec.to_local(zone)).buffer(margin_m) for zone in spec.keep_out])
+    try:
+        zones = unary_union([Polygon(spec.to_local(zone)).buffer(margin_m) for zone in spec.keep_out])
+    except ValueError:
+        return  # one is nowhere near: no mission can be made of it, and that is told with its name
     if Polygon(spec.local_inner_area()).difference(zones).area < spec.cell_m**2:
         raise InvalidRequestError(
             "keep_out",

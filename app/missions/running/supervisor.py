@@ -73,9 +73,21 @@ class MissionSupervisor:
     def acting(self, mission_id: str) -> asyncio.Lock:
         """Return the lock under which a mission's state changes.
 
-        Whoever holds it keeps an abort waiting: nothing is computed under it.
+        Whoever holds it keeps what an abort writes waiting, not its vehicles: see :meth:`held_up`.
         """
         return self._acting.setdefault(mission_id, asyncio.Lock())
+
+    async def held_up(self, live: LiveMission) -> bool:
+        """Whether a mission's lock is held for longer than vehicles wait to be stopped.
+
+        Who joins a mission, or sends a vehicle on, writes that down under the lock: a database that hangs would keep
+        vehicles at sea meanwhile.
+        """
+        try:
+            async with asyncio.timeout(PATIENCE_S), self.acting(live.id):
+                return False
+        except TimeoutError:
+            return True
 
     def run(self, live: LiveMission) -> None:
         """Begin the flight."""

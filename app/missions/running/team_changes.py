@@ -72,6 +72,8 @@ class TeamChanges:
         VehicleNotFoundError, ConflictError
             The latter when it takes part in another mission meanwhile.
         """
+        if live.header.state is MissionState.RUNNING and await self._supervisor.held_up(live):
+            return await self._leave(live, live.team.named(name), actor)
         async with self._supervisor.acting(live.id):
             member = live.team.named(name)
             if live.header.state in ENDED:
