@@ -1,14 +1,35 @@
+import asyncio
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
 
+from app.missions import clock
+from app.missions.clock import now
 from app.missions.service import MissionService
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.storage.database import Database
+from simulator.event_loop import BEGIN_S, SimulatedTimeLoop
 from tests.support.missions.harbour import Harbour
 from tests.support.neptus.gateway import COLS, ROWS, Gateway
 from tests.support.ports import free_ports
+
+
+def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
+    """Run tests that use ``simulated_time`` on a loop of that kind, all others on the usual one."""
+    simulated = "simulated_time" in getattr(item, "fixturenames", ())
+    return {"simulated": SimulatedTimeLoop} if simulated else {"real": asyncio.SelectorEventLoop}
+
+
+@pytest.fixture
+async def simulated_time() -> AsyncIterator[None]:
+    """A time that goes on as soon as nobody has anything left to do: missions come out the same on busy machines.
+
+    While a thread works, a planner's as well, no time passes.
+    """
+    loop, began = asyncio.get_running_loop(), now().timestamp()
+    with clock.told_by(lambda: began + loop.time() - BEGIN_S):
+        yield
 
 
 @pytest.fixture
