@@ -234,7 +234,8 @@ export function allDecided({ budget, step, steps, minutes_left, km_left_per_vehi
   return budget.steps != null ? step >= steps : minutes_left === 0 || km_left_per_vehicle === 0;
 }
 
-const SETTLED = ["reached", "missed", "refused"];
+/** What becomes of a waypoint in the end. */
+export const SETTLED = ["reached", "missed", "refused"];
 
 /** Whether all that survey wait for a decision; who is held or called home waits for none. */
 export function allWait(vehicles: readonly Waiting[]): boolean {

@@ -31,7 +31,7 @@ export async function showWhere(vehicle: string, at: number | null): Promise<voi
     return;
   }
   try {
-    const [tracks] = await Promise.all([api.tracks(id), fetchSteps()]);
+    const [tracks] = await Promise.all([api.tracks(id), fetchSteps(true)]);
     if (selectedId.peek() === id) show(placeThen(vehicle, waysOf(tracks)[vehicle], steps.peek(), at) ?? here);
   } catch (error) {
     noteFault(error);

@@ -104,13 +104,16 @@ export function NewMissionForm() {
     if (Object.keys(faults.value).length > 0) return;
     sending.value = true;
     try {
-      // What it follows stays as it is.
-      if (edited) await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
-      const ids = edited ? [edited.id] : await createMissions(toMissions(draft.value));
-      if (draft.value.tide_table) {
-        const source = draft.value.tide_source || say("mission.tideTable");
-        for (const id of ids) await api.setTide(id, { table: draft.value.tide_table, source });
-      }
+      const { tide_table: table, tide_source } = draft.value;
+      const source = tide_source || say("mission.tideTable");
+      const withTide = async (id: string) => {
+        if (table) await api.setTide(id, { table, source });
+      };
+      if (edited) {
+        // What it follows stays as it is.
+        await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
+        await withTide(edited.id);
+      } else await createMissions(toMissions(draft.value), withTide);
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;

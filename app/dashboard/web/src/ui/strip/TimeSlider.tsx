@@ -34,7 +34,7 @@ export function TimeSlider() {
             playing.value = false;
             return;
           }
-          if (shown === null || shown >= last) await replay(1);
+          await replay(shown === null || shown >= last ? 1 : shown + 1);
           playing.value = true;
         }}
       >
