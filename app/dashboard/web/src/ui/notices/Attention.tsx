@@ -17,8 +17,9 @@ const SIGNS = { alarm: "✕", warning: "▲", calm: "◌" };
 
 /** One glance tells what needs a person: over the map on every page, alarms until someone takes them. */
 export function Attention() {
+  // Alarms are of now, whatever step of the past is shown.
   const matters = useComputed(() =>
-    replayStep.value === null ? mattersOf(mission.value, openAlarms.value) : [],
+    mattersOf(replayStep.value === null ? mission.value : null, openAlarms.value),
   );
   const open = useSignal(false);
   useEffect(() => followAlarms(), []);
