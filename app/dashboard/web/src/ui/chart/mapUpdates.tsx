@@ -45,6 +45,7 @@ import {
   marked,
   measured,
   mission,
+  now,
   ownShip,
   panelOpen,
   planned,
@@ -142,9 +143,10 @@ export function follow(chart: Chart): () => void {
         showTargets.value && replayStep.value === null ? targetMarks(mission.value?.targets ?? []) : [],
       ),
     ),
-    effect(() =>
-      chart.setShips(showShips.value && replayStep.value === null ? shipMarks(ships.value ?? []) : []),
-    ),
+    effect(() => {
+      const told = showShips.value && replayStep.value === null ? (ships.value ?? []) : [];
+      chart.setShips(shipMarks(told, told.length > 0 ? silence_s() : 0));
+    }),
     effect(() => {
       if (showShips.value && ships.value?.length) chart.setPointed(cursor.value);
     }),
@@ -203,6 +205,10 @@ function planLines(): PlanLines {
     }),
   );
 }
+
+/** How long ago the service told of what moves; 0 while it does. */
+const silence_s = (): number =>
+  socketStatus.value?.kind === "open" ? 0 : Math.max(0, now.value - view.peek().vehiclesAt) / 1000;
 
 /** A place that was asked for, where this device is, and where the own ship is. */
 function pointedOut(): PlaceMark[] {
