@@ -23,6 +23,7 @@ import {
   panelOpen,
   preflightOpen,
   replayStep,
+  serviceNow,
   settingsOpen,
   socketStatus,
   vehicles,
@@ -82,7 +83,7 @@ export function TopBar() {
           </>
         ) : null}
         <LinkSummary />
-        <Figure label={say("topBar.utc")} value={clock(new Date(now.value), "utc")} minor />
+        <Figure label={say("topBar.utc")} value={clock(new Date(serviceNow.value), "utc")} minor />
         <Figure label={say("topBar.local")} value={clock(new Date(now.value), "local")} minor />
       </dl>
       <Button

@@ -27,8 +27,8 @@ import {
   abortDialogOpen,
   abortOne,
   mission,
-  now,
   replayStep,
+  serviceNow,
   socketStatus,
   unstopped,
   type Vehicle,
@@ -249,7 +249,7 @@ function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; t
 
 /** How long its energy lasts beside what its way home takes; nothing where neither is known. */
 function Range({ of: v }: { of: VehicleView }) {
-  const words = rangeWords(v, now.value);
+  const words = rangeWords(v, serviceNow.value);
   if (words.length === 0) return null;
   const { energy_left_pct: left_pct, energy_left_s: left_s, return_needs_s: needs_s } = v;
   const needs_pct = left_pct && left_s && needs_s !== null ? (left_pct * needs_s) / left_s : null;
