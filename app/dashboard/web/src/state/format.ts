@@ -97,6 +97,9 @@ export function age(seconds: number | null): string {
   return seconds < 10 ? `${fixed(seconds, 1)} s` : duration(seconds);
 }
 
+/** A direction as it is said: three whole digits, north is 000. */
+export const direction = (degrees: number): string => String(Math.round(degrees) % 360).padStart(3, "0");
+
 /** Coordinates with as many decimals as a step of the given size needs. */
 export function latitude(degrees: number, decimals = 6): string {
   return `${Math.abs(degrees).toFixed(decimals)}° ${degrees < 0 ? "S" : "N"}`;
