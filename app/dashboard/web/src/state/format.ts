@@ -5,9 +5,9 @@ import { language, locale, say } from "../words/say";
 
 const UNKNOWN = "–";
 
-/** A number with so many decimals, as the language writes it. */
+/** A number with so many decimals, as the language writes it; what is rounded to nothing has no sign. */
 export function fixed(value: number, digits: number): string {
-  const text = value.toFixed(digits);
+  const text = value.toFixed(digits).replace(/^-(?=[0.]*$)/, "");
   return language.value === "pt" ? text.replace(".", ",") : text;
 }
 
