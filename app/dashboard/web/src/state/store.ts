@@ -84,6 +84,11 @@ export const colourOf = computed(() => {
 /** After this long without a word a vehicle's values are drawn as old. */
 export const STALE_AFTER_S = 5;
 
+/** Whether the service tells what is now: a socket stays open for long after the network has gone. */
+export const live = computed(
+  () => socketStatus.value?.kind === "open" && now.value - view.value.vehiclesAt <= 1000 * STALE_AFTER_S,
+);
+
 export interface Vehicle {
   view: VehicleView;
   waypoint: WaypointView | undefined;

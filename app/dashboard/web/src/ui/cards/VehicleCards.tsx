@@ -26,10 +26,10 @@ import {
 import {
   abortDialogOpen,
   abortOne,
+  live,
   mission,
   replayStep,
   serviceNow,
-  socketStatus,
   unstopped,
   type Vehicle,
   vehicles,
@@ -52,7 +52,7 @@ export function VehicleCards() {
   return (
     <aside class="cards-column" aria-label={say("compare.vehicles")}>
       <section
-        class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
+        class={`cards${live.value ? "" : " stale"}`}
         // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
         tabIndex={0}
       >

@@ -42,6 +42,7 @@ import {
   holidays,
   isDark,
   lightFrom,
+  live,
   marked,
   measured,
   mission,
@@ -67,7 +68,6 @@ import {
   showTargets,
   showTracks,
   site,
-  socketStatus,
   stripHeight,
   theme,
   type Vehicle,
@@ -207,15 +207,14 @@ function planLines(): PlanLines {
 }
 
 /** How long ago the service told of what moves; 0 while it does. */
-const silence_s = (): number =>
-  socketStatus.value?.kind === "open" ? 0 : Math.max(0, now.value - view.peek().vehiclesAt) / 1000;
+const silence_s = (): number => (live.value ? 0 : Math.max(0, now.value - view.peek().vehiclesAt) / 1000);
 
 /** A place that was asked for, where this device is, and where the own ship is. */
 function pointedOut(): PlaceMark[] {
   const [asked, own, ship] = [marked.value, ownPosition.value, ownShip.value];
-  const live = showShips.value && replayStep.value === null;
+  const shown = showShips.value && replayStep.value === null;
   return [
-    ...(live && ship ? [ownShipMark(ship, socketStatus.value?.kind === "open")] : []),
+    ...(shown && ship ? [ownShipMark(ship, live.value)] : []),
     ...(asked
       ? [
           {
