@@ -42,6 +42,16 @@ def test_the_form_names_wrong_values_and_creates_nothing(page: Page, service: Se
     expect(page.get_by_text("Give the mission a name")).to_be_visible()
     expect(page.get_by_text("Steps must be between 1 and 100000")).to_be_visible()
     expect(by_id(page, "field-steps")).to_have_attribute("aria-invalid", "true")
+    # The button is a window's height below.
+    expect(by_id(page, "field-name")).to_be_in_viewport()
+    expect(by_id(page, "field-name")).to_be_focused()
+    by_id(page, "field-name").fill("Folded")
+    by_id(page, "field-steps").fill("10")
+    page.get_by_text("Expert settings").click()
+    by_id(page, "field-max_depth_m").fill("-3")
+    page.get_by_text("Expert settings").click()
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "fault-max_depth_m")).to_be_in_viewport()
     assert len(service.get("/missions")) == before
 
 

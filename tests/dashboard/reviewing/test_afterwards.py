@@ -46,6 +46,17 @@ def test_a_finished_mission_is_replayed_step_by_step(page: Page, service: Servic
     expect(by_id(page, "step")).to_have_text("4")
 
 
+def test_files_tell_the_quality_of_the_mission_that_is_shown(page: Page, service: Service, flown: str) -> None:
+    show(page, flown)
+    by_id(page, "toggle-files").click()
+    expect(by_id(page, "quality")).to_contain_text("Depths are below")
+    nothing = service.create(name="Nothing yet")
+    page.evaluate(f"location.hash = '#/missions/{nothing}'")
+    expect(by_id(page, "mission-name")).to_have_text("Nothing yet")
+    expect(by_id(page, "files")).to_contain_text("follow with the first accepted sounding")
+    expect(by_id(page, "quality")).to_have_count(0)
+
+
 def test_charts_layers_space_and_comparison_of_a_finished_mission(
     watched: Watched, service: Service, flown: str
 ) -> None:

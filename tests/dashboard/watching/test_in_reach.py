@@ -222,6 +222,7 @@ def test_an_entry_into_a_zone_is_told_over_the_map_and_on_the_card(page: Page, s
     service.post(f"/missions/{mission}/measurements", {"items": items})
     service.act(mission, "start")
     show(page, mission)
+    expect(by_id(page, "step")).not_to_have_text("0")
     items = [where | {"time_s": 1_795_225_150.0, "lat_deg": 41.18525, "lon_deg": -8.7046}]
     service.post(f"/missions/{mission}/measurements", {"items": items})
     expect(by_id(page, "alarms")).to_contain_text("rover is in keep-out zone 1")
@@ -229,6 +230,10 @@ def test_an_entry_into_a_zone_is_told_over_the_map_and_on_the_card(page: Page, s
     expect(by_id(page, "vehicle-mark-rover")).to_contain_text("in keep-out zone 1")
     other = page.context.new_page()
     other.goto(page.url)
+    expect(by_id(other, "alarms")).to_contain_text("rover is in keep-out zone 1")
+    # Who looks at the past is told of the present's alarms, too.
+    by_id(other, "slider").fill("1")
+    expect(by_id(other, "replayed-at")).to_contain_text("UTC")
     expect(by_id(other, "alarms")).to_contain_text("rover is in keep-out zone 1")
     by_id(page, "take-alarms").click()
     for either in (page, other):

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { durations } from "./format";
+import { direction, durations, fixed, metres } from "./format";
 
 it("ranges of time are told in whole minutes from ten minutes on, and are not narrower then", () => {
   expect(durations(187, 250)).toBe("3 min 07 s to 4 min 10 s");
@@ -7,4 +7,14 @@ it("ranges of time are told in whole minutes from ten minutes on, and are not na
   expect(durations(828, 1216)).toBe("13 to 21 min");
   expect(durations(3020, 3890)).toBe("50 min to 1 h 05 min");
   expect(durations(900, 900)).toBe("15 min");
+});
+
+it("directions are told in three digits, north as 000", () => {
+  expect([0, 7.4, 90, 359.4, 359.6].map(direction)).toEqual(["000", "007", "090", "359", "000"]);
+});
+
+it("what is rounded to nothing has no sign", () => {
+  expect(metres(-0.04)).toBe("0.0 m");
+  expect(fixed(-0.4, 0)).toBe("0");
+  expect(fixed(-0.06, 1)).toBe("-0.1");
 });

@@ -5,9 +5,9 @@ import { language, locale, say } from "../words/say";
 
 const UNKNOWN = "–";
 
-/** A number with so many decimals, as the language writes it. */
+/** A number with so many decimals, as the language writes it; what is rounded to nothing has no sign. */
 export function fixed(value: number, digits: number): string {
-  const text = value.toFixed(digits);
+  const text = value.toFixed(digits).replace(/^-(?=[0.]*$)/, "");
   return language.value === "pt" ? text.replace(".", ",") : text;
 }
 
@@ -96,6 +96,9 @@ export function age(seconds: number | null): string {
   if (seconds === null) return say("format.never");
   return seconds < 10 ? `${fixed(seconds, 1)} s` : duration(seconds);
 }
+
+/** A direction as it is said: three whole digits, north is 000. */
+export const direction = (degrees: number): string => String(Math.round(degrees) % 360).padStart(3, "0");
 
 /** Coordinates with as many decimals as a step of the given size needs. */
 export function latitude(degrees: number, decimals = 6): string {

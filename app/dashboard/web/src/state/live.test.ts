@@ -281,3 +281,19 @@ it("has vehicles wait for a decision only while somebody surveys", () => {
   expect(allWait([of("", "acknowledged"), of("held by Ana", "reached")])).toBe(false);
   expect(allWait([of("held by Ana", "reached"), of("called home by Ana", "reached")])).toBe(false);
 });
+
+it("the service's clock counts where the page's is wrong, not what messages take", () => {
+  const at = Date.parse("2026-11-21T12:00:00Z");
+  const shown = { ...EMPTY_VIEW, mission: { id: "m", waypoints: [] } as unknown as MissionView };
+  const told = (view: typeof shown, late_ms: number) =>
+    reduce(
+      view,
+      { type: "vehicles", time: "2026-11-21T12:00:00Z", vehicles: [] },
+      at + late_ms,
+    ) as typeof shown;
+  expect(told(shown, 900).clockAhead_ms).toBe(0);
+  const wrong = told(shown, -3_600_000);
+  expect(wrong.clockAhead_ms).toBe(3_600_000);
+  expect(told(wrong, -3_599_200).clockAhead_ms).toBe(3_600_000);
+  expect(told(wrong, 100).clockAhead_ms).toBe(-100);
+});

@@ -51,6 +51,8 @@ export interface LiveView {
   vehiclesAt: number;
   /** The same for the mission's state and progress. */
   progressAt: number;
+  /** By how much the service's clock is ahead of the page's; within two seconds they count as the same. */
+  clockAhead_ms: number;
 }
 
 export const EMPTY_VIEW: LiveView = {
@@ -68,6 +70,7 @@ export const EMPTY_VIEW: LiveView = {
   lastEventId: 0,
   vehiclesAt: 0,
   progressAt: 0,
+  clockAhead_ms: 0,
 };
 
 const MOST_TRACK_POINTS = 8000;
@@ -98,11 +101,13 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         lastEventId: message.last_event_id,
         vehiclesAt: at,
         progressAt: at,
+        clockAhead_ms: view.clockAhead_ms,
       };
     case "vehicles":
       if (!view.mission) return view;
       return {
         ...view,
+        clockAhead_ms: steady(view.clockAhead_ms, Date.parse(message.time) - at),
         mission: { ...view.mission, vehicles: message.vehicles },
         tracks: extendTracks(view.tracks, message.vehicles),
         vehiclesAt: at,
@@ -138,6 +143,12 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       return withAlarm(view, message.alarm);
   }
 }
+
+const SAME_CLOCK_MS = 2000;
+
+/** A difference of clocks as it was, unless it is another by more than messages take. */
+const steady = (before_ms: number, found_ms: number): number =>
+  Math.abs(found_ms - before_ms) > SAME_CLOCK_MS ? found_ms : before_ms;
 
 /** The mission as it was asked for once, until the live view tells more. */
 export function withMission(view: LiveView, mission: MissionView, at: number): LiveView {
@@ -234,7 +245,8 @@ export function allDecided({ budget, step, steps, minutes_left, km_left_per_vehi
   return budget.steps != null ? step >= steps : minutes_left === 0 || km_left_per_vehicle === 0;
 }
 
-const SETTLED = ["reached", "missed", "refused"];
+/** What becomes of a waypoint in the end. */
+export const SETTLED = ["reached", "missed", "refused"];
 
 /** Whether all that survey wait for a decision; who is held or called home waits for none. */
 export function allWait(vehicles: readonly Waiting[]): boolean {

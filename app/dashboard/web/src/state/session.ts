@@ -9,6 +9,7 @@ import { withTiles } from "../map/picture/seafloor";
 import { type Key, say } from "../words/say";
 import { identify, me, signedOut, whyNotCommand } from "./access";
 import { EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
+import { lastFlown, withSteps } from "./past/history";
 import { isAllowed } from "./stateNames";
 import {
   abortDialogOpen,
@@ -36,6 +37,8 @@ import {
 const LIST_PERIOD_MS = 5000;
 const LEAST_MAP_PERIOD_MS = 300;
 const REPLAY_MAP_PERIOD_MS = 120;
+/** As many steps come at once. */
+const STEPS_PAGE = 1000;
 
 /** The last command that was refused, until it is dismissed or the next one succeeds. */
 export const refusal = signal<{ what: string; error: ServiceError; inDialog: boolean } | null>(null);
@@ -282,16 +285,18 @@ function followVersions<T>(
   };
 }
 
-/** Asks for the steps that are not known yet. */
-export async function fetchSteps(): Promise<void> {
+/** Asks for the steps that are not known yet; `flown`: for those, too, whose waypoints were still to be flown when they were. */
+export async function fetchSteps(flown = false): Promise<void> {
   const id = selectedId.peek();
   if (!id) return;
+  const known = steps.peek();
+  let after = flown ? lastFlown(known) : (known.at(-1)?.number ?? 0);
   for (;;) {
-    const known = steps.peek();
-    const more = await api.steps(id, known.at(-1)?.number ?? 0);
+    const more = await api.steps(id, after);
     if (selectedId.peek() !== id || more.length === 0) return;
-    steps.value = [...known, ...more];
-    if (more.length < 1000) return;
+    steps.value = withSteps(steps.peek(), more);
+    if (more.length < STEPS_PAGE) return;
+    after = more.at(-1)?.number ?? after;
   }
 }
 
@@ -399,13 +404,20 @@ export async function send<T>(what: string, answer: Promise<T>, inDialog = false
   }
 }
 
-/** Creates missions that follow each other, all or none, and shows the first; returns their ids. */
-export async function createMissions(described: readonly NewMission[]): Promise<string[]> {
+/**
+ * Creates missions that follow each other, all or none, and shows the first; `complete` gives each what its description
+ * does not hold. Returns their ids.
+ */
+export async function createMissions(
+  described: readonly NewMission[],
+  complete: (id: string) => Promise<unknown> = async () => undefined,
+): Promise<string[]> {
   const ids: string[] = [];
   try {
     for (const mission of described) {
       const created: MissionView = await api.create({ ...mission, after: ids.at(-1) ?? null });
       ids.push(created.id);
+      await complete(created.id);
     }
   } catch (error) {
     await Promise.allSettled(ids.map(api.deleteMission));

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { MissionView, VehicleView, WaypointView } from "../api/types";
+import { chosenLanguage } from "../words/say";
 import { age, clock, count, distance, duration, latitude, longitude, metres } from "./format";
 import {
   batteryWords,
@@ -221,4 +222,17 @@ it("a mission whose vehicles are on their way home lasts until the last is there
   );
   expect(remaining_s(0, [])).toBe(0);
   expect(remaining_s(null, [coming("returning", 200)])).toBeNull();
+});
+
+it("a length that is no whole number is told with the language's comma in both figures", () => {
+  chosenLanguage.value = "pt";
+  const km = {
+    km_left_per_vehicle: 1.2,
+    minutes_left: null,
+    budget: { km_per_vehicle: 1.5 },
+    step: 3,
+    steps: 9,
+  };
+  expect(flownWords(km as Parameters<typeof flownWords>[0])).toBe("0,3 de 1,5 km");
+  chosenLanguage.value = "system";
 });

@@ -15,7 +15,7 @@ import type {
   WaypointView,
 } from "../api/types";
 import { named, say } from "../words/say";
-import { clock, count, fixed, minutes, percent } from "./format";
+import { clock, count, fixed, minutes, percent, plain } from "./format";
 
 export const MISSION_WORDS: Record<MissionState, string> = {
   get draft() {
@@ -119,7 +119,11 @@ type Progress = Pick<
 >;
 
 const ofWhole = (whole: number, left: number, unit: string): string =>
-  say("state.of", { whole: fixed(Math.max(whole - left, 0), whole < 10 ? 1 : 0), whole2: whole, unit });
+  say("state.of", {
+    whole: fixed(Math.max(whole - left, 0), whole < 10 ? 1 : 0),
+    whole2: plain(whole),
+    unit,
+  });
 
 /** How far a mission has come, in the unit of its length. */
 export const lengthWords = (progress: Progress): string =>
@@ -259,10 +263,10 @@ export function sonarWords(
     range_m = SPEC["vehicles.sonar.range_m"].default,
   } = sonar ?? {};
   return [
-    say("state.multibeam", { apertureDeg: aperture_deg }),
+    say("state.multibeam", { apertureDeg: plain(aperture_deg) }),
     say("state.beams", { beams }),
-    `${rate_hz} Hz`,
-    say("state.reachesM", { rangeM: range_m }),
+    `${plain(rate_hz)} Hz`,
+    say("state.reachesM", { rangeM: plain(range_m) }),
   ];
 }
 

@@ -49,6 +49,9 @@ export const socketStatus = signal<SocketStatus | null>(null);
 /** Page clock, milliseconds, ticking. */
 export const now = signal(Date.now());
 
+/** The service's clock, milliseconds: what it tells of when something was or will be is beside that, not beside this device's. */
+export const serviceNow = computed(() => now.value + view.value.clockAhead_ms);
+
 export const mission = computed(() => view.value.mission);
 
 /** Reading more soundings and pings takes long enough to be asked for. */
@@ -80,6 +83,11 @@ export const colourOf = computed(() => {
 
 /** After this long without a word a vehicle's values are drawn as old. */
 export const STALE_AFTER_S = 5;
+
+/** Whether the service tells what is now: a socket stays open for long after the network has gone. */
+export const live = computed(
+  () => socketStatus.value?.kind === "open" && now.value - view.value.vehiclesAt <= 1000 * STALE_AFTER_S,
+);
 
 export interface Vehicle {
   view: VehicleView;
@@ -122,7 +130,7 @@ const TAKEN_SHOWN_MS = 60_000;
 export const takenAlarm = computed(() => {
   const { taken } = view.value;
   const at = taken?.acknowledged_at ? Date.parse(taken.acknowledged_at) : 0;
-  return now.value - at < TAKEN_SHOWN_MS ? taken : null;
+  return serviceNow.value - at < TAKEN_SHOWN_MS ? taken : null;
 });
 
 /** Vehicles whose last stop was not acknowledged. */

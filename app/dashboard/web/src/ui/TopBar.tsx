@@ -18,11 +18,14 @@ import {
   abortOne,
   finishOpen,
   linksOpen,
+  live,
   mission,
   now,
   panelOpen,
   preflightOpen,
   replayStep,
+  STALE_AFTER_S,
+  serviceNow,
   settingsOpen,
   socketStatus,
   vehicles,
@@ -82,7 +85,7 @@ export function TopBar() {
           </>
         ) : null}
         <LinkSummary />
-        <Figure label={say("topBar.utc")} value={clock(new Date(now.value), "utc")} minor />
+        <Figure label={say("topBar.utc")} value={clock(new Date(serviceNow.value), "utc")} minor />
         <Figure label={say("topBar.local")} value={clock(new Date(now.value), "local")} minor />
       </dl>
       <Button
@@ -128,20 +131,20 @@ export function TopBar() {
 function MissionLine() {
   const present = mission.value;
   if (!present) return null;
-  const live = socketStatus.value?.kind === "open";
+  const isLive = live.value;
   const waiting = decidingFor.value;
   const words = missionWords(present);
   return (
     <p
-      class={`state ${live ? present.state : "unknown"}${present.ending ? " ending" : ""}`}
+      class={`state ${isLive ? present.state : "unknown"}${present.ending ? " ending" : ""}`}
       data-testid="mission-state"
       data-state={present.state}
-      data-live={live}
+      data-live={isLive}
       title={present.reason}
     >
-      <span aria-hidden="true">{live ? missionSign(present) : "?"}</span>{" "}
-      {live ? words : say("topBar.whenLastHeard", { words })}
-      {live && waiting !== null ? (
+      <span aria-hidden="true">{isLive ? missionSign(present) : "?"}</span>{" "}
+      {isLive ? words : say("topBar.whenLastHeard", { words })}
+      {isLive && waiting !== null ? (
         <span class="reason" data-testid="deciding">
           {" "}
           {say("topBar.planningStepForVehiclesWait", {
@@ -155,13 +158,14 @@ function MissionLine() {
   );
 }
 
-/** Counts on between the service's messages while the link stands. */
+/** Counts on between the service's messages, up to when it was last heard where the link does not stand. */
 function elapsed(): number {
   const present = mission.value;
   if (!present) return 0;
   if (replayStep.value !== null) return elapsedThen.value ?? 0;
-  const counting = present.state === "running" && socketStatus.value?.kind === "open";
-  return present.progress.elapsed_s + (counting ? Math.max(0, now.value - view.value.progressAt) / 1000 : 0);
+  const until = live.value ? now.value : view.value.vehiclesAt;
+  const since_s = present.state === "running" ? Math.max(0, until - view.value.progressAt) / 1000 : 0;
+  return present.progress.elapsed_s + since_s;
 }
 
 function Figure({
@@ -191,21 +195,26 @@ function LinkSummary() {
   if (!status) return null;
   let words: string;
   let tone: Tone = "warning";
-  if (status.kind === "open" && mission.value) {
+  const { vehiclesAt } = view.value;
+  const silent_s = vehiclesAt ? (now.value - vehiclesAt) / 1000 : 0;
+  const old = vehiclesAt ? say("topBar.dataOld", { now: age(silent_s) }) : "";
+  if (status.kind === "open" && mission.value && !live.value) {
+    words = say("topBar.serviceSilent", { silent: age(silent_s) });
+    tone = "alarm";
+  } else if (status.kind === "open" && mission.value) {
     words = say("topBar.liveOfVehicles", { heard, all });
     tone = heard < all ? "warning" : "good";
   } else if (status.kind === "waiting") {
     const wait = Math.max(0, Math.ceil((status.retryAt - now.value) / 1000));
-    const old = view.value.vehiclesAt
-      ? say("topBar.dataOld", { now: age((now.value - view.value.vehiclesAt) / 1000) })
-      : "";
     words = say("topBar.serviceGoneTryingAgainInS", { old, wait });
     tone = "alarm";
   } else if (status.kind === "refused") {
     words = say("topBar.notSignedIn");
     tone = "alarm";
   } else {
-    words = say("topBar.connecting");
+    const stale = silent_s > STALE_AFTER_S;
+    words = `${say("topBar.connecting")}${stale ? old : ""}`;
+    if (stale) tone = "alarm";
   }
   return (
     <div class="figure">

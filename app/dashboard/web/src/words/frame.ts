@@ -36,6 +36,10 @@ export const FRAME = {
     en: "Service gone{old}; trying again in {wait} s",
     pt: "Sem serviço{old}; nova tentativa em {wait} s",
   },
+  "topBar.serviceSilent": {
+    en: "Service silent for {silent}",
+    pt: "Serviço sem dar sinal há {silent}",
+  },
   "topBar.notSignedIn": { en: "Not signed in", pt: "Sem sessão" },
   "topBar.connecting": { en: "Connecting…", pt: "A ligar…" },
   "topBar.stopTheVehiclesWhereTheyAre": {
@@ -230,6 +234,10 @@ export const FRAME = {
     en: "The vehicles are on their way home; the mission is {becomes} once all are there. Stop now, above, stops them where they are.",
     pt: "Os veículos estão a regressar; a missão fica {becomes} quando todos chegarem. Parar já, em cima, para-os onde estão.",
   },
+  "stop.serviceDoesNotAnswer": {
+    en: "The service does not answer: this order may not have reached it, and vehicles go on meanwhile. Stop them from their own consoles where that cannot wait.",
+    pt: "O serviço não responde: esta ordem pode não lhe ter chegado, e entretanto os veículos continuam. Pare-os nas consolas deles se não puder esperar.",
+  },
   "stop.acknowledgedTheStop": { en: "acknowledged the stop", pt: "confirmou a paragem" },
   "stop.didNotAcknowledge": { en: "did not acknowledge", pt: "não confirmou" },
   "stop.noVehicleWasUnderWay": { en: "No vehicle was under way.", pt: "Nenhum veículo estava em curso." },
@@ -265,6 +273,7 @@ export const FRAME = {
   "time.stepOf": { en: "step {shown} of {last}", pt: "passo {shown} de {last}" },
   "time.asItEnded": { en: "as it ended", pt: "como terminou" },
   "time.live": { en: "live", pt: "em direto" },
+  "time.notLive": { en: "not live", pt: "não em direto" },
   "time.endTheMissionBeforeItsLast": {
     en: "End the mission before its last step",
     pt: "Terminar a missão antes do último passo",

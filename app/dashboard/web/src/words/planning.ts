@@ -480,7 +480,7 @@ export const PLANNING = {
   "forecast.forecastNotMeasured": { en: "Forecast, not measured", pt: "Previsão, não medição" },
   "forecast.duration": { en: "Duration", pt: "Duração" },
   "forecast.wellKnown": { en: "Well known{simulated}", pt: "Bem conhecido{simulated}" },
-  "forecast.ensonified": { en: "Ensonified", pt: "Ensonificado" },
+  "forecast.ensonified": { en: "Ensonified", pt: "Insonificado" },
   "forecast.landmarksLeft": { en: "Landmarks left{simulated}", pt: "Marcas por ver{simulated}" },
   "forecast.meanDeviation": { en: "Mean deviation{simulated}", pt: "Desvio médio{simulated}" },
 } as const;

@@ -14,6 +14,7 @@ const ship = {
   sog_mps: 5,
   cog_deg: 30,
   heading_deg: null,
+  age_s: 2,
   closest: null,
 } as ShipView;
 const closest = { mission_id: "m", vehicle: "a", distance_m: 42.4, in_s: 125, alarm: true };
@@ -36,6 +37,13 @@ test("its words say who it is, and how close it comes to whom", () => {
   expect(shipWords({ ...ship, closest })).toBe("EVA (cargo), 9.7 kn, CPA 42 m from a in 2 min 5 s");
   expect(shipWords({ ...ship, name: "", own: true, sog_mps: null })).toBe("MMSI 211000001 (own)");
   expect(shipMarks([{ ...ship, closest }])[0]?.alarm).toBe(true);
+});
+
+test("its words say how long it was not heard, also while the service does not tell of it", () => {
+  expect(shipWords({ ...ship, age_s: 250 })).toBe("EVA (cargo), 9.7 kn, last heard 4 min 10 s ago");
+  expect(shipMarks([{ ...ship, closest }], 65)[0]?.words).toBe(
+    "EVA (cargo), 9.7 kn, CPA 42 m from a in 1 min 0 s, last heard 1 min 7 s ago",
+  );
 });
 
 test("the own ship points where her bow does, and is marked where she may be elsewhere by now", () => {

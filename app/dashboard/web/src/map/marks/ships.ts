@@ -19,7 +19,8 @@ export interface ShipMark {
   words: string;
 }
 
-export function shipMarks(ships: readonly ShipView[]): ShipMark[] {
+/** Ships as they were told `since_s` ago; 0 while they are told of every second. */
+export function shipMarks(ships: readonly ShipView[], since_s = 0): ShipMark[] {
   return ships.map((ship) => {
     const at: LngLat = [ship.lon_deg, ship.lat_deg];
     const scale = metresPerDegree(ship.lat_deg);
@@ -33,7 +34,7 @@ export function shipMarks(ships: readonly ShipView[]): ShipMark[] {
       ],
       bow_deg: ship.heading_deg ?? ship.cog_deg,
       alarm: ship.closest?.alarm ?? false,
-      words: shipWords(ship),
+      words: shipWords(ship, since_s),
     };
   });
 }
@@ -52,13 +53,20 @@ export function ownShipMark(ship: OwnShipView, connected: boolean): PlaceMark {
   };
 }
 
-export function shipWords({ name, mmsi, type, sog_mps, own, closest }: ShipView): string {
+/** A ship that was not heard for so long may be far from where it was. */
+const OLD_S = 60;
+
+export function shipWords(ship: ShipView, since_s = 0): string {
+  const { name, mmsi, type, sog_mps, own, closest } = ship;
   const who = `${name || `MMSI ${mmsi}`}${own ? say("ships.own") : type ? ` (${type})` : ""}`;
   const speed = sog_mps === null ? "" : `, ${fixed((sog_mps * 3600) / 1852, 1)} kn`;
-  if (!closest) return who + speed;
+  const age_s = ship.age_s + since_s;
+  const old = age_s < OLD_S ? "" : say("marks.lastHeardAgo", { ageS: minutes(age_s) });
+  if (!closest) return who + speed + old;
   const away = say("ships.mFrom", { distanceM: fixed(closest.distance_m, 0), vehicle: closest.vehicle });
-  const when = closest.in_s < 1 ? say("ships.now") : say("state.in", { inS: minutes(closest.in_s) });
-  return say("ships.cpa", { who, speed, away, when });
+  const in_s = closest.in_s - since_s;
+  const when = in_s < 1 ? say("ships.now") : say("state.in", { inS: minutes(in_s) });
+  return say("ships.cpa", { who, speed, away, when }) + old;
 }
 
 export function minutes(seconds: number): string {

@@ -1,6 +1,6 @@
 /** The sound of alarms that nobody has taken; this device can be kept quiet. */
 
-import { effect } from "@preact/signals";
+import { computed, effect } from "@preact/signals";
 import { kept } from "../../persistentSignal";
 import { openAlarms } from "../store";
 
@@ -28,12 +28,14 @@ function sound(audio: AudioContext): void {
 /** Sounds for as long as an alarm is open whose cause goes on; returns what ends that. */
 export function followAlarms(makeAudio = () => new AudioContext()): () => void {
   let audio: AudioContext | null = null;
+  // The alarms are told anew with every message of the live view: the sound keeps its own pace.
+  const sounds = computed(
+    () =>
+      alarmSound.value &&
+      openAlarms.value.some(({ severity, ended_at }) => severity !== "minor" && ended_at === null),
+  );
   return effect(() => {
-    if (
-      !alarmSound.value ||
-      !openAlarms.value.some(({ severity, ended_at }) => severity !== "minor" && ended_at === null)
-    )
-      return;
+    if (!sounds.value) return;
     const again = () => {
       audio ??= makeAudio();
       if (audio.state === "suspended") void audio.resume();

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { OrderView, VehicleView } from "../../api/types";
-import { nearestTo, orderWords, takesOrders } from "./orderWords";
+import { nearestTo, orderWords, spacingOf, takesOrders } from "./orderWords";
 
 const order = (changes: Partial<OrderView>): OrderView => ({
   id: 1,
@@ -42,4 +42,9 @@ test("who surveys can be sent, the nearest first", () => {
   expect(found.map(({ name }) => name)).toEqual(["near", "far"]);
   expect(takesOrders({ state: "paused", ending: null }, vehicle("a", 41.18))).toBe(false);
   expect(takesOrders({ state: "running", ending: "finished" }, vehicle("a", 41.18))).toBe(false);
+});
+
+test("how far apart lines are to be is typed with a point or a comma, or not at all", () => {
+  expect(["", " 2.5", "2,5", "0,5"].map(spacingOf)).toEqual([null, 2.5, 2.5, 0.5]);
+  expect(["0.4", "-1", "two"].map(spacingOf)).toEqual([undefined, undefined, undefined]);
 });

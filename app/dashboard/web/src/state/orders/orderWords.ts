@@ -3,7 +3,7 @@
 import type { LngLat, OrderView, VehicleView } from "../../api/types";
 import { wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
-import { distance } from "../format";
+import { distance, pointed } from "../format";
 
 /** How long a way through places is. */
 export const lengthOf = (way: readonly LngLat[]): number =>
@@ -22,6 +22,15 @@ export function orderWords({ kind, state, way, asked_by }: OrderView): string {
   }[kind];
   const next = state === "accepted" ? say("orders.next") : "";
   return say("orders.orderedBy", { what, next, askedBy: asked_by });
+}
+
+const LEAST_SPACING_M = 0.5;
+
+/** How far apart lines are to be, as typed: null where nothing was, undefined where that is no such distance. */
+export function spacingOf(text: string): number | null | undefined {
+  if (text.trim() === "") return null;
+  const spacing_m = Number(pointed(text));
+  return spacing_m >= LEAST_SPACING_M ? spacing_m : undefined;
 }
 
 interface Led {

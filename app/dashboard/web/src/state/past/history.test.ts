@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { LngLat, StepView, WaypointView } from "../../api/types";
 import { place } from "../format";
-import { endsOf, figuresOf, placeAt } from "./history";
+import { endsOf, figuresOf, lastFlown, placeAt, withSteps } from "./history";
 
 const waypoint = (step: number, lng: number, status: WaypointView["status"] = "reached") =>
   ({ vehicle: "a", step, lon_deg: lng, lat_deg: 0, depth_m: 2, arrival_radius_m: 3, status }) as WaypointView;
@@ -39,6 +39,27 @@ describe("where a vehicle was at a step", () => {
   it("is where it was sent when its way is not known, and nowhere for a stranger", () => {
     expect(placeAt("a", undefined, [], 0, stepOf(1, 10e-5))?.place).toEqual([10e-5, 0]);
     expect(placeAt("b", undefined, [], 0, stepOf(1, 10e-5))).toBeNull();
+  });
+});
+
+describe("steps that are told again", () => {
+  const known = [stepOf(1, 0), stepOf(2, 0, "acknowledged"), stepOf(3, 0, "planned")];
+
+  it("are those from the first one on that was still to be flown", () => {
+    expect(lastFlown(known)).toBe(1);
+    expect(lastFlown([stepOf(1, 0), stepOf(2, 0, "missed")])).toBe(2);
+    expect(lastFlown([stepOf(1, 0, "sent")])).toBe(0);
+    expect(lastFlown([])).toBe(0);
+  });
+
+  it("take the places of what was known of them", () => {
+    const steps = withSteps(known, [stepOf(2, 0), stepOf(3, 0, "missed"), stepOf(4, 0, "planned")]);
+    expect(steps.map(({ number, waypoints }) => [number, waypoints[0]?.status])).toEqual([
+      [1, "reached"],
+      [2, "reached"],
+      [3, "missed"],
+      [4, "planned"],
+    ]);
   });
 });
 

@@ -3,6 +3,7 @@
 import type { LngLat, StepView, TimedTracks } from "../../api/types";
 import { wayBetween } from "../../map/geo";
 import { type Key, say } from "../../words/say";
+import { SETTLED } from "../live";
 
 export interface Series {
   label: string;
@@ -33,6 +34,18 @@ const TERMS: Readonly<Record<string, Exclude<Term, "terms.trustInPrediction">>> 
   waypoints: "terms.waypoints",
   errands: "terms.errands",
 };
+
+/** Steps with others, each once as it was told last, in their order. */
+export function withSteps(known: readonly StepView[], told: readonly StepView[]): StepView[] {
+  const byNumber = new Map([...known, ...told].map((step) => [step.number, step]));
+  return [...byNumber.values()].sort((a, b) => a.number - b.number);
+}
+
+/** The last step up to which nothing is to be flown any more; 0: none. */
+export function lastFlown(known: readonly StepView[]): number {
+  const ahead = known.findIndex(({ waypoints }) => waypoints.some(({ status }) => !SETTLED.includes(status)));
+  return (ahead < 0 ? known.at(-1)?.number : known[ahead - 1]?.number) ?? 0;
+}
 
 /** A planner's figure in words. */
 export function termWords(name: string): string {

@@ -60,9 +60,10 @@ export async function replay(step: number): Promise<void> {
   const id = selectedId.peek();
   if (!id) return;
   try {
-    if (replayStep.peek() === null) {
-      const [tracks] = await Promise.all([api.tracks(id), fetchSteps()]);
-      ways.value = waysOf(tracks);
+    // The mission may have gone on since the past was asked for.
+    if (replayStep.peek() === null || step > (steps.peek().at(-1)?.number ?? 0)) {
+      const [tracks] = await Promise.all([api.tracks(id), fetchSteps(true)]);
+      if (selectedId.peek() === id) ways.value = waysOf(tracks);
     }
     if (selectedId.peek() === id) replayStep.value = step;
   } catch (error) {

@@ -3,7 +3,7 @@
 import { api } from "../../api/client";
 import type { EventView, LngLat } from "../../api/types";
 import { fetchSteps, noteFault } from "../session";
-import { destination, marked, mission, selectedId, steps } from "../store";
+import { destination, marked, mission, selectedId, serviceNow, steps } from "../store";
 import { waysOf } from "./history";
 import { placeThen, vehicleOf } from "./placeThen";
 
@@ -26,12 +26,12 @@ export async function showWhere(vehicle: string, at: number | null): Promise<voi
   const present = mission.peek()?.vehicles.find(({ name }) => name === vehicle);
   const here: LngLat | null =
     present?.lon_deg != null && present.lat_deg != null ? [present.lon_deg, present.lat_deg] : null;
-  if (at === null || Date.now() - at < LATELY_MS) {
+  if (at === null || serviceNow.peek() - at < LATELY_MS) {
     show(here);
     return;
   }
   try {
-    const [tracks] = await Promise.all([api.tracks(id), fetchSteps()]);
+    const [tracks] = await Promise.all([api.tracks(id), fetchSteps(true)]);
     if (selectedId.peek() === id) show(placeThen(vehicle, waysOf(tracks)[vehicle], steps.peek(), at) ?? here);
   } catch (error) {
     noteFault(error);

@@ -1,5 +1,5 @@
 import type { TargetState, TargetView } from "../../api/types";
-import { age, fixed, metres, speed } from "../../state/format";
+import { age, direction, metres, plain, speed } from "../../state/format";
 import type { Tone } from "../../state/stateNames";
 import { mission } from "../../state/store";
 import { say } from "../../words/say";
@@ -76,7 +76,7 @@ function TargetCard({ target }: { target: TargetView }) {
       <p class="small">
         {[
           say("targets.target2"),
-          asked === undefined ? null : say("targets.askedM", { asked }),
+          asked === undefined ? null : say("targets.askedM", { asked: plain(asked) }),
           target.in_area === null
             ? null
             : target.in_area
@@ -86,7 +86,7 @@ function TargetCard({ target }: { target: TargetView }) {
             ? null
             : say("targets.speedTo", {
                 speed: speed(target.speed_mps),
-                courseDeg: fixed(target.course_deg ?? 0, 0),
+                courseDeg: direction(target.course_deg ?? 0),
               }),
           say("targets.ranges", {
             ranges: target.ranges,

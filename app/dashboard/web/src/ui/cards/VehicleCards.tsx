@@ -26,10 +26,10 @@ import {
 import {
   abortDialogOpen,
   abortOne,
+  live,
   mission,
-  now,
   replayStep,
-  socketStatus,
+  serviceNow,
   unstopped,
   type Vehicle,
   vehicles,
@@ -52,7 +52,7 @@ export function VehicleCards() {
   return (
     <aside class="cards-column" aria-label={say("compare.vehicles")}>
       <section
-        class={`cards${socketStatus.value?.kind === "open" ? "" : " stale"}`}
+        class={`cards${live.value ? "" : " stale"}`}
         // biome-ignore lint/a11y/noNoninteractiveTabindex: cards higher than the window are scrolled with the keyboard
         tabIndex={0}
       >
@@ -249,7 +249,7 @@ function Reasons({ vehicle: { view: v, waypoint }, tone }: { vehicle: Vehicle; t
 
 /** How long its energy lasts beside what its way home takes; nothing where neither is known. */
 function Range({ of: v }: { of: VehicleView }) {
-  const words = rangeWords(v, now.value);
+  const words = rangeWords(v, serviceNow.value);
   if (words.length === 0) return null;
   const { energy_left_pct: left_pct, energy_left_s: left_s, return_needs_s: needs_s } = v;
   const needs_pct = left_pct && left_s && needs_s !== null ? (left_pct * needs_s) / left_s : null;

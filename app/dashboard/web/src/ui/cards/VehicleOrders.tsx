@@ -12,7 +12,7 @@ import {
   surveyDenser,
   typingFor,
 } from "../../state/orders/orders";
-import { lengthOf, orderWords, takesOrders } from "../../state/orders/orderWords";
+import { lengthOf, orderWords, spacingOf, takesOrders } from "../../state/orders/orderWords";
 import { resumeVehicle } from "../../state/session";
 import { describing, drawing, drawingReady, mission, picking, vehicles } from "../../state/store";
 import { say } from "../../words/say";
@@ -135,9 +135,9 @@ export function DenserQuestion() {
   const able = vehicles.value.map(({ view }) => view).filter((v) => takesOrders(present, v));
   const send = async (event: SubmitEvent) => {
     event.preventDefault();
-    const spacing_m = spacing.value.trim() === "" ? null : Number(spacing.value);
-    fault.value = spacing_m !== null && !(spacing_m >= 0.5) ? say("orders.typeMetres") : "";
-    if (fault.value === "" && (await surveyDenser(ring, spacing_m, who.value || null)))
+    const spacing_m = spacingOf(spacing.value);
+    fault.value = spacing_m === undefined ? say("orders.typeMetres") : "";
+    if (spacing_m !== undefined && (await surveyDenser(ring, spacing_m, who.value || null)))
       denserRing.value = null;
   };
   return (

@@ -3,7 +3,7 @@ import type { Signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { wayBetween } from "../../map/geo";
 import { followOwn, ownFault, whyNoPosition } from "../../state/device/geolocation";
-import { distance } from "../../state/format";
+import { direction, distance } from "../../state/format";
 import {
   coordinateFormat,
   crossovers,
@@ -147,7 +147,7 @@ function Measured() {
           <span>
             {sayWith("mapTools.lastAt", {
               b: <b>{distance(last.metres, 1)}</b>,
-              bearingDeg: last.bearing_deg.toFixed(0).padStart(3, "0"),
+              bearingDeg: direction(last.bearing_deg),
             })}
           </span>
           <span>

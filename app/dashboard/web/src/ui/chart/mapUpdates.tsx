@@ -42,9 +42,11 @@ import {
   holidays,
   isDark,
   lightFrom,
+  live,
   marked,
   measured,
   mission,
+  now,
   ownShip,
   panelOpen,
   planned,
@@ -66,7 +68,6 @@ import {
   showTargets,
   showTracks,
   site,
-  socketStatus,
   stripHeight,
   theme,
   type Vehicle,
@@ -142,9 +143,10 @@ export function follow(chart: Chart): () => void {
         showTargets.value && replayStep.value === null ? targetMarks(mission.value?.targets ?? []) : [],
       ),
     ),
-    effect(() =>
-      chart.setShips(showShips.value && replayStep.value === null ? shipMarks(ships.value ?? []) : []),
-    ),
+    effect(() => {
+      const told = showShips.value && replayStep.value === null ? (ships.value ?? []) : [];
+      chart.setShips(shipMarks(told, told.length > 0 ? silence_s() : 0));
+    }),
     effect(() => {
       if (showShips.value && ships.value?.length) chart.setPointed(cursor.value);
     }),
@@ -204,12 +206,15 @@ function planLines(): PlanLines {
   );
 }
 
+/** How long ago the service told of what moves; 0 while it does. */
+const silence_s = (): number => (live.value ? 0 : Math.max(0, now.value - view.peek().vehiclesAt) / 1000);
+
 /** A place that was asked for, where this device is, and where the own ship is. */
 function pointedOut(): PlaceMark[] {
   const [asked, own, ship] = [marked.value, ownPosition.value, ownShip.value];
-  const live = showShips.value && replayStep.value === null;
+  const shown = showShips.value && replayStep.value === null;
   return [
-    ...(live && ship ? [ownShipMark(ship, socketStatus.value?.kind === "open")] : []),
+    ...(shown && ship ? [ownShipMark(ship, live.value)] : []),
     ...(asked
       ? [
           {

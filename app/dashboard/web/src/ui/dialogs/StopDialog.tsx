@@ -5,6 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { ActionView, StopView } from "../../api/types";
 import { refusal, said } from "../../state/session";
 import { MISSION_WORDS } from "../../state/stateNames";
+import { live } from "../../state/store";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
 import { Dialog } from "../parts/Dialog";
@@ -89,7 +90,13 @@ export function StopDialog({
       open={open}
       name={name}
       heading={ending ? say("stop.returningHome") : answer.value ? done : question}
-      fault={refusal.value?.what === what ? said(refusal.value.error) : ""}
+      fault={
+        sending.value !== null && !live.value
+          ? say("stop.serviceDoesNotAnswer")
+          : refusal.value?.what === what
+            ? said(refusal.value.error)
+            : ""
+      }
       closing={answer.value ? say("dialog.close") : say("stop.keepGoing")}
       actions={answer.value ? null : confirming}
     >

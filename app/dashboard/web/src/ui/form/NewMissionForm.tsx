@@ -1,6 +1,6 @@
 import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
 import type { LngLat } from "../../api/types";
 import { polygonOf } from "../../map/area";
@@ -56,6 +56,12 @@ export function NewMissionForm() {
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
+  const form = useRef<HTMLFormElement>(null);
+  /** How often it was sent with faults. */
+  const faulty = useSignal(0);
+  useLayoutEffect(() => {
+    if (faulty.value > 0 && form.current) showFault(form.current);
+  }, [faulty.value]);
 
   useSignalEffect(() => {
     draftShapes.value = {
@@ -101,16 +107,22 @@ export function NewMissionForm() {
     event.preventDefault();
     faults.value = faultsOf(draft.value);
     refused.value = null;
-    if (Object.keys(faults.value).length > 0) return;
+    if (Object.keys(faults.value).length > 0) {
+      faulty.value += 1;
+      return;
+    }
     sending.value = true;
     try {
-      // What it follows stays as it is.
-      if (edited) await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
-      const ids = edited ? [edited.id] : await createMissions(toMissions(draft.value));
-      if (draft.value.tide_table) {
-        const source = draft.value.tide_source || say("mission.tideTable");
-        for (const id of ids) await api.setTide(id, { table: draft.value.tide_table, source });
-      }
+      const { tide_table: table, tide_source } = draft.value;
+      const source = tide_source || say("mission.tideTable");
+      const withTide = async (id: string) => {
+        if (table) await api.setTide(id, { table, source });
+      };
+      if (edited) {
+        // What it follows stays as it is.
+        await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
+        await withTide(edited.id);
+      } else await createMissions(toMissions(draft.value), withTide);
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;
@@ -130,6 +142,7 @@ export function NewMissionForm() {
   return (
     <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
       <form
+        ref={form}
         class="new-mission"
         onSubmit={(event) => void submit(event)}
         noValidate
@@ -198,6 +211,16 @@ export function NewMissionForm() {
       </form>
     </Form.Provider>
   );
+}
+
+/** Brings the first fault into sight, whatever it is folded into: the form is longer than the window. */
+function showFault(form: HTMLFormElement): void {
+  const fault = form.querySelector("span.fault:not([role])");
+  for (let part = fault?.closest("details"); part; part = part.parentElement?.closest("details"))
+    part.open = true;
+  fault?.scrollIntoView({ block: "center" });
+  const field = fault?.closest(".field")?.querySelector<HTMLElement>("input, select");
+  field?.focus({ preventScroll: true });
 }
 
 /** To map the sea floor, or to look for something among obstacles. */

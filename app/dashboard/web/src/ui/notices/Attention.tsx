@@ -6,7 +6,7 @@ import { alarmSound, followAlarms } from "../../state/alarms/alarmSound";
 import { type Matter, mattersOf, toldWords } from "../../state/alarms/attention";
 import { clock, minutes } from "../../state/format";
 import { showWhere } from "../../state/past/whereabouts";
-import { mission, now, openAlarms, replayStep, takenAlarm } from "../../state/store";
+import { mission, openAlarms, replayStep, serviceNow, takenAlarm } from "../../state/store";
 import { say, sayWith } from "../../words/say";
 import { Button, flips } from "../parts/Controls";
 import { take, takeAlarms, takeFault } from "./acknowledge";
@@ -17,8 +17,9 @@ const SIGNS = { alarm: "✕", warning: "▲", calm: "◌" };
 
 /** One glance tells what needs a person: over the map on every page, alarms until someone takes them. */
 export function Attention() {
+  // Alarms are of now, whatever step of the past is shown.
   const matters = useComputed(() =>
-    replayStep.value === null ? mattersOf(mission.value, openAlarms.value) : [],
+    mattersOf(replayStep.value === null ? mission.value : null, openAlarms.value),
   );
   const open = useSignal(false);
   useEffect(() => followAlarms(), []);
@@ -89,7 +90,7 @@ function Line({ matter: m, onTake }: { matter: Matter; onTake: (id: string) => v
                   {clock(new Date(m.since), "utc").slice(0, 5)}
                 </time>
               ),
-              ago: minutes(Math.max(now.value - m.since, 0) / 1000),
+              ago: minutes(Math.max(serviceNow.value - m.since, 0) / 1000),
             })}{" "}
           </>
         )}

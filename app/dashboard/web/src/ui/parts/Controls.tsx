@@ -41,8 +41,20 @@ interface ButtonProps extends AriaAttributes {
   children: ComponentChildren;
 }
 
-export function Button({ id, kind = "command", commands = false, disabled, title, ...rest }: ButtonProps) {
+export function Button({
+  id,
+  kind = "command",
+  commands = false,
+  disabled,
+  title,
+  onClick,
+  ...rest
+}: ButtonProps) {
   const why = commands ? whyNotCommand.value : "";
+  // The second click of a double click is no second command, and none for what has come to lie under it.
+  const once = (event: MouseEvent) => {
+    if (event.detail < 2) onClick(event);
+  };
   return (
     <button
       type="button"
@@ -50,6 +62,7 @@ export function Button({ id, kind = "command", commands = false, disabled, title
       data-testid={id}
       disabled={disabled || why !== ""}
       title={why || title}
+      onClick={commands ? once : onClick}
       {...rest}
     />
   );

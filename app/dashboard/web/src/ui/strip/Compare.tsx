@@ -1,13 +1,13 @@
 import "./Compare.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { api } from "../../api/client";
-import type { MissionSummary, MissionView, StepView } from "../../api/types";
+import type { MissionView, StepView } from "../../api/types";
 import { differenceOf, type SeaFloor, withTiles } from "../../map/picture/seafloor";
-import { count, distance, duration, metres, percent } from "../../state/format";
+import { count, dayAndTime, distance, duration, metres, percent } from "../../state/format";
 import { figuresOf } from "../../state/past/history";
 import { fetchSteps, noteFault, said } from "../../state/session";
 import { lengthWords, MISSION_WORDS } from "../../state/stateNames";
-import { mission, missions, seaFloor, steps } from "../../state/store";
+import { mission, missions, seaFloor, selectedId, steps } from "../../state/store";
 import { say } from "../../words/say";
 import { Choice } from "../parts/Controls";
 import { Plot } from "../parts/Plot";
@@ -25,8 +25,14 @@ export function Compare() {
   const fault = useSignal("");
   useSignalEffect(() => {
     const id = chosen.value;
+    const of = selectedId.value;
     other.value = null;
     if (!id) return;
+    if (id === of) {
+      // It was compared with another one before.
+      chosen.value = "";
+      return;
+    }
     fetchSteps().catch(noteFault);
     fetchOther(id).then(
       (found) => {
@@ -51,7 +57,11 @@ export function Compare() {
             ...(missions.value ?? [])
               .filter((m) => m.id !== present.id)
               .map(
-                (m) => [m.id, `${m.name}, ${MISSION_WORDS[m.state].toLowerCase()}, ${createdAt(m)}`] as const,
+                (m) =>
+                  [
+                    m.id,
+                    `${m.name}, ${MISSION_WORDS[m.state].toLowerCase()}, ${dayAndTime(new Date(m.created_at))}`,
+                  ] as const,
               ),
           ]}
           id="compare-with"
@@ -70,8 +80,6 @@ export function Compare() {
     </div>
   );
 }
-
-const createdAt = (m: MissionSummary) => m.created_at.slice(0, 16).replace("T", " ");
 
 async function fetchOther(id: string): Promise<Other> {
   const mission = await api.mission(id);

@@ -27,26 +27,29 @@ export function Files() {
 
   useSignalEffect(() => {
     const id = selectedId.value;
+    products.value = [];
+    fault.value = "";
     if (!id) return;
     api.products(id).then(
       (list) => {
-        products.value = list;
+        if (selectedId.peek() === id) products.value = list;
       },
       (error) => {
-        fault.value = said(error);
+        if (selectedId.peek() === id) fault.value = said(error);
       },
     );
   });
 
   useSignalEffect(() => {
     const id = selectedId.value;
+    quality.value = null;
     if (!id || !hasMap.value) return;
     api.quality(id).then(
       (found) => {
-        quality.value = found;
+        if (selectedId.peek() === id) quality.value = found;
       },
       () => {
-        quality.value = null;
+        // Nothing is known of it; the live socket tells where the service is gone.
       },
     );
   });

@@ -2,7 +2,7 @@ import "./TimeSlider.css";
 import { clock } from "../../state/format";
 import { pace, playing, replay, showPresent } from "../../state/past/replay";
 import { flownWords, hasEnded, isAllowed } from "../../state/stateNames";
-import { finishOpen, mission, replayStep, steps } from "../../state/store";
+import { finishOpen, live, mission, replayStep, steps } from "../../state/store";
 import { say, sayWith } from "../../words/say";
 import { Button, sets } from "../parts/Controls";
 
@@ -34,7 +34,7 @@ export function TimeSlider() {
             playing.value = false;
             return;
           }
-          if (shown === null || shown >= last) await replay(1);
+          await replay(shown === null || shown >= last ? 1 : shown + 1);
           playing.value = true;
         }}
       >
@@ -56,7 +56,9 @@ export function TimeSlider() {
       />
       {shown === null ? (
         <>
-          <span class="when">{over ? say("time.asItEnded") : say("time.live")}</span>
+          <span class="when">
+            {over ? say("time.asItEnded") : live.value ? say("time.live") : say("time.notLive")}
+          </span>
           {isAllowed("finish", present) ? (
             <Button
               id="finish"
