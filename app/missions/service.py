@@ -260,9 +260,9 @@ class MissionService:
     async def missions(self) -> list[MissionSummary]:
         """Return every mission that no other process has, newest first."""
         # One that ended and left memory is as it was then: taking it up again for every list would be slow.
-        found = [
-            self._registry.left(one) or await self._summary(one) for (one,) in await self._at_once(mission_queries.ALL)
-        ]
+        ids = [one for (one,) in await self._at_once(mission_queries.ALL)]
+        await self._registry.recall(ids)
+        found = [self._registry.left(one) or await self._summary(one) for one in ids]
         return [summary for summary in found if summary is not None]
 
     async def _summary(self, mission_id: str) -> MissionSummary | None:

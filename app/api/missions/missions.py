@@ -81,8 +81,9 @@ async def create_mission(
 @router.get("", operation_id="listMissions", summary="List the missions")
 async def list_missions(request: Request, state: State, service: Service, reader: Reader) -> list[MissionSummary]:
     """Return every mission, newest first, with its state and progress."""
-    found = await service.missions() + await from_peers(request, state, _summaries)
-    return sorted(found, key=lambda mission: mission.created_at, reverse=True)
+    # One that ended and that no process has in memory is listed by each.
+    found = {one.id: one for one in [*await service.missions(), *await from_peers(request, state, _summaries)]}
+    return sorted(found.values(), key=lambda mission: mission.created_at, reverse=True)
 
 
 @router.get(

@@ -2,11 +2,12 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 
+import orjson
 import structlog
 from pydantic import ValidationError
 from sqlalchemy import delete, select
@@ -102,6 +103,17 @@ class MissionRegistry:
         """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
         return None if mission_id in self._live else self._left.get(mission_id)
 
+    async def recall(self, mission_ids: Sequence[str]) -> None:
+        """Learn how missions stood that left memory in an earlier run, or in another process."""
+        unknown = [one for one in mission_ids if one not in self._live and one not in self._left]
+        if not unknown:
+            return
+        async with self._database.reading() as session:
+            stored = await mission_queries.summaries(session, unknown)
+        for mission_id, content in stored:
+            with suppress(ValidationError):  # another version wrote it: the mission is taken up
+                self._left[mission_id] = MissionSummary.model_validate(content)
+
     async def check_exists(self, mission_id: str) -> None:
         """Raise MissionNotFoundError where there is no such mission; it is not taken up."""
         if mission_id in self._live or mission_id in self._left or mission_id in self._seen:
@@ -149,6 +161,8 @@ class MissionRegistry:
                     row = await session.get_one(MissionRow, mission_id)
             with _opening(mission_id):
                 live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+            if row.summary is not None:
+                await self._keep_summary(live, None)
             live.ships.traffic = self._traffic
             if self._compute is not None:
                 live.compute_by(self._compute)
@@ -215,7 +229,17 @@ class MissionRegistry:
             del self._live[live.id]
             await live.close()
             if self._ownership is not None:
+                await self._keep_summary(live, self._left[live.id])
                 await self._ownership.release([live.id])
+
+    async def _keep_summary(self, live: LiveMission, summary: MissionSummary | None) -> None:
+        """Write down how lists are to tell of a mission that leaves memory; None: it may change from now on."""
+        content = None if summary is None else orjson.loads(summary.model_dump_json(exclude={"allowed_actions"}))
+        try:
+            async with live.database.writing() as session:
+                await mission_queries.keep_summary(session, live.id, content)
+        except (SQLAlchemyError, OSError, MissionElsewhereError) as error:
+            log.warning("how a mission stands is not written for lists", mission=live.id, error=str(error))
 
     async def delete(self, live: LiveMission) -> None:
         """Remove a mission with everything that belongs to it. What was measured is kept: then ConflictError."""
@@ -258,6 +282,8 @@ class MissionRegistry:
         for live in self:
             try:
                 await live.close()
+                if self._ownership is not None and live.header.state in ENDED:
+                    await self._keep_summary(live, live.summary())
             except MissionElsewhereError as error:
                 log.warning("the last words of a mission are not written", mission=live.id, error=str(error))
 

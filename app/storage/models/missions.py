@@ -25,6 +25,8 @@ class MissionRow(Base):
     elapsed_s: Mapped[float] = mapped_column(default=0.0)
     ending: Mapped[dict[str, Any] | None]
     """What it becomes once all vehicles are home; None while it goes on."""
+    summary: Mapped[dict[str, Any] | None]
+    """How lists tell of one that ended and is in no memory; None of all others."""
 
 
 class MissionVehicleRow(Base):

@@ -16,6 +16,25 @@ ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id
 """The ids of all missions, newest first."""
 
 
+CHUNK = 500
+"""So many ids are asked for at once."""
+
+
+async def summaries(session: AsyncSession, mission_ids: Sequence[str]) -> Sequence[tuple[str, dict[str, Any]]]:
+    """Return how lists tell of those of some missions that ended and are in no memory, by id."""
+    found: list[tuple[str, dict[str, Any]]] = []
+    for first in range(0, len(mission_ids), CHUNK):
+        among = MissionRow.id.in_(mission_ids[first : first + CHUNK])
+        query = select(MissionRow.id, MissionRow.summary).where(among, MissionRow.summary.is_not(None))
+        found += [(mission_id, summary) for mission_id, summary in await session.execute(query) if summary]
+    return found
+
+
+async def keep_summary(session: AsyncSession, mission_id: str, summary: dict[str, Any] | None) -> None:
+    """Keep how lists tell of a mission that ended; None: it may change, as a process has it in memory."""
+    await session.execute(update(MissionRow).where(MissionRow.id == mission_id).values(summary=summary))
+
+
 async def oldest_first(session: AsyncSession, mission_id: str | None = None) -> Sequence[MissionRow]:
     """Return all missions in the order in which they were created, or only the one of an id."""
     query = select(MissionRow).order_by(MissionRow.created_at, MissionRow.id)

@@ -3,15 +3,18 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack
+from unittest.mock import Mock
 
 import pytest
 
 from app.missions.errors import ConflictError, MissionElsewhereError
 from app.missions.operations.history import events_after
+from app.missions.running import registry
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.states import MissionState
 from app.missions.views.mission import Level
+from app.storage.models import MissionRow
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
 from tests.support.storage.databases import Databases, query
@@ -67,6 +70,49 @@ async def test_running_missions_go_to_whoever_is_left(two: tuple[Harbour, Harbou
         await until(taken_up, "the other process has it")
         await until_step(other, mission, before[mission] + 1)
         assert (await act(other, mission, "abort", actor="Ben")).mission.state is MissionState.ABORTED
+
+
+async def test_missions_that_ended_are_listed_after_a_restart_without_being_taken_up(
+    two: tuple[Harbour, Harbour], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many they are: each takes time, and other processes are not asked for them."""
+    first, second = two
+    one = await first.open()
+    for name in "ab":
+        mission = (await one.create(sim_spec(name, steps=500))).id
+        await act(one, mission, "start")
+        await until_step(one, mission, 2)
+        await act(one, mission, "abort")
+    listed = await one.missions()
+    assert [summary.progress.step >= 2 for summary in listed] == [True, True]
+    await first.close()
+    opened = Mock(side_effect=AssertionError)
+    monkeypatch.setattr(registry, "take_up", opened)
+    other = await second.open()
+    assert await other.missions() == listed
+    assert await other.missions() == listed
+    opened.assert_not_called()
+
+
+async def test_a_mission_that_ended_is_listed_as_it_was_only_while_no_process_may_change_it(
+    two: tuple[Harbour, Harbour],
+) -> None:
+    first, second = two
+
+    async def kept() -> bool:
+        async with second.database.reading() as session:
+            return (await session.get_one(MissionRow, mission)).summary is not None
+
+    one, _ = await first.open(), await second.open()
+    mission = (await one.create(sim_spec("a"))).id
+    await act(one, mission, "abort")
+    assert not await kept()
+    one = await first.reopen()
+    assert await kept()
+    await one.get(mission)
+    assert not await kept(), "a process that was killed now would leave it as it was before"
+    await first.close()
+    assert await kept()
 
 
 def query_owner(harbour: Harbour, mission: str) -> set[int]:

@@ -65,6 +65,14 @@ describe("how far a mission has come", () => {
     expect(lengthWords({ ...known, ...left, budget })).toBe(words);
     expect(flownWords({ ...known, ...left, budget })).toBe(words.startsWith("step") ? null : words);
   });
+
+  it.each([
+    [80, "1 min 20 s of its time left"],
+    [-511, "8 min 31 s beyond its time"],
+  ])("is told of a search with %d s left by its time", (left_s, words) => {
+    const budget = { minutes: null, km_per_vehicle: null, steps: 60 };
+    expect(lengthWords({ ...known, budget, search: { left_s } })).toBe(words);
+  });
 });
 
 const surveying = {

@@ -15,7 +15,7 @@ import type {
   WaypointView,
 } from "../api/types";
 import { named, say } from "../words/say";
-import { clock, count, fixed, minutes, percent, plain } from "./format";
+import { clock, count, duration, fixed, minutes, percent, plain } from "./format";
 
 export const MISSION_WORDS: Record<MissionState, string> = {
   get draft() {
@@ -116,7 +116,7 @@ export function flownWords({ budget, ...left }: Progress): string | null {
 type Progress = Pick<
   MissionView["progress"],
   "budget" | "minutes_left" | "km_left_per_vehicle" | "step" | "steps"
->;
+> & { search?: Pick<NonNullable<MissionView["progress"]["search"]>, "left_s"> | null };
 
 const ofWhole = (whole: number, left: number, unit: string): string =>
   say("state.of", {
@@ -125,9 +125,13 @@ const ofWhole = (whole: number, left: number, unit: string): string =>
     unit,
   });
 
-/** How far a mission has come, in the unit of its length. */
-export const lengthWords = (progress: Progress): string =>
-  flownWords(progress) ?? say("state.stepOf", { step: progress.step, steps: progress.steps });
+/** How far a mission has come, in the unit of its length; a search may take any number of steps within its time. */
+export function lengthWords(progress: Progress): string {
+  const { search, step, steps } = progress;
+  if (!search) return flownWords(progress) ?? say("state.stepOf", { step, steps });
+  const time = duration(Math.abs(search.left_s));
+  return say(search.left_s < 0 ? "state.beyondItsTime" : "state.leftOfItsTime", { time });
+}
 
 const LINK_WORDS: Record<LinkState, string> = {
   get unknown() {

@@ -6,6 +6,7 @@ import { age, clock, duration } from "../state/format";
 import { elapsedThen } from "../state/past/replay";
 import { act, askAbort, busyWith } from "../state/session";
 import {
+  hasEnded,
   isAllowed,
   MISSION_WORDS,
   missionSign,
@@ -201,6 +202,9 @@ function LinkSummary() {
   if (status.kind === "open" && mission.value && !live.value) {
     words = say("topBar.serviceSilent", { silent: age(silent_s) });
     tone = "alarm";
+  } else if (status.kind === "open" && mission.value && hasEnded(mission.value)) {
+    words = say("topBar.live");
+    tone = "good";
   } else if (status.kind === "open" && mission.value) {
     words = say("topBar.liveOfVehicles", { heard, all });
     tone = heard < all ? "warning" : "good";

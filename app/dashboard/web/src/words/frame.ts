@@ -27,6 +27,7 @@ export const FRAME = {
     en: "· planning step {step} for {waiting}, vehicles wait at their waypoints",
     pt: "· a planear o passo {step} há {waiting}, os veículos esperam nos seus pontos",
   },
+  "topBar.live": { en: "Live", pt: "Em direto" },
   "topBar.liveOfVehicles": {
     en: "Live · {heard} of {all} vehicles",
     pt: "Em direto · {heard} de {all} veículos",

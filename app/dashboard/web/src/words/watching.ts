@@ -87,6 +87,8 @@ export const WATCHING = {
   "state.stopped": { en: "stopped", pt: "parado" },
   "state.of": { en: "{whole} of {whole2} {unit}", pt: "{whole} de {whole2} {unit}" },
   "state.stepOf": { en: "step {step} of {steps}", pt: "passo {step} de {steps}" },
+  "state.leftOfItsTime": { en: "{time} of its time left", pt: "restam {time} do seu tempo" },
+  "state.beyondItsTime": { en: "{time} beyond its time", pt: "{time} além do seu tempo" },
   "state.neverHeard": { en: "Never heard", pt: "Nunca ouvido" },
   "state.noContact": { en: "No contact", pt: "Sem contacto" },
   "state.offlineByPlan": { en: "Offline by plan", pt: "Sem ligação, por plano" },
