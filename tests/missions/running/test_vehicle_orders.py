@@ -33,6 +33,8 @@ from tests.support.waiting import until
 LINES = {"name": "lawnmower"}
 LIMITS = {"max_step_m": 8.0, "min_separation_m": 2.0}
 
+pytestmark = pytest.mark.usefixtures("simulated_time")
+
 
 def survey(*names: str, **changes: Any) -> MissionSpec:
     spec = {"steps": 1000, "side_m": 80.0, "planner": LINES, "limits": LIMITS}
