@@ -156,6 +156,7 @@ async def test_who_comes_back_has_used_its_time(under_way: Made) -> None:
     assert again.way_left_m(vehicle.live.spec) == left_m < WHOLE_M - 100.0
 
 
+@pytest.mark.usefixtures("simulated_time")
 async def test_vehicles_that_wait_for_each_other_all_the_time_survey_for_their_minutes(service: MissionService) -> None:
     limits = {"max_step_m": 8.0, "min_separation_m": 5.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
     vehicles = [{"name": name, "kind": "sim", "depth_m": 2.0} for name in "abc"]

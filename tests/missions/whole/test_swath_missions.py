@@ -87,6 +87,7 @@ async def test_a_mission_sees_all_of_its_area_and_ends_by_itself(harbour: Harbou
     assert progress.beams > 10_000
 
 
+@pytest.mark.usefixtures("simulated_time")
 async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Harbour) -> None:
     live = await started(harbour)
     await ensonified(live, 15.0)
@@ -147,6 +148,7 @@ async def test_a_map_of_swaths_is_shown_as_it_was_at_any_step(harbour: Harbour) 
         live = await harbour.service.get(live.id)
 
 
+@pytest.mark.usefixtures("simulated_time")
 async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour) -> None:
     live = await started(harbour)
     await ensonified(live, 25.0)
