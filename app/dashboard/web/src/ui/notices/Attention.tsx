@@ -70,7 +70,7 @@ export function Attention() {
           ) : null}
         </div>
       </section>
-      {alarms.length === 0 ? <Taken /> : null}
+      <Taken />
     </>
   );
 }
