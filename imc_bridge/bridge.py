@@ -187,8 +187,8 @@ class Bridge:
 
     # What the user asks
 
-    def nodes(self) -> tuple[NodeView, ...]:
-        """Every known node, by id."""
+    def nodes(self, name: str | None = None) -> tuple[NodeView, ...]:
+        """Every known node, by id; with a name only those that are called so."""
         now = self._now()
         return tuple(
             view_of(
@@ -201,6 +201,7 @@ class Bridge:
                 way_home=way_home.text if (way_home := self._crew.way_home(node)) is not None else "",
             )
             for node in self._registry
+            if name is None or node.name == name
         )
 
     def want(self, vehicle: str) -> None:

@@ -91,9 +91,9 @@ class FleetHub:
         link = self._links.get(kind)
         if link is None:
             return VehicleInfo(name, kind, LinkState.UNKNOWN, f"links of kind {kind} are switched off in the settings")
-        for info in link.vehicles():
-            if info.name == name:
-                return info
+        info = link.vehicle(name)
+        if info is not None:
+            return info
         reason = "never heard of: is it switched on, and does it reach this service?"
         if link.capabilities.simulated:
             reason = "simulated: it is launched when its mission starts"

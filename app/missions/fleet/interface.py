@@ -411,6 +411,10 @@ class FleetLink(ABC):
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle known to this link, in a stable order."""
 
+    def vehicle(self, name: str) -> VehicleInfo | None:
+        """Return one of them; None for one that was never heard of."""
+        return next((info for info in self.vehicles() if info.name == name), None)
+
     @abstractmethod
     async def engage(self, vehicle: str) -> None:
         """Make the vehicle ready to follow waypoints of ours. Raises VehicleRefusedError."""

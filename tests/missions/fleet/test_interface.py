@@ -249,6 +249,10 @@ async def test_an_order_before_engaging_is_refused(bench: Bench) -> None:
 
 async def test_known_vehicles_are_of_the_links_kind(bench: Bench) -> None:
     assert [(info.name, info.kind) for info in bench.link.vehicles()] == [(bench.name, bench.link.kind)]
+    by_name = bench.link.vehicle(bench.name)
+    assert by_name is not None
+    assert (by_name.name, by_name.kind) == (bench.name, bench.link.kind)
+    assert bench.link.vehicle("nobody") is None
     age_s = bench.info().age_s
     assert age_s is not None
     assert age_s >= 0.0

@@ -110,12 +110,20 @@ class ImcFleetLink(FleetLink):
 
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle heard of, by IMC id."""
+        return self._infos(self._bridge.nodes())
+
+    def vehicle(self, name: str) -> VehicleInfo | None:
+        """Return the first of this name, without a look at all the others; None where there is none."""
+        return next(iter(self._infos(self._bridge.nodes(name))), None)
+
+    def _infos(self, nodes: Sequence[NodeView]) -> list[VehicleInfo]:
+        """Return those that are vehicles, and wanted."""
         wanted = self._bridge.settings.vehicles
         lost = self._bridge.drops.recent
         trouble = ". ".join(drop_words(lost, self._bridge.transport.receive_buffer_bytes)) if lost else ""
         return [
             replace(_info(node), machine_advice=trouble)
-            for node in self._bridge.nodes()
+            for node in nodes
             if node.is_vehicle and (not wanted or node.name in wanted)
         ]
 

@@ -316,18 +316,25 @@ class SimFleetLink(FleetLink):
 
     def vehicles(self) -> Sequence[VehicleInfo]:
         """Every vehicle that was launched."""
-        return [
-            VehicleInfo(
-                name,
-                self.kind,
-                s.state,
-                AGROUND if s.aground else "" if s.silent_since_s is None else SILENT,
-                age_s=0.0 if s.silent_since_s is None else (s.body.time_s - s.silent_since_s) / self._time_scale,
-                report=s.report,
-                faults=tuple(s.faults.values()),
-            )
-            for name, s in self._deployed.items()
-        ]
+        return [self._info(name, simulated) for name, simulated in self._deployed.items()]
+
+    def vehicle(self, name: str) -> VehicleInfo | None:
+        """Return one of them; None for one that was not launched."""
+        simulated = self._deployed.get(name)
+        return None if simulated is None else self._info(name, simulated)
+
+    def _info(self, name: str, simulated: DeployedVehicle) -> VehicleInfo:
+        return VehicleInfo(
+            name,
+            self.kind,
+            simulated.state,
+            AGROUND if simulated.aground else "" if simulated.silent_since_s is None else SILENT,
+            age_s=0.0
+            if simulated.silent_since_s is None
+            else (simulated.body.time_s - simulated.silent_since_s) / self._time_scale,
+            report=simulated.report,
+            faults=tuple(simulated.faults.values()),
+        )
 
     async def engage(self, vehicle: str) -> None:
         """Let a vehicle follow. Raises VehicleRefusedError when it was not launched."""
