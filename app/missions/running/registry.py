@@ -4,10 +4,9 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 
-import orjson
 import structlog
 from pydantic import ValidationError
 from sqlalchemy import delete, select
@@ -25,6 +24,7 @@ from app.missions.errors import (
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import stored_spec, take_up
 from app.missions.live.mission import LiveMission
+from app.missions.running.ended_missions import EndedMissions, store_summary
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
 from app.missions.spec.mission import MissionSpec
@@ -75,8 +75,7 @@ class MissionRegistry:
         self._may_take_up: Callable[[MissionRow], Awaitable[bool]] = _always
         self._taken_up: Callable[[LiveMission], Awaitable[None]] = _nothing
         self._live: dict[str, LiveMission] = {}
-        # As they were when they left memory.
-        self._left: dict[str, MissionSummary] = {}
+        self._ended = EndedMissions(database)
         # Known to exist, whoever has them; another process may have deleted one meanwhile.
         self._seen: set[str] = set()
         self._looked_s: dict[str, float] = {}
@@ -101,22 +100,15 @@ class MissionRegistry:
 
     def left(self, mission_id: str) -> MissionSummary | None:
         """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
-        return None if mission_id in self._live else self._left.get(mission_id)
+        return None if mission_id in self._live else self._ended.get(mission_id)
 
     async def recall(self, mission_ids: Sequence[str]) -> None:
         """Learn how missions stood that left memory in an earlier run, or in another process."""
-        unknown = [one for one in mission_ids if one not in self._live and one not in self._left]
-        if not unknown:
-            return
-        async with self._database.reading() as session:
-            stored = await mission_queries.summaries(session, unknown)
-        for mission_id, content in stored:
-            with suppress(ValidationError):  # another version wrote it: the mission is taken up
-                self._left[mission_id] = MissionSummary.model_validate(content)
+        await self._ended.recall([one for one in mission_ids if one not in self._live])
 
     async def check_exists(self, mission_id: str) -> None:
         """Raise MissionNotFoundError where there is no such mission; it is not taken up."""
-        if mission_id in self._live or mission_id in self._left or mission_id in self._seen:
+        if mission_id in self._live or mission_id in self._ended or mission_id in self._seen:
             return
         async with self._database.reading() as session:
             if await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id)) is None:
@@ -162,7 +154,7 @@ class MissionRegistry:
             with _opening(mission_id):
                 live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
             if row.summary is not None:
-                await self._keep_summary(live, None)
+                await store_summary(live, None)
             live.ships.traffic = self._traffic
             if self._compute is not None:
                 live.compute_by(self._compute)
@@ -170,7 +162,7 @@ class MissionRegistry:
                 await live.pings.tidy()
             await self._make_room()
             self._live[mission_id] = live
-            self._left.pop(mission_id, None)
+            self._ended.forget(mission_id)
             self._maps.take_up(live)
             if self._ownership is not None:
                 live.survey_late_changes(partial(self._maps.survey, live))
@@ -196,7 +188,7 @@ class MissionRegistry:
 
     async def _put_away(self, live: LiveMission, why: str) -> None:
         """Forget a mission that is stored no more."""
-        self._left.pop(live.id, None)
+        self._ended.forget(live.id)
         self._seen.discard(live.id)
         self._looked_s.pop(live.id, None)
         if self._live.pop(live.id, None) is not None:
@@ -225,21 +217,13 @@ class MissionRegistry:
             if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.holds(m.id)
         ]
         for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
-            self._left[live.id] = live.summary()
+            summary = live.summary()
+            self._ended.note(summary)
             del self._live[live.id]
             await live.close()
             if self._ownership is not None:
-                await self._keep_summary(live, self._left[live.id])
+                await store_summary(live, summary)
                 await self._ownership.release([live.id])
-
-    async def _keep_summary(self, live: LiveMission, summary: MissionSummary | None) -> None:
-        """Write down how lists are to tell of a mission that leaves memory; None: it may change from now on."""
-        content = None if summary is None else orjson.loads(summary.model_dump_json(exclude={"allowed_actions"}))
-        try:
-            async with live.database.writing() as session:
-                await mission_queries.keep_summary(session, live.id, content)
-        except (SQLAlchemyError, OSError, MissionElsewhereError) as error:
-            log.warning("how a mission stands is not written for lists", mission=live.id, error=str(error))
 
     async def delete(self, live: LiveMission) -> None:
         """Remove a mission with everything that belongs to it. What was measured is kept: then ConflictError."""
@@ -283,7 +267,7 @@ class MissionRegistry:
             try:
                 await live.close()
                 if self._ownership is not None and live.header.state in ENDED:
-                    await self._keep_summary(live, live.summary())
+                    await store_summary(live, live.summary())
             except MissionElsewhereError as error:
                 log.warning("the last words of a mission are not written", mission=live.id, error=str(error))
 
@@ -292,7 +276,7 @@ class MissionRegistry:
         for live in self:
             live.abandon()
         self._live.clear()
-        self._left.clear()
+        self._ended.clear()
 
 
 @contextmanager
