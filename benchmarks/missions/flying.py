@@ -20,22 +20,25 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
+from app.commands.simulated_service import served
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import decide
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
-from app.missions.settings import ImcSettings, ServiceSettings
+from app.missions.settings import ImcSettings, ServiceSettings, SimulationSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, Action
 from app.storage.database import Database
+from app.storage.models import WaypointRow
 from app.storage.queries.missions import track_points, waypoints_between
 from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import FLIGHT, make_parser, write_section
@@ -114,48 +117,77 @@ def mission(flight: Flight) -> MissionSpec:
     )
 
 
+@dataclass(frozen=True)
+class Flown:
+    """What is left of a mission that was flown, by vehicle."""
+
+    state: str
+    survey_s: list[float]
+    tracks: dict[str, list[tuple[float, float, float, float]]]
+    waypoints: Sequence[WaypointRow]
+    gives_way_s: dict[str, list[float]]
+
+
 async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict[str, Any]:
     """Fly the mission; what its tracks tell, which may be drawn into a file."""
     url = f"sqlite+aiosqlite:///{folder / 'mission.db'}"
     imc = ImcSettings(port=PORT, announce_ports=ANNOUNCE_PORTS, loopback_only=True)
     await prepare_database(url, may_upgrade=True)
-    database = Database(url)
-    service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=flight.time_scale), database)
+    service = MissionService(ServiceSettings(database_url=url, imc=imc, time_scale=flight.time_scale), Database(url))
     if flight.slow_decisions:
         slow_down(flight.slow_decisions / flight.time_scale)
     crafts = [await craft(number, flight) for number in range(flight.vehicles)] if flight.kind == "imc" else []
     await service.startup()
     begun = time.monotonic()
     try:
-        identity = (await service.create(mission(flight))).id
-        while crafts and sum(view.link == "ready" for view in await service.vehicles()) < flight.vehicles:  # noqa: ASYNC110
-            await asyncio.sleep(0.1)
-        await service.act(await service.get(identity), Action.START, actor="benchmark")
-        gives_way_s: dict[str, list[float]] = {name_of(number): [] for number in range(flight.vehicles)}
-        seen = 0
-        while (view := mission_view(live := await service.get(identity))).state not in ENDED:
-            await asyncio.sleep(0.5)
-            for event in await events_after(live, seen):
-                seen, name = event.id, str(event.data.get("vehicle"))
-                if "gives_way_to" in event.data and (report := live.team.named(name).report) is not None:
-                    gives_way_s[name].append(report.time_s)
-        surveyed_s = [member.flown.survey_s for member in live.team]
-        async with database.reading() as session:
-            tracks = await track_points(session, identity)
-            waypoints = await waypoints_between(session, identity, 1, 1_000_000)
+        flown = await _flown(flight, service)
     finally:
         await service.shutdown()
         for process in crafts:
             process.terminate()
             await process.wait()
+    return _told(flight, flown, time.monotonic() - begun, picture)
+
+
+def fly_in_simulated_time(flight: Flight, picture: Path | None = None) -> dict[str, Any]:
+    """Fly the mission as fast as the machine allows; while a thread computes no time passes. Not over IMC."""
+    begun = time.monotonic()
+    flown = served(SimulationSettings(), flight.time_scale, partial(_flown, flight))
+    return _told(flight, flown, time.monotonic() - begun, picture)
+
+
+async def _flown(flight: Flight, service: MissionService) -> Flown:
+    """Fly a mission from its start to its end."""
+    identity = (await service.create(mission(flight))).id
+    over_imc = flight.kind == "imc"
+    while over_imc and sum(view.link == "ready" for view in await service.vehicles()) < flight.vehicles:  # noqa: ASYNC110
+        await asyncio.sleep(0.1)
+    await service.act(await service.get(identity), Action.START, actor="benchmark")
+    gives_way_s: dict[str, list[float]] = {name_of(number): [] for number in range(flight.vehicles)}
+    seen = 0
+    while (view := mission_view(live := await service.get(identity))).state not in ENDED:
+        await asyncio.sleep(0.5)
+        for event in await events_after(live, seen):
+            seen, name = event.id, str(event.data.get("vehicle"))
+            if "gives_way_to" in event.data and (report := live.team.named(name).report) is not None:
+                gives_way_s[name].append(report.time_s)
+    surveyed_s = [member.flown.survey_s for member in live.team]
+    async with live.database.reading() as session:
+        tracks = await track_points(session, identity)
+        waypoints = await waypoints_between(session, identity, 1, 1_000_000)
+    return Flown(str(view.state), surveyed_s, tracks, waypoints, gives_way_s)
+
+
+def _told(flight: Flight, mission: Flown, wall_s: float, picture: Path | None) -> dict[str, Any]:
+    """Return what the tracks of a mission tell, which may be drawn into a file."""
     frame = LocalFrame(*ORIGIN)
     by_vehicle: dict[str, dict[str, Any]] = {}
     drawn: dict[str, tuple[FloatArray, FloatArray]] = {}
-    for name, points in tracks.items():
+    for name, points in mission.tracks.items():
         lon, lat, _, seconds = np.array(points).T
         track = np.column_stack(frame.to_local(lat, lon))
-        ends = np.array([[row.east_m, row.north_m] for row in waypoints if row.vehicle == name]).reshape(-1, 2)
-        by_vehicle[name], drawn[name] = judged(track, seconds, ends, gives_way_s[name]), (track, ends)
+        ends = np.array([[row.east_m, row.north_m] for row in mission.waypoints if row.vehicle == name]).reshape(-1, 2)
+        by_vehicle[name], drawn[name] = judged(track, seconds, ends, mission.gives_way_s[name]), (track, ends)
     if picture is not None:
         draw(picture, drawn)
 
@@ -164,9 +196,9 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
 
     flown = sum(found["flown_m"] for found in by_vehicle.values())
     return {
-        "state": str(view.state),
-        "wall_s": round(time.monotonic() - begun, 1),
-        "survey_minutes": [round(seconds / 60.0, 1) for seconds in surveyed_s],
+        "state": mission.state,
+        "wall_s": round(wall_s, 1),
+        "survey_minutes": [round(seconds / 60.0, 1) for seconds in mission.survey_s],
         "flown_m": round(flown, 1),
         "planned_m": round(sum(found["planned_m"] for found in by_vehicle.values()), 1),
         "on_plan_pct": round(sum(f["on_plan_pct"] * f["flown_m"] for f in by_vehicle.values()) / max(flown, 1e-9), 1),
@@ -176,7 +208,7 @@ async def fly(flight: Flight, folder: Path, picture: Path | None = None) -> dict
         "loops_of_legs": sum(found["loops_of_legs"] for found in by_vehicle.values()),
         "waiting_pct": mean_of("waiting_pct"),
         "waiting_under_way_pct": mean_of("waiting_under_way_pct"),
-        "missed": sum(row.status != "reached" for row in waypoints),
+        "missed": sum(row.status != "reached" for row in mission.waypoints),
         "by_vehicle": by_vehicle,
     }
 

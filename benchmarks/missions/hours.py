@@ -6,7 +6,9 @@ to 50 m; each third mission is flown by lines, the others by what the service ha
 two fake DUNE nodes in processes of their own. The sea floor is the generated harbour, over IMC a smooth one. Told is
 what :mod:`benchmarks.missions.flying` tells: ``loops_under_way`` are closed circles of vehicles that still had legs,
 ``loops_giving_way`` those of them that let another vehicle pass, ``loops_of_legs`` those that the legs describe.
-With ``--keep FILE`` the missions are kept there, and are not flown again as long as the program is the same.
+With ``--keep FILE`` the missions are kept there, and are not flown again as long as the program is the same. With
+``--simulated-time`` those over IMC are left out, and the others are flown as fast as the machine allows, however busy
+it is: no decision takes time then.
 """
 
 import asyncio
@@ -23,7 +25,7 @@ import numpy as np
 
 from app.api import logs
 from benchmarks.common.report import FLIGHT, make_parser, write_section
-from benchmarks.missions.flying import Flight, fly
+from benchmarks.missions.flying import Flight, fly, fly_in_simulated_time
 from benchmarks.missions.kept import keep, kept, version
 
 SHORT_M = 150.0
@@ -58,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--time-scale", type=float, default=10.0)
     parser.add_argument("--keep", type=Path, metavar="FILE", help="keep what was flown in this file, and go on from it")
+    parser.add_argument("--simulated-time", action="store_true", help="as fast as the machine allows, none over IMC")
     parser.add_argument("--any-version", action="store_true", help="what other versions flew counts, too")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw the tracks into this folder")
     options = parser.parse_args(arguments)
@@ -68,9 +71,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if seed in done:
             continue
         flight = drawn(seed, options.minutes, options.time_scale)
+        if options.simulated_time and flight.kind == "imc":
+            continue
         picture = None if options.pictures is None else options.pictures / f"{seed}.png"
-        with tempfile.TemporaryDirectory(prefix="bathyfleet-hours-") as folder:
-            found = asyncio.run(fly(flight, Path(folder), picture))
+        if options.simulated_time:
+            found = fly_in_simulated_time(flight, picture)
+        else:
+            with tempfile.TemporaryDirectory(prefix="bathyfleet-hours-") as folder:
+                found = asyncio.run(fly(flight, Path(folder), picture))
         load = round(os.getloadavg()[1], 1)
         facts = {"version": of, "seed": seed, "flight": describe(flight), "side_m": flight.side, "load": load}
         done[seed] = facts | found
@@ -78,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     flown = [done[seed] for seed in sorted(done) if 0 <= seed - options.first < options.missions]
     figures = summary(flown)
     print(json.dumps(figures, indent=1))
-    title = f"Missions of {options.minutes:g} min"
+    title = f"Missions of {options.minutes:g} min{' in simulated time' if options.simulated_time else ''}"
     hidden = {options.keep: "FILE", options.pictures: "FOLDER"}
     write_section(options.write, FLIGHT, title, figures, seeds=[m["seed"] for m in flown], hidden=hidden)
 
