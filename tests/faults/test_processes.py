@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import signal
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -28,7 +29,8 @@ async def two(tmp_path: Path, databases: Databases) -> AsyncIterator[tuple[Runni
         running = []
         for name in ("one", "other"):
             (folder := tmp_path / name).mkdir()
-            running.append(await stack.enter_async_context(service_in(folder, database_url=url)))
+            world = {"HUNG_LOOKS": "5"}
+            running.append(await stack.enter_async_context(service_in(folder, database_url=url, world=world)))
         yield running[0], running[1]
 
 
@@ -82,6 +84,40 @@ async def test_any_of_them_answers_and_a_killed_ones_mission_goes_on(two: tuple[
         assert set(vehicle.accepted) <= set(stored), "no sounding that was accepted is lost"
         assert len(stored) == len(set(stored)), "none is stored twice"
         assert vehicle.steps_seen == sorted(set(vehicle.steps_seen)), "no step is flown twice"
+
+
+@pytest.mark.timeout(600)
+async def test_a_hung_ones_mission_goes_on_elsewhere_and_is_left_alone_when_it_wakes(
+    two: tuple[Running, Running],
+) -> None:
+    """Its machine is held up, or its loop stands still: it keeps its connections, and answers nobody."""
+    (first, at_first), (second, at_second) = two
+    vehicles = pollers()
+    spec = mission_of([{"name": vehicle.name, "kind": "rest"} for vehicle in vehicles], steps=10)
+    created = await at_first.post("/missions", json=spec)
+    identity = created.json()["id"]
+    mission = f"/missions/{identity}"
+    assert (await at_first.post(f"{mission}/start")).status_code == httpx.codes.OK
+    first.process.send_signal(signal.SIGSTOP)
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            while "mission taken up" not in second.said:  # noqa: ASYNC110 - another process looks
+                await asyncio.sleep(0.05)
+        flying = [asyncio.create_task(vehicle.run(at_second, identity)) for vehicle in vehicles]
+        await step_more(at_second, mission, 2)
+    finally:
+        first.process.send_signal(signal.SIGCONT)
+    async with asyncio.timeout(PATIENCE_S):
+        while "taken for dead" not in first.said and "not answer" not in first.said:  # noqa: ASYNC110 - as above
+            await asyncio.sleep(0.05)
+        await asyncio.gather(*flying)
+        while (ended := (await at_second.get(mission)).json())["state"] == "running":  # noqa: ASYNC110 - as above
+            await asyncio.sleep(0.05)
+        assert (await at_first.get(mission)).json()["state"] == ended["state"] == "finished", ended["reason"]
+    steps = [
+        number for (number,) in query(first.database_url, "select number from steps order by committed_at, number")
+    ]
+    assert steps == list(range(1, 11)), "every step once, in order"
 
 
 async def receive_all(viewer: ClientConnection) -> None:

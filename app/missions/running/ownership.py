@@ -62,7 +62,7 @@ class Ownership:
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
         self.called = asyncio.Event()
-        self._membership = make_membership(database.url, self.called.set)
+        self._membership = make_membership(database.url, self.called.set, database.application)
         self._number = 0
         self._mine: set[str] = set()
         self._peers: dict[int, Peer] = {}
@@ -140,9 +140,10 @@ class Ownership:
             raise MembershipLostError("this process was taken for dead")
         dead = {row.id for row in known} - alive
         if dead:
+            await self._membership.end_sessions(dead)
             async with self._database.writing() as session:
                 await processes.bury(session, dead)
-            log.warning("another process ended", processes=sorted(dead))
+            log.warning("another process ended, or hangs", processes=sorted(dead))
         self._peers = {
             row.id: Peer(row.id, row.url, row.secret, row.certificate)
             for row in known

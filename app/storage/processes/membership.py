@@ -1,12 +1,16 @@
 """Which of the processes that share a database are alive, shown by locks that end with their holders.
 
 No clock is compared and no heartbeat written: the operating system (SQLite) or the database server (PostgreSQL) gives
-a lock up when its process is killed, and the server also when the network to it is cut.
+a lock up when its process is killed, and the server also when the network to it is cut. A process that hangs keeps its
+lock: PostgreSQL tells when it asked last, as each does every second. In SQLite nothing does.
 """
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Iterable
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,15 +19,30 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncSession, create_async_engine
 from sqlalchemy.pool import NullPool
 
+from app.storage.application import APPLICATION, called
 from app.storage.processes.process_lock import LockHeldError, ProcessLock, is_held
 
 LOCKS = 0x62617468
 """The first half of our advisory locks' names in PostgreSQL; the second is the process's number."""
-HELD = (
-    f"SELECT objid::bigint FROM pg_locks WHERE locktype = 'advisory' AND classid::bigint = {LOCKS} "  # noqa: S608
+_OURS = (
+    "FROM pg_locks LEFT JOIN pg_stat_activity USING (pid) "  # noqa: S608 - nothing of it comes from outside
+    f"WHERE locktype = 'advisory' AND classid::bigint = {LOCKS} "
     "AND objsubid = 2 AND granted AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
 )
-"""Asks PostgreSQL for the numbers of a database's processes that live."""
+HELD = f"SELECT objid::bigint {_OURS}"
+"""Asks PostgreSQL for the numbers of a database's processes that have not ended."""
+HEARD = f"SELECT objid::bigint, state_change {_OURS}"
+"""The same, and when each asked last, by the server's clock; null where the server does not keep that."""
+SESSIONS = (
+    "SELECT pg_terminate_backend(session.pid) FROM pg_stat_activity session "  # noqa: S608 - the same
+    "WHERE session.application_name IN "
+    f"(SELECT application_name {_OURS} AND objid::bigint = ANY($1) AND application_name LIKE '{APPLICATION}%')"
+)
+"""Ends everything that some processes have begun in PostgreSQL."""
+HUNG_LOOKS = 60
+"""A process that asked nothing while another one looked so often is taken for dead."""
+LOOK_S = 0.9
+"""Looks that follow each other faster count once."""
 CHANNEL = "bathyfleet"
 """PostgreSQL's channel on which processes ask each other to look again."""
 SILENCE_S = 4
@@ -46,6 +65,9 @@ class Membership(Protocol):
     async def alive(self, numbers: Iterable[int]) -> set[int]:
         """Return those of the numbers whose processes live. Raises MembershipLostError."""
 
+    async def end_sessions(self, numbers: Iterable[int]) -> None:
+        """End what processes that are taken for dead have begun in the database, and may hold others up with."""
+
     async def call(self) -> None:
         """Tell the others to look again, where there is a way; they look every second anyway."""
 
@@ -53,12 +75,15 @@ class Membership(Protocol):
         """Give the lock up."""
 
 
-def make_membership(url: str, on_call: Callable[[], None]) -> Membership:
-    """Return the membership for a database; ``on_call`` is called when another process says that something changed."""
+def make_membership(url: str, on_call: Callable[[], None], application: str = "") -> Membership:
+    """Return the membership for a database; ``on_call`` is called when another process says that something changed.
+
+    ``application``: what the process is called on all its connections, see :mod:`app.storage.application`.
+    """
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":
         return FileMembership(Path(parsed.database or "bathyfleet.db"))
-    return AdvisoryMembership(url, on_call)
+    return AdvisoryMembership(url, on_call, application)
 
 
 async def alive_beside(session: AsyncSession, url: str, numbers: Iterable[int]) -> set[int]:
@@ -106,6 +131,9 @@ class FileMembership:
     def _path(self, number: int) -> Path:
         return self._database.with_name(f"{self._database.name}-process-{number}")
 
+    async def end_sessions(self, numbers: Iterable[int]) -> None:
+        """Do nothing: with its lock a process has given up its transactions."""
+
     async def call(self) -> None:
         """Do nothing: the others look every second."""
 
@@ -116,11 +144,42 @@ class FileMembership:
             self._lock = None
 
 
+class Silence:
+    """For how many looks in a row others were not heard; two that were both held up for long do not blame each other.
+
+    Parameters
+    ----------
+    now_s
+        A clock in seconds.
+    """
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._now_s = now_s
+        self._counted_s = -math.inf
+        self._heard: dict[int, tuple[datetime, int]] = {}
+        """When each was heard last, and in how many looks it was not since."""
+
+    def hung(self, heard: Mapping[int, datetime | None]) -> set[int]:
+        """Return who was silent for too long, of all that are there, each with when it was heard last."""
+        counts = self._now_s() - self._counted_s >= LOOK_S
+        if counts:
+            self._counted_s = self._now_s()
+        found: dict[int, tuple[datetime, int]] = {}
+        for number, at in heard.items():
+            if at is not None:
+                before, silent = self._heard.get(number, (None, 0))
+                found[number] = at, silent + counts if before == at else 0
+        self._heard = found
+        return {number for number, (_, silent) in found.items() if silent >= HUNG_LOOKS}
+
+
 class AdvisoryMembership:
     """Processes that share a PostgreSQL database: each holds an advisory lock on a connection of its own."""
 
-    def __init__(self, url: str, on_call: Callable[[], None]) -> None:
-        self._engine = create_async_engine(url, poolclass=NullPool)
+    def __init__(self, url: str, on_call: Callable[[], None], application: str = "") -> None:
+        self._engine = create_async_engine(url, poolclass=NullPool, connect_args=called(application))
+        self._number = 0
+        self._silence = Silence()
         self._on_call = on_call
         self._connection: AsyncConnection | None = None
         self._driver: Any = None
@@ -137,6 +196,7 @@ class AdvisoryMembership:
             raise MembershipLostError(f"the database cannot be reached: {error}") from error
         if not held:
             raise MembershipLostError(f"another process has number {number}")
+        self._number = number
 
     async def _connect(self) -> None:
         self._connection = await self._engine.connect()
@@ -148,9 +208,17 @@ class AdvisoryMembership:
         await self._driver.add_listener(CHANNEL, lambda *_: self._on_call())
 
     async def alive(self, numbers: Iterable[int]) -> set[int]:
-        """Return the numbers whose locks are held. Raises MembershipLostError when the server does not answer."""
-        held = {int(row[0]) for row in await self._ask("fetch", HELD)}
-        return held & set(numbers)
+        """Return the numbers whose locks are held, by processes that do not hang.
+
+        Raises MembershipLostError when the server does not answer.
+        """
+        heard = {int(number): at for number, at in await self._ask("fetch", HEARD)}
+        others = {number: at for number, at in heard.items() if number != self._number}
+        return (set(heard) - self._silence.hung(others)) & set(numbers)
+
+    async def end_sessions(self, numbers: Iterable[int]) -> None:
+        """End the connections of processes, whatever transaction they are in. Raises MembershipLostError."""
+        await self._ask("execute", SESSIONS, list(numbers))
 
     async def call(self) -> None:
         """Tell the others to look again."""

@@ -1,7 +1,8 @@
 """``bathyfleet serve`` in a world where something is wrong; the arguments are the command's own.
 
 Environment: ``FAULTS_CLOCK`` names a file with the seconds that the wall clock is off, read at every look at it;
-``FAULTS_BUSY_MS`` is how long a writer waits for another process.
+``FAULTS_BUSY_MS`` is how long a writer waits for another process; ``FAULTS_HUNG_LOOKS``: after so many looks in vain
+another process is taken for dead.
 """
 
 import os
@@ -35,6 +36,10 @@ if __name__ == "__main__":
 
         for module in (clock, tokens):
             vars(module)["datetime"] = Shifted
+    if "FAULTS_HUNG_LOOKS" in os.environ:
+        from app.storage.processes import membership
+
+        membership.HUNG_LOOKS = int(os.environ["FAULTS_HUNG_LOOKS"])
     if "FAULTS_BUSY_MS" in os.environ:
         from app.storage import database
 
