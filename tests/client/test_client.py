@@ -130,6 +130,17 @@ def test_what_is_posted_over_a_line_that_loses_answers_is_stored_once(client: Cl
     client.abort_mission(mission.id)
 
 
+def test_what_is_no_number_is_refused_and_not_sent_as_if_it_were_left_out(client: Client) -> None:
+    mission = client.create_mission(mission_spec())
+    slanted = soundings(1)[0] | {"beam_off_nadir_deg": float("nan")}
+    for item in (slanted, models.Measurement(**slanted)):
+        (verdict,) = client.send_measurements(mission.id, [item]).items
+        assert (verdict.verdict, verdict.reason.partition(":")[0]) == ("rejected", "beam_off_nadir_deg")
+    with pytest.raises(InvalidRequestError, match="finite"):
+        client.create_mission(models.MissionSpec(**mission_spec(), accuracy_m=float("nan")))
+    client.abort_mission(mission.id)
+
+
 def test_what_may_have_been_done_is_not_done_again(client: Client, relay: Relay) -> None:
     relay.answers_to_lose = 1
     with Client(relay.url) as distant, pytest.raises(UnreachableError, match="has to be looked up"):

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from urllib.parse import quote
 
 import httpx
-from pydantic import BaseModel, TypeAdapter
+from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 T = TypeVar("T")
 
@@ -83,7 +83,10 @@ def part(value: str | int) -> str:
 def _as_json(body: BaseModel | Mapping[str, Any]) -> bytes:
     if isinstance(body, BaseModel):
         return body.model_dump_json(exclude_unset=True).encode()
-    return TypeAdapter(dict[str, Any]).dump_json(dict(body), exclude_unset=True)
+    return _MAPPING.dump_json(dict(body), exclude_unset=True)
+
+
+_MAPPING = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
 
 
 @cache
