@@ -35,12 +35,12 @@ from bathyfleet.client.streams import (
     LARGEST_MESSAGE,
     LogPlace,
     ends,
-    is_reached,
     live_address,
     message_of,
     refusal,
     tls_of,
 )
+from bathyfleet.client.wait import Wait
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,10 +98,10 @@ class Client(Operations):
         self._http.close()
 
     def _call(self, call: Call[T]) -> T:
-        attempts = self._attempts(f"{call.method} {call.path}", repeatable=call.repeatable)
+        attempts = self._attempts(f"{call.method} {call.path}", repeatable=call.repeatable, within_s=call.within_s)
         while True:
             try:
-                answer = self._http.send(call.request(self._http))
+                answer = self._http.send(call.request(self._http, attempts.left_s))
             except httpx.TransportError as error:
                 time.sleep(attempts.after_error(error))
                 continue
@@ -109,8 +109,8 @@ class Client(Operations):
                 return call.read(answer)
             time.sleep(attempts.after_refusal(answer))
 
-    def _attempts(self, what: str, *, repeatable: bool = True) -> Attempts:
-        return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable)
+    def _attempts(self, what: str, *, repeatable: bool = True, within_s: float | None = None) -> Attempts:
+        return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable, within_s=within_s)
 
     def wait_for(
         self, mission_id: str, *states: str, timeout_s: float | None = None, every_s: float = 1.0
@@ -133,14 +133,13 @@ class Client(Operations):
         TimeoutError
             When the time is over.
         """
-        until = None if timeout_s is None else time.monotonic() + timeout_s
+        wait = Wait(mission_id, states, timeout_s, every_s)
         while True:
-            mission = self.get_mission(mission_id)
-            if is_reached(mission, states):
+            mission = self._call(wait.question())
+            pause_s = wait.after(mission)
+            if pause_s is None:
                 return mission
-            if until is not None and time.monotonic() + every_s > until:
-                raise TimeoutError(f"mission {mission_id} is still {mission.state} after {timeout_s:g} s")
-            time.sleep(every_s)
+            time.sleep(pause_s)
 
     def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> Generator[EventView, None, None]:
         """Yield the entries of a mission's log, first those that there are, then each as it is made.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ssl
-from collections.abc import Collection
 from typing import Annotated, get_args
 
 import httpx
@@ -13,8 +12,8 @@ from pydantic_core import from_json
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bathyfleet.client.call import part
-from bathyfleet.client.models import EventView, LiveMessage, MissionView, Problem
-from bathyfleet.client.problems import MEDIA_TYPE, EndedError, ProblemError, made_up, raised
+from bathyfleet.client.models import EventView, LiveMessage, Problem
+from bathyfleet.client.problems import MEDIA_TYPE, ProblemError, made_up, raised
 
 ENDED = ("finished", "aborted", "failed")
 QUIET_S = 45.0
@@ -62,24 +61,6 @@ class LogPlace:
 def ends(entry: EventView) -> bool:
     """Tell whether with this entry of its log a mission has ended."""
     return entry.kind == "state" and entry.data.get("state") in ENDED
-
-
-def is_reached(mission: MissionView, states: Collection[str]) -> bool:
-    """Tell whether a mission is in one of the states, or has ended where none is named.
-
-    Raises
-    ------
-    EndedError
-        When it has ended in a state that is none of these.
-    """
-    if mission.state in (states or ENDED):
-        return True
-    if mission.state in ENDED:
-        wanted = " or ".join(states)
-        raise EndedError(
-            f"mission {mission.id} is {mission.state}, not {wanted}: {mission.reason or 'no reason given'}"
-        )
-    return False
 
 
 def message_of(text: str | bytes) -> LiveMessage | None:
