@@ -117,6 +117,9 @@ def test_the_log_comes_whole_over_a_line_that_is_cut(client: Client, relay: Rela
     ended = next(i for i, entry in enumerate(stored) if entry.data.get("state") == "finished")
     assert read == stored[: ended + 1]
     assert next(iter(client.events(survey, after=stored[-2].id))) == stored[-1]
+    before, end = stored[ended - 1].id, stored[ended]
+    assert list(client.events(survey, after=before, until_ended=True)) == [end]
+    assert list(client.events(survey, after=end.id, until_ended=True)) == stored[ended + 1 :]
 
 
 def test_what_is_posted_over_a_line_that_loses_answers_is_stored_once(client: Client, relay: Relay) -> None:

@@ -32,6 +32,7 @@ from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, Measu
 from bathyfleet.client.operations import Operations
 from bathyfleet.client.retry import Attempts
 from bathyfleet.client.streams import (
+    ENDED,
     LARGEST_MESSAGE,
     LogPlace,
     ends,
@@ -151,8 +152,17 @@ class Client(Operations):
         after : int
             Only entries with a larger id.
         until_ended : bool
-            Stop after the entry that ends the mission, instead of never.
+            Stop after the entry that ends the mission, instead of never; where that one is not among
+            those with a larger id any more, after the last one.
         """
+        if until_ended and after and self.get_mission(mission_id).state in ENDED:
+            while entries := self.get_events(mission_id, after=after):
+                for entry in entries:
+                    yield entry
+                    if ends(entry):
+                        return
+                after = entries[-1].id
+            return
         place = LogPlace(mission_id, after)
         attempts = self._attempts(place.name)
         while True:
