@@ -8,7 +8,8 @@ from app.missions.operations.history import events_after
 from app.missions.preflight.survey import preflight
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
-from tests.support.missions.harbour import act, sim_spec, spec_json
+from tests.support.missions.harbour import act, sim_spec
+from tests.support.missions.specs import spec_json
 
 
 def rest_spec(vehicle: str, **changes: Any) -> MissionSpec:
