@@ -38,8 +38,8 @@ from bathyfleet.client.streams import (
     ends,
     live_address,
     message_of,
-    refusal,
     tls_of,
+    wait_after,
 )
 from bathyfleet.client.wait import Wait
 
@@ -213,10 +213,7 @@ class AsyncClient(AsyncOperations):
                             yield message
                 wait_s = attempts.after_end()
             except (OSError, WebSocketException) as error:
-                refused = refusal(error, address)
-                if refused is not None:
-                    raise refused from error
-                wait_s = attempts.after_error(error)
+                wait_s = wait_after(error, attempts, address)
             await asyncio.sleep(wait_s)
 
     async def post_measurements(

@@ -38,8 +38,8 @@ from bathyfleet.client.streams import (
     ends,
     live_address,
     message_of,
-    refusal,
     tls_of,
+    wait_after,
 )
 from bathyfleet.client.wait import Wait
 
@@ -209,10 +209,7 @@ class Client(Operations):
                             yield message
                 wait_s = attempts.after_end()
             except (OSError, WebSocketException) as error:
-                refused = refusal(error, address)
-                if refused is not None:
-                    raise refused from error
-                wait_s = attempts.after_error(error)
+                wait_s = wait_after(error, attempts, address)
             time.sleep(wait_s)
 
     def post_measurements(

@@ -13,14 +13,22 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bathyfleet.client.call import part
 from bathyfleet.client.models import EventView, LiveMessage, Problem
-from bathyfleet.client.problems import MEDIA_TYPE, ProblemError, made_up, raised
+from bathyfleet.client.problems import (
+    MEDIA_TYPE,
+    BusyError,
+    ProblemError,
+    UnreachableError,
+    made_up,
+    raised,
+)
+from bathyfleet.client.retry import Attempts
 
 ENDED = ("finished", "aborted", "failed")
 QUIET_S = 45.0
 """The service says something at least every 15 s; a stream that is silent for longer is dead."""
 LARGEST_MESSAGE = 64 << 20
 REFUSALS = {4401: 401, 4403: 403, 4404: 404, 4429: 429}
-"""Codes that a live socket is closed with for good, and the HTTP status that says the same."""
+"""Codes that a live socket is closed with where it says why, and the HTTP status that says the same."""
 
 _messages: TypeAdapter[LiveMessage] = TypeAdapter(Annotated[LiveMessage, Field(discriminator="type")])
 _kinds = frozenset(get_args(message.model_fields["type"].annotation)[0] for message in get_args(LiveMessage))
@@ -70,17 +78,28 @@ def message_of(text: str | bytes) -> LiveMessage | None:
 
 
 def refusal(error: Exception, name: str) -> ProblemError | None:
-    """Return why a live socket is closed for good; None where connecting again may help."""
+    """Return why a live socket is refused; None where nobody said. Of what is too much now, it may be had later."""
     if isinstance(error, ConnectionClosed) and error.rcvd is not None and error.rcvd.code in REFUSALS:
         return raised(made_up(REFUSALS[error.rcvd.code], error.rcvd.reason, name))
     if isinstance(error, InvalidStatus):
         answer = error.response
-        if answer.status_code in (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE):
-            return None
         if (answer.headers.get("content-type") or "").startswith(MEDIA_TYPE):
             return raised(Problem.model_validate_json(answer.body or b""))
         return raised(made_up(answer.status_code, "", name))
     return None
+
+
+def wait_after(error: Exception, attempts: Attempts, name: str) -> float:
+    """Return seconds to wait before a live socket is opened again. Raises why not: ProblemError, UnreachableError."""
+    refused = refusal(error, name)
+    if refused is None:
+        return attempts.after_error(error)
+    if not isinstance(refused, BusyError):
+        raise refused from error
+    try:
+        return attempts.after_error(error)
+    except UnreachableError:
+        raise refused from error
 
 
 def live_address(address: str, mission_id: str) -> str:
