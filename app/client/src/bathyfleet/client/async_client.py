@@ -161,9 +161,9 @@ class AsyncClient(AsyncOperations):
         """
         if until_ended and after and (await self.get_mission(mission_id)).state in ENDED:
             while entries := await self.get_events(mission_id, after=after):
-                for entry in entries:
-                    yield entry
-                    if ends(entry):
+                for stored in entries:
+                    yield stored
+                    if ends(stored):
                         return
                 after = entries[-1].id
             return

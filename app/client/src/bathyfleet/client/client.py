@@ -157,9 +157,9 @@ class Client(Operations):
         """
         if until_ended and after and self.get_mission(mission_id).state in ENDED:
             while entries := self.get_events(mission_id, after=after):
-                for entry in entries:
-                    yield entry
-                    if ends(entry):
+                for stored in entries:
+                    yield stored
+                    if ends(stored):
                         return
                 after = entries[-1].id
             return
