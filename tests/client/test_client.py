@@ -224,8 +224,9 @@ def test_live_messages_come_typed_and_begin_anew_after_a_cut(client: Client, rel
 
 
 def test_live_messages_of_no_mission_are_refused(client: Client) -> None:
-    with pytest.raises(NotFoundError):
+    with pytest.raises(NotFoundError) as refused:
         next(iter(client.live("nowhere")))
+    assert refused.value.kind == "mission-not-found"
 
 
 def test_small_answers_are_as_typed(client: Client, survey: str) -> None:

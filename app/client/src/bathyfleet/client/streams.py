@@ -27,8 +27,13 @@ ENDED = ("finished", "aborted", "failed")
 QUIET_S = 45.0
 """The service says something at least every 15 s; a stream that is silent for longer is dead."""
 LARGEST_MESSAGE = 64 << 20
-REFUSALS = {4401: 401, 4403: 403, 4404: 404, 4429: 429}
-"""Codes that a live socket is closed with where it says why, and the HTTP status that says the same."""
+REFUSALS = {
+    4401: (401, "unauthenticated"),
+    4403: (403, "forbidden"),
+    4404: (404, "mission-not-found"),
+    4429: (429, "too-many-streams"),
+}
+"""Codes that a live socket is closed with where it says why; HTTP status and kind of problem that say the same."""
 
 _messages: TypeAdapter[LiveMessage] = TypeAdapter(Annotated[LiveMessage, Field(discriminator="type")])
 _kinds = frozenset(get_args(message.model_fields["type"].annotation)[0] for message in get_args(LiveMessage))
@@ -80,7 +85,8 @@ def message_of(text: str | bytes) -> LiveMessage | None:
 def refusal(error: Exception, name: str) -> ProblemError | None:
     """Return why a live socket is refused; None where nobody said. Of what is too much now, it may be had later."""
     if isinstance(error, ConnectionClosed) and error.rcvd is not None and error.rcvd.code in REFUSALS:
-        return raised(made_up(REFUSALS[error.rcvd.code], error.rcvd.reason, name))
+        status, kind = REFUSALS[error.rcvd.code]
+        return raised(made_up(status, error.rcvd.reason, name, kind))
     if isinstance(error, InvalidStatus):
         answer = error.response
         if (answer.headers.get("content-type") or "").startswith(MEDIA_TYPE):
