@@ -37,6 +37,7 @@ from app.missions.operations.reports import Reports
 from app.missions.operations.sites import Sites
 from app.missions.operations.traffic import places_of, traffic_view
 from app.missions.operations.work_processes import WorkProcesses
+from app.missions.preflight.neighbours import neighbour_checks
 from app.missions.running.admission import check_spec
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.descriptions import describe_anew
@@ -50,7 +51,7 @@ from app.missions.running.supervisor import MissionSupervisor
 from app.missions.running.team_changes import TeamChanges, vehicle_row
 from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec
-from app.missions.states import ENDED, Action, MissionState
+from app.missions.states import AT_SEA, ENDED, Action, MissionState
 from app.missions.succession import Succession
 from app.missions.traffic.watch import Traffic
 from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
@@ -291,6 +292,11 @@ class MissionService:
         async with self._database.reading() as session:
             return await mission_queries.oldest_first(session, mission_id)
 
+    async def at_sea(self) -> Sequence[MissionRow]:
+        """Return the missions whose vehicles are out there, as they are stored, whoever has them."""
+        async with self._database.reading() as session:
+            return await mission_queries.in_states(session, AT_SEA)
+
     async def spec(self, mission_id: str) -> MissionSpec:
         """Return what a mission is to do, whoever has it. Raises MissionNotFoundError, MissionUnreadableError."""
         return await self._registry.spec(mission_id)
@@ -319,6 +325,7 @@ class MissionService:
         async with self._supervisor.acting(live.id):
             target = states.move(live.header.state, action)
             stops: list[StopReceipt] = []
+            nearby: list[str] = []
             if returns(live, action, return_home):
                 await self._supervisor.bring_home(live, Ending(target, note, actor))
             elif action in (Action.START, Action.RESUME):
@@ -328,6 +335,8 @@ class MissionService:
                     self._claims.check_links(live)
                     # The site may have been surveyed since the mission was described.
                     await self.sites.begin(live)
+                    # Also in the log: programs and consoles start missions without a look at the checklist.
+                    nearby = [check.message for check in neighbour_checks(live, await self.at_sea())]
                 self._claims.claim_team(live)
                 try:
                     await self._supervisor.set_state(live, target, note, actor, check=free_elsewhere(live))
@@ -336,6 +345,8 @@ class MissionService:
                         self._claims.release_team(live)
                     raise
                 self._supervisor.run(live)
+                for message in nearby:
+                    await live.journal.log(Level.WARNING, "safety", message)
             else:
                 stops = await self._supervisor.stand_down(live, target, note, actor)
                 if target in ENDED:

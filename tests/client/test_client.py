@@ -117,6 +117,9 @@ def test_the_log_comes_whole_over_a_line_that_is_cut(client: Client, relay: Rela
     ended = next(i for i, entry in enumerate(stored) if entry.data.get("state") == "finished")
     assert read == stored[: ended + 1]
     assert next(iter(client.events(survey, after=stored[-2].id))) == stored[-1]
+    before, end = stored[ended - 1].id, stored[ended]
+    assert list(client.events(survey, after=before, until_ended=True)) == [end]
+    assert list(client.events(survey, after=end.id, until_ended=True)) == stored[ended + 1 :]
 
 
 def test_what_is_posted_over_a_line_that_loses_answers_is_stored_once(client: Client, relay: Relay) -> None:
@@ -127,6 +130,17 @@ def test_what_is_posted_over_a_line_that_loses_answers_is_stored_once(client: Cl
     assert [item.index for item in verdict.items] == list(range(12))
     assert (verdict.accepted, verdict.duplicate, verdict.replayed) == (12, 0, True)
     assert client.get_mission(mission.id).progress.soundings == 12
+    client.abort_mission(mission.id)
+
+
+def test_what_is_no_number_is_refused_and_not_sent_as_if_it_were_left_out(client: Client) -> None:
+    mission = client.create_mission(mission_spec())
+    slanted = soundings(1)[0] | {"beam_off_nadir_deg": float("nan")}
+    for item in (slanted, models.Measurement(**slanted)):
+        (verdict,) = client.send_measurements(mission.id, [item]).items
+        assert (verdict.verdict, verdict.reason.partition(":")[0]) == ("rejected", "beam_off_nadir_deg")
+    with pytest.raises(InvalidRequestError, match="finite"):
+        client.create_mission(models.MissionSpec(**mission_spec(), accuracy_m=float("nan")))
     client.abort_mission(mission.id)
 
 
@@ -210,8 +224,9 @@ def test_live_messages_come_typed_and_begin_anew_after_a_cut(client: Client, rel
 
 
 def test_live_messages_of_no_mission_are_refused(client: Client) -> None:
-    with pytest.raises(NotFoundError):
+    with pytest.raises(NotFoundError) as refused:
         next(iter(client.live("nowhere")))
+    assert refused.value.kind == "mission-not-found"
 
 
 def test_small_answers_are_as_typed(client: Client, survey: str) -> None:

@@ -1,6 +1,7 @@
 import httpx
 import pytest
 
+from bathyfleet.client.call import Call
 from bathyfleet.client.problems import BusyError, ConflictError, UnreachableError
 from bathyfleet.client.retry import LONGEST_S, Attempts
 
@@ -66,3 +67,19 @@ def test_the_service_says_how_long_to_wait(clock: Clock) -> None:
         attempts.after_refusal(answer(429, **{"retry-after": "61"}))
     with pytest.raises(ConflictError):
         attempts.after_refusal(answer(409))
+
+
+def test_a_time_that_was_given_ends_before_patience(clock: Clock) -> None:
+    attempts = Attempts("x", 60.0, repeatable=True, within_s=3.0, now=clock)
+    assert attempts.left_s == 3.0
+    clock.s += attempts.after_error(LOST)
+    assert attempts.left_s == pytest.approx(2.8)
+    with pytest.raises(TimeoutError, match="no answer came in the time that was given"):
+        attempts.after_refusal(answer(503, **{"retry-after": "5"}))
+
+
+def test_no_answer_is_waited_for_longer_than_the_time_that_was_given() -> None:
+    with httpx.Client(base_url="http://service", timeout=75.0) as client:
+        call: Call[None] = Call("GET", "/health", None)
+        assert call.request(client).extensions["timeout"]["read"] == 75.0
+        assert call.request(client, 5.0).extensions["timeout"]["read"] == 5.0

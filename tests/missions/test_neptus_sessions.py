@@ -84,6 +84,12 @@ async def test_two_vehicles_are_led_through_an_area(make_gateway: Callable[..., 
         await gateway.close()
 
 
+async def test_after_start_nobody_is_asked_to_press_it(gateway: Gateway) -> None:
+    await fly(gateway, gateway.real(floor_m, two()), 2)
+    said = await gateway.log("vehicle")
+    assert sorted(said) == [f"{SESSION}-1 follows", f"{SESSION}-2 follows"]
+
+
 async def test_distances_of_other_sensors_are_no_soundings(gateway: Gateway) -> None:
     panel = gateway.real(floor_m, two(sensors=(*DVL, FORWARD)))
     await fly(gateway, panel, 8)

@@ -68,7 +68,8 @@ class ShareMiddleware:
 async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
     reason = "as many requests are open as one user, or all but operators, may have at a time"
     if scope["type"] == "websocket":
-        # Before it was accepted: the server answers 403.
+        # Unless it was accepted first the server would answer 403, which tells of rights.
+        await send({"type": "websocket.accept"})
         await send({"type": "websocket.close", "code": 4429, "reason": reason})
         return
     remedy = f"Close some, or wait {RETRY_S} s; the number is max_connections in the settings"

@@ -188,9 +188,9 @@ for _action in Action:
     summary="See what stands before the start",
     responses=_FOUND,
 )
-async def check_mission(reader: Reader, mission: Mission) -> PreflightView:
+async def check_mission(reader: Reader, service: Service, mission: Mission) -> PreflightView:
     """Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most."""
-    return preflight(mission)
+    return preflight(mission, await service.at_sea())
 
 
 @router.get(

@@ -1,7 +1,7 @@
 """The checklist before a start: what would be refused, what would go wrong, and what is only good to know."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from pyproj import Geod
@@ -21,6 +21,7 @@ from app.missions.flight.decisions.decision import (
 )
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
+from app.missions.preflight.neighbours import neighbour_checks
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks
@@ -28,6 +29,7 @@ from app.missions.safety.free_space import WAITING_CIRCLE_M, way_in
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
+from app.storage.models import MissionRow
 
 FAR_M = 500.0
 """A vehicle that starts farther from the area than this may have been put into the wrong mission."""
@@ -36,13 +38,14 @@ OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNI
 _BATTERIES = {BatteryState.OK: OK, BatteryState.LOW: WARNING, BatteryState.CRITICAL: PROBLEM}
 
 
-def preflight(live: LiveMission) -> PreflightView:
-    """Return what stands before the start of a mission."""
+def preflight(live: LiveMission, at_sea: Sequence[MissionRow] = ()) -> PreflightView:
+    """Return what stands before the start of a mission, beside those that are at sea."""
     checks = [
         *_vehicles(live),
         *_batteries(live),
         *recovery_checks(live),
         *_places(live),
+        *neighbour_checks(live, at_sea),
         *_depths(live),
         *_room(live),
         *_waiting(live),

@@ -41,6 +41,12 @@ async def oldest_first(session: AsyncSession, mission_id: str | None = None) -> 
     return (await session.scalars(query if mission_id is None else query.where(MissionRow.id == mission_id))).all()
 
 
+async def in_states(session: AsyncSession, states: Collection[str]) -> Sequence[MissionRow]:
+    """Return the missions that are in one of some states, in the order in which they were created."""
+    query = select(MissionRow).where(MissionRow.state.in_(states)).order_by(MissionRow.created_at, MissionRow.id)
+    return (await session.scalars(query)).all()
+
+
 async def followers(session: AsyncSession, mission_id: str) -> Sequence[str]:
     """Return the ids of the missions that are to begin after one, and have not, oldest first."""
     follows = MissionRow.spec["after"].as_string() == mission_id

@@ -15,6 +15,7 @@ from app.descriptors import allow_descriptors
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database
+from bathyfleet.client import AsyncClient, BusyError
 from tests.support.api.rest import make_client, mission_spec, running
 from tests.support.waiting import until
 
@@ -151,8 +152,13 @@ async def test_who_is_refused_is_told_why(fleet: Fleet) -> None:
         assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
         assert refused.json()["type"] == "urn:bathyfleet:problem:too-many-connections"
         url = f"{server.url.replace('http', 'ws', 1)}/api/v1/missions/{fleet.mission}/live"
-        with pytest.raises(websockets.InvalidStatus):
-            await websockets.connect(url, additional_headers=bearer(fleet.tokens["viewer"]))
+        async with websockets.connect(url, additional_headers=bearer(fleet.tokens["viewer"])) as socket:
+            with pytest.raises(websockets.ConnectionClosedError):
+                await socket.recv()
+            assert socket.close_code == 4429
+        async with AsyncClient(server.url, fleet.tokens["viewer"], patience_s=0) as viewer:
+            with pytest.raises(BusyError, match="as many requests are open"):
+                await anext(viewer.live(fleet.mission))
         await close(held)
 
         async def served() -> bool:

@@ -9,6 +9,7 @@ more flies its last leg and circles at its end, until someone presses STOP in th
 import asyncio
 import time
 from collections.abc import Coroutine, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -45,6 +46,8 @@ GATHER_S = 0.3
 """Orders of one step come within a moment; a vehicle without one by then is told to stay."""
 STAY_AFTER_S = 10.0
 """A step without any order, since no waypoint is safe, is answered with where the vehicles are."""
+TAKEN_WITHIN_S = 5.0
+"""The first step starts the mission, which asks its vehicles to follow while that step is still being taken in."""
 PRIOR_SPACING_S = 3600.0
 """Between cells of a prior map, which are no track: far enough apart that no move is a jump."""
 
@@ -97,6 +100,8 @@ class _Fleet:
     pending: int | None = None
     """The step that the panel waits to be answered."""
     superseded: bool = False
+    begun: asyncio.Event = field(default_factory=asyncio.Event, repr=False)
+    """Set when its first step is taken in."""
     prior: Sequence[tuple[int, int, float]] = ()
     """Cells of a prior map that the mission will hear of when it has begun."""
     timer: asyncio.TimerHandle | None = field(default=None, repr=False)
@@ -170,8 +175,13 @@ class NeptusFleetLink(VisitedLink):
 
     async def engage(self, vehicle: str) -> None:
         """Let a vehicle take part in answers. Raises VehicleRefusedError before its session's first step."""
-        _, craft = self._find(vehicle)
-        if craft.state in (LinkState.HEARD, LinkState.LOST):
+        fleet, craft = self._find(vehicle)
+        if craft.state is LinkState.HEARD and craft.place is not None:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(fleet.begun.wait(), TAKEN_WITHIN_S)
+        if craft.state is LinkState.HEARD:
+            raise VehicleRefusedError(vehicle, self._reason(craft.state), "it follows with its first step")
+        if craft.state is LinkState.LOST:
             raise VehicleRefusedError(vehicle, self._reason(craft.state), "press START in the panel")
         self._set_state(craft, LinkState.ENGAGED)
 
@@ -291,6 +301,7 @@ class NeptusFleetLink(VisitedLink):
             if craft.state is not LinkState.ENGAGED:
                 # Not before the soundings are in, or the first decision would be made without them.
                 self._set_state(craft, LinkState.READY)
+        fleet.begun.set()
         for craft in fleet.crafts:
             if craft.order is not None and craft.published and craft.status is not WaypointStatus.REACHED:
                 self._report(craft, WaypointStatus.REACHED)

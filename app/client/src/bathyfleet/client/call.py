@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from urllib.parse import quote
 
 import httpx
-from pydantic import BaseModel, TypeAdapter
+from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 T = TypeVar("T")
 
@@ -32,6 +32,8 @@ class Call(Generic[T]):
         Sent as it is.
     query, headers : mapping
         Those that are None are left out.
+    within_s : float, optional
+        The time within which it has to be answered, whatever the client's patience.
     """
 
     method: str
@@ -41,14 +43,15 @@ class Call(Generic[T]):
     content: bytes | None = None
     query: Mapping[str, Any] = field(default_factory=dict)
     headers: Mapping[str, str | None] = field(default_factory=dict)
+    within_s: float | None = None
 
     @property
     def repeatable(self) -> bool:
         """Whether sending it twice does what sending it once does."""
         return self.method == "GET" or self.headers.get("idempotency-key") is not None
 
-    def request(self, client: httpx.Client | httpx.AsyncClient) -> httpx.Request:
-        """Return the request for a connection whose base is the service's address."""
+    def request(self, client: httpx.Client | httpx.AsyncClient, within_s: float | None = None) -> httpx.Request:
+        """Return the request for a connection whose base is the service's address, answered within some time."""
         headers = {name: value for name, value in self.headers.items() if value is not None}
         if self.reading not in (bytes, str, None):
             headers["Accept"] = f"{JSON}, application/geo+json"
@@ -59,7 +62,15 @@ class Call(Generic[T]):
         elif content is not None:
             headers["Content-Type"] = "application/octet-stream"
         params = {name: value for name, value in self.query.items() if value is not None}
-        return client.build_request(self.method, f"/api/v1{self.path}", params=params, content=content, headers=headers)
+        request = client.build_request(
+            self.method, f"/api/v1{self.path}", params=params, content=content, headers=headers
+        )
+        if within_s is not None:
+            usual: Mapping[str, float | None] = request.extensions["timeout"]
+            request.extensions["timeout"] = {
+                name: within_s if s is None else min(s, within_s) for name, s in usual.items()
+            }
+        return request
 
     def read(self, answer: httpx.Response) -> T:
         """Return what a successful answer says."""
@@ -83,7 +94,10 @@ def part(value: str | int) -> str:
 def _as_json(body: BaseModel | Mapping[str, Any]) -> bytes:
     if isinstance(body, BaseModel):
         return body.model_dump_json(exclude_unset=True).encode()
-    return TypeAdapter(dict[str, Any]).dump_json(dict(body), exclude_unset=True)
+    return _MAPPING.dump_json(dict(body), exclude_unset=True)
+
+
+_MAPPING = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
 
 
 @cache

@@ -32,15 +32,16 @@ from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, Measu
 from bathyfleet.client.operations import Operations
 from bathyfleet.client.retry import Attempts
 from bathyfleet.client.streams import (
+    ENDED,
     LARGEST_MESSAGE,
     LogPlace,
     ends,
-    is_reached,
     live_address,
     message_of,
-    refusal,
     tls_of,
+    wait_after,
 )
+from bathyfleet.client.wait import Wait
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,10 +99,10 @@ class Client(Operations):
         self._http.close()
 
     def _call(self, call: Call[T]) -> T:
-        attempts = self._attempts(f"{call.method} {call.path}", repeatable=call.repeatable)
+        attempts = self._attempts(f"{call.method} {call.path}", repeatable=call.repeatable, within_s=call.within_s)
         while True:
             try:
-                answer = self._http.send(call.request(self._http))
+                answer = self._http.send(call.request(self._http, attempts.left_s))
             except httpx.TransportError as error:
                 time.sleep(attempts.after_error(error))
                 continue
@@ -109,8 +110,8 @@ class Client(Operations):
                 return call.read(answer)
             time.sleep(attempts.after_refusal(answer))
 
-    def _attempts(self, what: str, *, repeatable: bool = True) -> Attempts:
-        return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable)
+    def _attempts(self, what: str, *, repeatable: bool = True, within_s: float | None = None) -> Attempts:
+        return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable, within_s=within_s)
 
     def wait_for(
         self, mission_id: str, *states: str, timeout_s: float | None = None, every_s: float = 1.0
@@ -133,14 +134,13 @@ class Client(Operations):
         TimeoutError
             When the time is over.
         """
-        until = None if timeout_s is None else time.monotonic() + timeout_s
+        wait = Wait(mission_id, states, timeout_s, every_s)
         while True:
-            mission = self.get_mission(mission_id)
-            if is_reached(mission, states):
+            mission = self._call(wait.question())
+            pause_s = wait.after(mission)
+            if pause_s is None:
                 return mission
-            if until is not None and time.monotonic() + every_s > until:
-                raise TimeoutError(f"mission {mission_id} is still {mission.state} after {timeout_s:g} s")
-            time.sleep(every_s)
+            time.sleep(pause_s)
 
     def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> Generator[EventView, None, None]:
         """Yield the entries of a mission's log, first those that there are, then each as it is made.
@@ -152,8 +152,17 @@ class Client(Operations):
         after : int
             Only entries with a larger id.
         until_ended : bool
-            Stop after the entry that ends the mission, instead of never.
+            Stop after the entry that ends the mission, instead of never; where that one is not among
+            those with a larger id any more, after the last one.
         """
+        if until_ended and after and self.get_mission(mission_id).state in ENDED:
+            while entries := self.get_events(mission_id, after=after):
+                for stored in entries:
+                    yield stored
+                    if ends(stored):
+                        return
+                after = entries[-1].id
+            return
         place = LogPlace(mission_id, after)
         attempts = self._attempts(place.name)
         while True:
@@ -200,10 +209,7 @@ class Client(Operations):
                             yield message
                 wait_s = attempts.after_end()
             except (OSError, WebSocketException) as error:
-                refused = refusal(error, address)
-                if refused is not None:
-                    raise refused from error
-                wait_s = attempts.after_error(error)
+                wait_s = wait_after(error, attempts, address)
             time.sleep(wait_s)
 
     def post_measurements(

@@ -10,7 +10,13 @@ class Model(BaseModel):
     """Something that the service is told or answers. Fields of a newer service are kept under their names."""
 
     model_config = ConfigDict(
-        extra="allow", populate_by_name=True, serialize_by_alias=True, protected_namespaces=(), defer_build=True
+        extra="allow",
+        populate_by_name=True,
+        serialize_by_alias=True,
+        protected_namespaces=(),
+        defer_build=True,
+        # Else NaN would be sent as null, which says that there is no such value; the service refuses NaN.
+        ser_json_inf_nan="constants",
     )
 
 

@@ -104,15 +104,14 @@ def problem_of(answer: httpx.Response) -> ProblemError:
     return raised(made_up(answer.status_code, answer.text[:SHOWN], str(answer.request.url)))
 
 
-def made_up(status: int, detail: str, instance: str) -> Problem:
+def made_up(status: int, detail: str, instance: str, kind: str = "") -> Problem:
     """Return a problem for what has no document of its own."""
     try:
         title = HTTPStatus(status).phrase
     except ValueError:
         title = f"Status {status}"
-    return Problem(
-        type="about:blank", title=title, status=status, detail=detail, instance=instance, remedy="", errors=[]
-    )
+    type_ = f"urn:bathyfleet:problem:{kind}" if kind else "about:blank"
+    return Problem(type=type_, title=title, status=status, detail=detail, instance=instance, remedy="", errors=[])
 
 
 def raised(problem: Problem) -> ProblemError:

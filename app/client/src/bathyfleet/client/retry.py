@@ -11,6 +11,8 @@ import httpx
 from bathyfleet.client.problems import UnreachableError, problem_of
 
 FIRST_S, LONGEST_S = 0.2, 5.0
+LEAST_S = 2.0
+"""An answer is waited for so long also at the very end of a given time."""
 WORTH_REPEATING = (
     HTTPStatus.TOO_MANY_REQUESTS,
     HTTPStatus.BAD_GATEWAY,
@@ -31,18 +33,32 @@ class Attempts:
         Since the first failure, or the first one after :meth:`reached`.
     repeatable : bool
         Whether it may be done twice. What may not is only repeated where it cannot have arrived.
+    within_s : float, optional
+        For how long at all, from now on; then TimeoutError is raised.
     now : callable
         A clock in seconds.
     """
 
     def __init__(
-        self, what: str, patience_s: float, *, repeatable: bool, now: Callable[[], float] = time.monotonic
+        self,
+        what: str,
+        patience_s: float,
+        *,
+        repeatable: bool,
+        within_s: float | None = None,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._what = what
         self._patience_s = patience_s
         self._repeatable = repeatable
         self._now = now
+        self._until = None if within_s is None else now() + within_s
         self.reached()
+
+    @property
+    def left_s(self) -> float | None:
+        """How long the answer to the next attempt may take; None: as long as to any request."""
+        return None if self._until is None else max(self._until - self._now(), LEAST_S)
 
     def reached(self) -> None:
         """Begin anew: the service answers."""
@@ -84,6 +100,8 @@ class Attempts:
         self._since = now if self._since is None else self._since
         wait_s = max(self._next_s, least_s)
         self._next_s = min(2.0 * self._next_s, LONGEST_S)
+        if self._until is not None and now + wait_s > self._until:
+            raise TimeoutError(f"{self._what}: no answer came in the time that was given")
         return wait_s if now + wait_s <= self._since + self._patience_s else None
 
 

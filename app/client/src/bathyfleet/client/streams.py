@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ssl
-from collections.abc import Collection
 from typing import Annotated, get_args
 
 import httpx
@@ -13,15 +12,28 @@ from pydantic_core import from_json
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from bathyfleet.client.call import part
-from bathyfleet.client.models import EventView, LiveMessage, MissionView, Problem
-from bathyfleet.client.problems import MEDIA_TYPE, EndedError, ProblemError, made_up, raised
+from bathyfleet.client.models import EventView, LiveMessage, Problem
+from bathyfleet.client.problems import (
+    MEDIA_TYPE,
+    BusyError,
+    ProblemError,
+    UnreachableError,
+    made_up,
+    raised,
+)
+from bathyfleet.client.retry import Attempts
 
 ENDED = ("finished", "aborted", "failed")
 QUIET_S = 45.0
 """The service says something at least every 15 s; a stream that is silent for longer is dead."""
 LARGEST_MESSAGE = 64 << 20
-REFUSALS = {4401: 401, 4403: 403, 4404: 404, 4429: 429}
-"""Codes that a live socket is closed with for good, and the HTTP status that says the same."""
+REFUSALS = {
+    4401: (401, "unauthenticated"),
+    4403: (403, "forbidden"),
+    4404: (404, "mission-not-found"),
+    4429: (429, "too-many-streams"),
+}
+"""Codes that a live socket is closed with where it says why; HTTP status and kind of problem that say the same."""
 
 _messages: TypeAdapter[LiveMessage] = TypeAdapter(Annotated[LiveMessage, Field(discriminator="type")])
 _kinds = frozenset(get_args(message.model_fields["type"].annotation)[0] for message in get_args(LiveMessage))
@@ -64,24 +76,6 @@ def ends(entry: EventView) -> bool:
     return entry.kind == "state" and entry.data.get("state") in ENDED
 
 
-def is_reached(mission: MissionView, states: Collection[str]) -> bool:
-    """Tell whether a mission is in one of the states, or has ended where none is named.
-
-    Raises
-    ------
-    EndedError
-        When it has ended in a state that is none of these.
-    """
-    if mission.state in (states or ENDED):
-        return True
-    if mission.state in ENDED:
-        wanted = " or ".join(states)
-        raise EndedError(
-            f"mission {mission.id} is {mission.state}, not {wanted}: {mission.reason or 'no reason given'}"
-        )
-    return False
-
-
 def message_of(text: str | bytes) -> LiveMessage | None:
     """Return a message of a live socket; None for a kind that this client does not know."""
     value = from_json(text)
@@ -89,17 +83,29 @@ def message_of(text: str | bytes) -> LiveMessage | None:
 
 
 def refusal(error: Exception, name: str) -> ProblemError | None:
-    """Return why a live socket is closed for good; None where connecting again may help."""
+    """Return why a live socket is refused; None where nobody said. Of what is too much now, it may be had later."""
     if isinstance(error, ConnectionClosed) and error.rcvd is not None and error.rcvd.code in REFUSALS:
-        return raised(made_up(REFUSALS[error.rcvd.code], error.rcvd.reason, name))
+        status, kind = REFUSALS[error.rcvd.code]
+        return raised(made_up(status, error.rcvd.reason, name, kind))
     if isinstance(error, InvalidStatus):
         answer = error.response
-        if answer.status_code in (httpx.codes.TOO_MANY_REQUESTS, httpx.codes.SERVICE_UNAVAILABLE):
-            return None
         if (answer.headers.get("content-type") or "").startswith(MEDIA_TYPE):
             return raised(Problem.model_validate_json(answer.body or b""))
         return raised(made_up(answer.status_code, "", name))
     return None
+
+
+def wait_after(error: Exception, attempts: Attempts, name: str) -> float:
+    """Return seconds to wait before a live socket is opened again. Raises why not: ProblemError, UnreachableError."""
+    refused = refusal(error, name)
+    if refused is None:
+        return attempts.after_error(error)
+    if not isinstance(refused, BusyError):
+        raise refused from error
+    try:
+        return attempts.after_error(error)
+    except UnreachableError:
+        raise refused from error
 
 
 def live_address(address: str, mission_id: str) -> str:
