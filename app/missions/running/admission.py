@@ -8,6 +8,7 @@ from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REF
 from app.missions.errors import InvalidRequestError
 from app.missions.flight.own_legs import least_way_m
 from app.missions.spec.mission import MissionKind, MissionSpec
+from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
 
 
@@ -118,6 +119,14 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
             f"{prefix}sensor",
             f"{vehicle.sensor} has no swath, and planner {spec.planner.name!r} plans by swaths",
             f"give it sensor {Sensor.MULTIBEAM}, or the mission another planner",
+        )
+    reach_m = (vehicle.sonar or SwathSonarSpec()).range_m
+    if vehicle.sensor is Sensor.MULTIBEAM and reach_m <= spec.limits.min_altitude_m:
+        raise InvalidRequestError(
+            f"{prefix}sonar.range_m",
+            f"{reach_m:g} m does not reach the bottom from limits.min_altitude_m above it, "
+            f"{spec.limits.min_altitude_m:g} m",
+            "give its range, or make limits.min_altitude_m smaller",
         )
     if vehicle.recovery_point is not None:
         name = f"{prefix}recovery_point"
