@@ -33,7 +33,7 @@ def _hexadecimal(given: Any) -> Any:
 
 Address = Annotated[str, AfterValidator(lambda text: str(ipaddress.IPv4Address(text)))]
 Network = Annotated[str, AfterValidator(lambda text: ipaddress.IPv4Network(text) and text)]
-ImcId = Annotated[int, BeforeValidator(_hexadecimal), Field(ge=1, le=0xFFFE)]
+ImcId = Annotated[int, Field(ge=1, le=0xFFFE), BeforeValidator(_hexadecimal)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 Latitude = Annotated[float, Field(ge=-90, le=90)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]

@@ -57,7 +57,7 @@ def test_imc_ids_are_taken_as_the_doctor_tells_them(monkeypatch: pytest.MonkeyPa
     imc = load_settings().imc
     assert (imc.id, imc.allowed_ids) == (0x4001, (0x15, 22))
     monkeypatch.setenv("BATHYFLEET_IMC__ID", "0xFFFF")
-    with pytest.raises(SettingsError, match=r"imc\.id is '0xFFFF'"):
+    with pytest.raises(SettingsError, match=r"imc\.id is 65535"):
         load_settings()
 
 
