@@ -1,9 +1,9 @@
 """Everything that can be set about the IMC side, in one frozen place; what others offer of it derives from here."""
 
 import ipaddress
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 STANDARD_ANNOUNCE_PORTS = (30100, 30101, 30102, 30103, 30104)
 STANDARD_MULTICAST_GROUP = "224.0.75.69"
@@ -22,9 +22,18 @@ def _multicast(text: str) -> str:
     return text
 
 
+def _hexadecimal(given: Any) -> Any:
+    """Return the number of a text like 0x4001: as TOML has it, and the doctor tells ids."""
+    text = given.strip().lower() if isinstance(given, str) else ""
+    try:
+        return int(text, 16) if text.startswith("0x") else given
+    except ValueError:
+        return given
+
+
 Address = Annotated[str, AfterValidator(lambda text: str(ipaddress.IPv4Address(text)))]
 Network = Annotated[str, AfterValidator(lambda text: ipaddress.IPv4Network(text) and text)]
-ImcId = Annotated[int, Field(ge=1, le=0xFFFE)]
+ImcId = Annotated[int, Field(ge=1, le=0xFFFE), BeforeValidator(_hexadecimal)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 Latitude = Annotated[float, Field(ge=-90, le=90)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]

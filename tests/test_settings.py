@@ -50,6 +50,17 @@ def test_the_command_line_beats_the_environment_beats_the_file(tmp_path: Path, m
     assert (settings.imc.name, settings.imc.port) == ("quay", 7001)
 
 
+def test_imc_ids_are_taken_as_the_doctor_tells_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the file they always were, in which 0x4001 is a number."""
+    monkeypatch.setenv("BATHYFLEET_IMC__ID", "0x4001")
+    monkeypatch.setenv("BATHYFLEET_IMC__ALLOWED_IDS", '["0x15", 22]')
+    imc = load_settings().imc
+    assert (imc.id, imc.allowed_ids) == (0x4001, (0x15, 22))
+    monkeypatch.setenv("BATHYFLEET_IMC__ID", "0xFFFF")
+    with pytest.raises(SettingsError, match=r"imc\.id is 65535"):
+        load_settings()
+
+
 def test_the_file_may_lie_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "elsewhere.toml"
     file.write_text("port = 4711\n")

@@ -28,8 +28,8 @@ def _list_formats(wanted: bool) -> None:
 def export(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
     format: Annotated[  # noqa: A002 - the option's name
-        str, typer.Option("--format", "-f", help="Kind of file; --formats lists them.")
-    ] = "tif",
+        str | None, typer.Option("--format", "-f", help="Kind of file; --formats lists them [default: tif]")
+    ] = None,
     formats: Annotated[
         bool, typer.Option("--formats", help="List the kinds of files.", callback=_list_formats, is_eager=True)
     ] = False,
@@ -37,8 +37,11 @@ def export(
         Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
     ] = None,
     order: Annotated[
-        str, typer.Option(help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2.")
-    ] = "1a",
+        str | None,
+        typer.Option(
+            help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2 [default: 1a]"
+        ),
+    ] = None,
     interval: Annotated[
         float | None, typer.Option(min=0.01, max=1000, help="Metres between contours [default: about ten contours]")
     ] = None,
@@ -54,16 +57,27 @@ def export(
     from app.missions.operations.maps import mission_maps
     from app.missions.service import MissionService
 
-    if format not in PRODUCTS:
-        raise typer.BadParameter(f"{format!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
-    if order not in list(Order):
+    wanted = format or "tif"
+    if wanted not in PRODUCTS:
+        raise typer.BadParameter(f"{wanted!r} is not one of {', '.join(PRODUCTS)}", param_hint="--format")
+    if order is not None and order not in list(Order):
         raise typer.BadParameter(f"{order!r} is not one of {', '.join(Order)}", param_hint="--order")
-    options = ProductOptions(Order(order), interval, vehicle=vehicle)
+    endings = {f".{kind.extension.rpartition('.')[2]}" for kind in PRODUCTS.values()} - {".tif"}
+    if format is None and out is not None and out.suffix.lower() in endings:
+        raise typer.BadParameter(f"{out} would be a GeoTIFF: say the kind of file by --format", param_hint="--out")
+    for option, given, heeding in (
+        ("--order", order, [name for name, kind in PRODUCTS.items() if kind.by_order]),
+        ("--interval", interval, [name for name, kind in PRODUCTS.items() if kind.with_contours]),
+        ("--vehicle", vehicle, [name for name, kind in PRODUCTS.items() if kind.of_vehicle]),
+    ):
+        if given is not None and wanted not in heeding:
+            raise typer.BadParameter(f"{wanted} does not depend on it, {', '.join(heeding)} do", param_hint=option)
+    options = ProductOptions(Order(order or "1a"), interval, vehicle=vehicle)
 
     async def run(service: MissionService) -> Product:
         live = await meant_mission(service, mission)
         return await mission_maps.export(
-            live, service.maps, service.settings.provider, service.compute, format, options
+            live, service.maps, service.settings.provider, service.compute, wanted, options
         )
 
     product = with_missions(settings, run)
@@ -227,7 +241,9 @@ def tide(
             help="Table of high and low waters, or of observed levels (.tid); default: --level.",
         ),
     ] = None,
-    level: Annotated[float, typer.Option(help="Constant water level, metres, where there is no table.")] = 0.0,
+    level: Annotated[
+        float | None, typer.Option(help="Constant water level, metres, where there is no table [default: 0]")
+    ] = None,
     source: Annotated[str | None, typer.Option(help="Where it comes from, kept with the product.")] = None,
     sd: Annotated[float, typer.Option(help="Standard deviation of the level, metres.")] = 0.0,
     datum: Annotated[int, typer.Option(help="EPSG code of the depth datum.")] = 5861,
@@ -242,12 +258,14 @@ def tide(
     from app.missions.operations.corrections.recorrection import set_tide
     from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection
 
+    if level is not None and table is not None:
+        raise typer.BadParameter("the table's levels would count: give one of them", param_hint="--level")
     try:
         text = None if table is None else table.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise CommandError(f"{table} is not text", "send a .tid table") from None
     given: dict[str, Any] = {
-        "level_m": level,
+        "level_m": level or 0.0,
         "sd_m": sd,
         "datum_epsg": datum,
         "datum_offset_m": datum_offset,
@@ -285,6 +303,8 @@ def adjust(
     from app.missions.operations.corrections import adjustment
     from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
 
+    if undo and fixes is not None:
+        raise typer.BadParameter("positions as they came have no fixes: give one of them", param_hint="--fixes")
     try:
         given = {} if fixes is None else {"fixes": json.loads(fixes.read_text(encoding="utf-8"))}
     except ValueError as error:

@@ -19,7 +19,7 @@ def train(
         ),
     ],
     more: Annotated[list[str] | None, typer.Argument(metavar="[TERRAINS]...", hidden=True)] = None,
-    iterations: Annotated[int, typer.Option(min=1, help="Controllers that are tried.")] = 2000,
+    iterations: Annotated[int, typer.Option(min=1, help="Controllers tried at least; cma tries 18 at a time.")] = 2000,
     method: Annotated[str, typer.Option(help="cma (CMA-ES), pcao (algorithm 1 of the paper) or random.")] = "cma",
     runs: Annotated[int, typer.Option(min=1, max=1000, help="Monte-Carlo runs per sea floor and controller.")] = 3,
     robots: Annotated[int, typer.Option(min=1, max=100)] = 3,

@@ -129,6 +129,7 @@ def test_without_json_a_table_is_printed(terrain: Terrain) -> None:
         (["--message-loss", "0.1"], ["message loss", "capacity"]),
         (["--regressors", "none"], ["none", "polynomial"]),
         (["--terrain", "/nowhere/at-all.npz"], ["at-all.npz"]),
+        (["--model", "model.json", "--planner", "cao,random"], ["--model", "only pcao flies with a model"]),
     ],
 )
 def test_wrong_input_is_refused_in_words(terrain: Terrain, arguments: Any, words: Any) -> None:

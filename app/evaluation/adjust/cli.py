@@ -28,7 +28,7 @@ def adjust(
     drift: Annotated[float, typer.Option(min=0.1, max=100.0, help="Error at the end of a dive, RMS, metres.")] = 6.0,
     vehicles: Annotated[int, typer.Option(min=1, max=20)] = 2,
     single_beam: Annotated[bool, typer.Option("--single-beam", help="Single beams in place of swath sonars.")] = False,
-    seed: Seed = 0,
+    seed: Seed = None,
     seeds: Seeds = None,
     jobs: Jobs = 1,
     scheduler: Scheduler = None,

@@ -46,7 +46,7 @@ def coverage(
     cell: Annotated[
         float | None, typer.Option(min=0.05, help="Side of a node, metres [default: a twentieth of the median depth]")
     ] = None,
-    seed: Seed = 0,
+    seed: Seed = None,
     seeds: Seeds = None,
     jobs: Jobs = 1,
     scheduler: Scheduler = None,

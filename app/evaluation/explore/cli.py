@@ -21,6 +21,7 @@ from app.evaluation.runs.command import (
     TerrainFile,
     compare,
     evaluate_app,
+    flown,
     model_of,
     planner_options,
     planners_named,
@@ -29,7 +30,6 @@ from app.evaluation.runs.command import (
     terrain_of,
 )
 from app.evaluation.runs.jobs import Progress as StepProgress
-from app.evaluation.runs.jobs import run_jobs
 from app.exploration.communication.messages import MAX_ENTRIES
 from app.exploration.core.objective import TERMS
 from app.exploration.planner.options import PlannerOptions
@@ -77,7 +77,7 @@ def explore(
         str, typer.Option(help="Number of landmarks, spread at random; all: one per cell of the terrain file.")
     ] = "1100",
     steps: Annotated[int, typer.Option(min=1)] = 500,
-    seed: Seed = 0,
+    seed: Seed = None,
     seeds: Seeds = None,
     candidates: Annotated[
         int | None, typer.Option(min=0, help="Candidates per vehicle; for osarses the number of real tries.")
@@ -125,7 +125,7 @@ def explore(
     count = _landmark_count(landmarks)
     changes = TeamSchedule(_changes(lose, "--lose"), _changes(join, "--join"))
     runs = []
-    trained = model_of(model)
+    trained = model_of(model, names)
     for name in names:
         options = planner_options(regressors, None if name == "osarses" else candidates, objective, contribution)
         options = options.model_copy(update={"model": trained if name == "pcao" else None})
@@ -191,14 +191,14 @@ def tables(
         sea_floors, missing = report_terrains(terrains)
     except (TerrainError, OSError) as error:
         raise typer.BadParameter(str(error), param_hint="--terrains") from error
-    chosen_seeds = seed_list(0, seeds)
+    chosen_seeds = seed_list(None, seeds)
     out.mkdir(parents=True, exist_ok=True)
     results = Results(out / "exploration.jsonl")
     open_ = [job for job in jobs_of(chosen, sea_floors, chosen_seeds, steps) if job.key not in results.runs]
     open_ = [] if no_run else open_
     with progress_bar() as bar:
         task = bar.add_task("tables", total=len(open_))
-        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
+        for run in flown(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
             results.add(run)
             bar.advance(task)
 

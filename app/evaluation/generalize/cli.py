@@ -11,9 +11,7 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from app.evaluation.generalize.tasks import TASKS, FloorJob
-from app.evaluation.runs.cluster import ClusterError
-from app.evaluation.runs.command import Json, Scheduler, evaluate_app, progress_bar, seed_list
-from app.evaluation.runs.jobs import run_jobs
+from app.evaluation.runs.command import Json, Scheduler, evaluate_app, flown, progress_bar, seed_list
 from app.evaluation.runs.store import Results
 from simulator.floors.unseen_floors import UNSEEN, floor_names
 
@@ -85,7 +83,7 @@ def _seeds(text: str, floors: int) -> Sequence[int]:
     if text in ("even", "odd"):
         count = -(-floors // len(UNSEEN))
         return list(itertools.islice(itertools.count(0 if text == "even" else 1, 2), count))
-    return seed_list(0, text)
+    return seed_list(None, text)
 
 
 def _run(
@@ -101,15 +99,12 @@ def _run(
     open_ = [] if no_run else [job for job in jobs if job.key not in kept]
     with progress_bar() as bar:
         task = bar.add_task("generalize", total=len(open_))
-        try:
-            for run in run_jobs(open_, processes, lambda job, step: bar.update(task, description=job.title), scheduler):
-                if results is None:
-                    kept[run["key"]] = run
-                else:
-                    results.add(run)
-                bar.advance(task)
-        except ClusterError as error:
-            raise typer.BadParameter(str(error), param_hint="--scheduler") from None
+        for run in flown(open_, processes, lambda job, step: bar.update(task, description=job.title), scheduler):
+            if results is None:
+                kept[run["key"]] = run
+            else:
+                results.add(run)
+            bar.advance(task)
     return kept
 
 

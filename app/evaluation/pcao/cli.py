@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from app.evaluation.runs.command import Scheduler, evaluate_app, model_of, progress_bar, seed_list
+from app.evaluation.runs.command import Scheduler, evaluate_app, flown, model_of, progress_bar, seed_list
 
 
 @evaluate_app.command()
@@ -41,9 +41,7 @@ def pcao(
     from app.evaluation.pcao.simulation.world import LANDMARKS, STEPS
     from app.evaluation.pcao.speed import speed_lines
     from app.evaluation.pcao.study import PARTS, Study
-    from app.evaluation.runs.cluster import ClusterError
     from app.evaluation.runs.facts import made
-    from app.evaluation.runs.jobs import run_jobs
     from app.evaluation.runs.store import Results
     from app.exploration.pcao.model import default_model
 
@@ -55,7 +53,7 @@ def pcao(
         raise typer.BadParameter(f"{terrains} is not a folder", param_hint="--terrains")
     processes = jobs or os.cpu_count() or 1
     chosen = model_of(model) or default_model()
-    study = Study(terrains, seed_list(0, seeds), chosen, steps, landmarks, iterations, searches, range(team_runs))
+    study = Study(terrains, seed_list(None, seeds), chosen, steps, landmarks, iterations, searches, range(team_runs))
     out.mkdir(parents=True, exist_ok=True)
     results = Results(out / "pcao.jsonl")
 
@@ -63,14 +61,9 @@ def pcao(
         open_ = [] if no_run else [job for job in wanted if job.key not in results.runs]
         with progress_bar() as bar:
             task = bar.add_task("pcao", total=len(open_))
-            try:
-                for run in run_jobs(
-                    open_, processes, lambda job, step: bar.update(task, description=job.title), scheduler
-                ):
-                    results.add(run)
-                    bar.advance(task)
-            except ClusterError as error:
-                raise typer.BadParameter(str(error), param_hint="--scheduler") from None
+            for run in flown(open_, processes, lambda job, step: bar.update(task, description=job.title), scheduler):
+                results.add(run)
+                bar.advance(task)
         return len(open_)
 
     count = make(study.jobs([part for part in parts if part != "tables"]) if "curves" in parts else [])

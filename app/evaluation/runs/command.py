@@ -1,6 +1,6 @@
 """What the commands of ``bathyfleet evaluate`` share: options, progress, and how their runs are shown."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,7 +25,7 @@ from simulator.floors.terrain_files import load_terrain
 evaluate_app = typer.Typer(help="Compare planners in closed loop, without a network.", no_args_is_help=True)
 
 TerrainFile = Annotated[Path, typer.Option("--terrain", help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv.")]
-Seed = Annotated[int, typer.Option(help="Seed of everything random.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random [default: 0]", show_default=False)]
 Seeds = Annotated[str | None, typer.Option(help="Several runs: FIRST:END (END excluded), or a list 1,5,9.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else, to standard output.")]
 Regressors = Annotated[str, typer.Option(help="What CAO's estimator is linear in: map or polynomial.")]
@@ -38,6 +38,10 @@ Scheduler = Annotated[
 ModelFile = Annotated[
     Path | None, typer.Option(help="What pcao flies with, a file of bathyfleet train [default: the one that ships]")
 ]
+
+
+WITH_REPORT = frozenset({"write", "seed", "seeds", "jobs", "scheduler", "only", "no_run"})
+"""Options that a report of ``--write`` heeds in every command; what it flies is laid down by its experiments."""
 
 
 @contextmanager
@@ -56,6 +60,16 @@ def progress_bar() -> Iterator[Progress]:
         yield bar
 
 
+def flown(
+    jobs: Sequence[Job], processes: int, tell: Callable[[Job, int], None], scheduler: str | None
+) -> Iterator[dict[str, Any]]:
+    """Yield every job's result as ``run_jobs`` does; a cluster that cannot be used is the option's fault."""
+    try:
+        yield from run_jobs(jobs, processes, tell, scheduler)
+    except ClusterError as error:
+        raise typer.BadParameter(str(error), param_hint="--scheduler") from None
+
+
 def compare(
     jobs: Sequence[Job], columns: tuple[str, ...], processes: int, scheduler: str | None = None, *, as_json: bool
 ) -> None:
@@ -67,11 +81,8 @@ def compare(
         def show(job: Job, step: int) -> None:
             bar.update(task, description=job.title, completed=sum(j.steps for j in jobs[: len(runs)]) + step)
 
-        try:
-            for run in run_jobs(jobs, processes, show, scheduler):
-                runs.append(run)  # noqa: PERF402 - ``show`` counts them
-        except ClusterError as error:
-            raise typer.BadParameter(str(error), param_hint="--scheduler") from None
+        for run in flown(jobs, processes, show, scheduler):
+            runs.append(run)  # noqa: PERF402 - ``show`` counts them
     if as_json:
         single = len(runs) == 1
         document = runs[0] if single else {"runs": runs, "summary": summarise(runs)}
@@ -84,10 +95,14 @@ def compare(
     Console().print(table)
 
 
-def model_of(path: Path | None) -> PcaoModel | None:
-    """Return the trained controller in a file; None without one."""
+def model_of(path: Path | None, planners: Collection[str] = ("pcao",)) -> PcaoModel | None:
+    """Return the trained controller in a file for those of the planners that fly with it; None without one."""
     if path is None:
         return None
+    if "pcao" not in planners:
+        raise typer.BadParameter(
+            f"only pcao flies with a model, not {', '.join(planners)}: add --planner pcao", param_hint="--model"
+        )
     try:
         return PcaoModel.model_validate_json(path.read_bytes())
     except OSError as error:
@@ -110,10 +125,12 @@ def planners_named(text: str, known: tuple[str, ...]) -> list[str]:
     return names
 
 
-def seed_list(seed: int, seeds: str | None, option: str = "--seeds") -> list[int]:
+def seed_list(seed: int | None, seeds: str | None, option: str = "--seeds") -> list[int]:
     """Return the seeds that the options name."""
     if seeds is None:
-        return [seed]
+        return [seed or 0]
+    if seed is not None:
+        raise typer.BadParameter(f"{option} names the seeds: leave out one of the two", param_hint="--seed")
     try:
         first, colon, end = seeds.partition(":")
         chosen = list(range(int(first), int(end))) if colon else [int(part) for part in seeds.split(",")]
@@ -124,10 +141,22 @@ def seed_list(seed: int, seeds: str | None, option: str = "--seeds") -> list[int
     return chosen
 
 
-def check_report(write: Path | None, only: str | None, *, no_run: bool) -> None:
-    """Refuse what is said of a report that is not asked for."""
-    if (only is not None or no_run) and write is None:
-        raise typer.BadParameter("goes with --write only", param_hint="--only" if only is not None else "--no-run")
+def check_report(
+    context: typer.Context, write: Path | None, only: str | None, *, no_run: bool, heeded: Collection[str] = ()
+) -> None:
+    """Refuse what is said of a report that is not asked for, and beside one what it would not heed."""
+    if write is None:
+        if only is not None or no_run:
+            raise typer.BadParameter("goes with --write only", param_hint="--only" if only is not None else "--no-run")
+        return
+    for option in context.command.params:
+        source = context.get_parameter_source(option.name or "")
+        if option.name in WITH_REPORT | set(heeded) or source is None or source.name != "COMMANDLINE":
+            continue
+        raise typer.BadParameter(
+            "the report of --write flies its own experiments (--only chooses among them): leave it out",
+            param_hint=option.opts[0],
+        )
 
 
 def planner_options(

@@ -16,6 +16,7 @@ from app.evaluation.runs.command import (
     check_report,
     compare,
     evaluate_app,
+    flown,
     planners_named,
     seed_list,
 )
@@ -36,6 +37,7 @@ COLUMNS = (
 
 @evaluate_app.command()
 def rescue(
+    context: typer.Context,
     scenario: Annotated[str, typer.Option(help="Car park 1, 2 or 3, or harbour.")] = "1",
     rc: Annotated[float, typer.Option(min=1.0, help="Radius of the goal area in metres.")] = 50.0,
     planner: Annotated[
@@ -46,7 +48,7 @@ def rescue(
     clock: Annotated[
         str, typer.Option(help="What uses up the window: way, or steps of whatever length (as in the paper).")
     ] = "way",
-    seed: Seed = 0,
+    seed: Seed = None,
     seeds: Seeds = None,
     jobs: Jobs = 1,
     scheduler: Scheduler = None,
@@ -65,10 +67,10 @@ def rescue(
     """Run ACCESS13's searches: explore a goal area and the rest of a partly known site, and be back in time."""
     if clock not in CLOCKS:
         raise typer.BadParameter(f"{clock!r} is none of {', '.join(CLOCKS)}", param_hint="--clock")
-    check_report(write, only, no_run=no_run)
+    check_report(context, write, only, no_run=no_run)
     chosen = seed_list(seed, seeds)
     if write is not None:
-        _report(write, chosen, seeds or str(seed), jobs, scheduler, only, no_run=no_run)
+        _report(write, chosen, seeds or str(chosen[0]), jobs, scheduler, only, no_run=no_run)
         return
     runs = [
         RescueJob(
@@ -97,7 +99,6 @@ def _report(
     out: Path, seeds: list[int], said: str, jobs: int, scheduler: str | None, only: str | None, *, no_run: bool
 ) -> None:
     from app.evaluation.runs.facts import made
-    from app.evaluation.runs.jobs import run_jobs
     from app.evaluation.runs.store import Results
 
     names = list(VARIANTS) if only is None else [name.strip() for name in only.split(",")]
@@ -111,9 +112,10 @@ def _report(
     open_: list[Any] = [] if no_run else [job for job in wanted if job.key not in results.runs]
     with ProgressBar(disable=not open_) as bar:
         task = bar.add_task("searches", total=len(open_))
-        for run in run_jobs(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
+        for run in flown(open_, jobs, lambda job, step: bar.update(task, description=job.title), scheduler):
             results.add(run)
             bar.advance(task)
-    facts = made(f"bathyfleet evaluate rescue --write FOLDER --seeds {said} --jobs {jobs}", jobs)
+    command = f"bathyfleet evaluate rescue --write FOLDER --seeds {said} --jobs {jobs}"
+    facts = made(command + (f" --only {only}" if only else ""), jobs)
     (out / "rescue.md").write_text(rescue_report(list(results.runs.values()), facts), encoding="utf-8")
     typer.echo(f"{out / 'rescue.md'}: {len(open_)} runs made, {len(results.runs)} kept", err=True)

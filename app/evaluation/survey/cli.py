@@ -55,7 +55,7 @@ def survey(
         float | None,
         typer.Option(min=0.1, help="How long a survey at sea lasts; by default what the steps take at 1.3 m/s."),
     ] = None,
-    seed: Seed = 0,
+    seed: Seed = None,
     seeds: Seeds = None,
     candidates: Annotated[int | None, typer.Option(min=4, help="Candidates per vehicle.")] = None,
     regressors: Regressors = "map",
@@ -76,12 +76,12 @@ def survey(
     if sounder not in ("single", "dvl", "swath"):
         raise typer.BadParameter(f"{sounder!r} is none of single, dvl, swath", param_hint="--sounder")
     beams: Sounder = "single" if sounder == "single" else "dvl" if sounder == "dvl" else "swath"
-    turns = seed_list(0, symmetries, "--symmetries")
+    turns = seed_list(None, symmetries, "--symmetries")
     if max(turns) >= SYMMETRIES:
         raise typer.BadParameter(f"{symmetries!r} goes beyond {SYMMETRIES - 1}, the last", param_hint="--symmetries")
     sea_floor = terrain_of(terrain)
     recorded = recorded_soundings(terrain)
-    options = planner_options(regressors, candidates).model_copy(update={"model": model_of(model)})
+    options = planner_options(regressors, candidates).model_copy(update={"model": model_of(model, names)})
     runs = [
         SurveyJob(
             SurveyScenario(

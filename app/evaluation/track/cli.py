@@ -18,6 +18,7 @@ from app.evaluation.runs.command import (
     check_report,
     compare,
     evaluate_app,
+    flown,
     planners_named,
     progress_bar,
     seed_list,
@@ -40,6 +41,7 @@ COLUMNS = (
 
 @evaluate_app.command()
 def track(
+    context: typer.Context,
     setup: Annotated[
         str, typer.Option(help="med13: landmarks on a sea floor; ngcuv12: in the water, localization fades.")
     ] = "med13",
@@ -55,7 +57,7 @@ def track(
     ] = None,
     targets: Annotated[int, typer.Option(min=0, max=20)] = 2,
     steps: Annotated[int, typer.Option(min=1)] = 500,
-    seed: Seed = 0,
+    seed: Seed = None,
     seeds: Seeds = None,
     accuracy: Annotated[
         float, typer.Option(min=0.001, help="Standard deviation below which landmarks and targets belong to A.")
@@ -85,7 +87,7 @@ def track(
     """Run MED13's and NGCUV12's scenarios: moving targets, fading localization, landmarks in three dimensions."""
     if setup not in SETUPS:
         raise typer.BadParameter(f"{setup!r} is none of {', '.join(SETUPS)}", param_hint="--setup")
-    check_report(write, only, no_run=no_run)
+    check_report(context, write, only, no_run=no_run, heeded=("terrain", "steps", "rollouts"))
     if terrain is not None and setup == "ngcuv12":
         raise typer.BadParameter("ngcuv12 has no sea floor; leave it out", param_hint="--terrain")
     if own_fix and setup != "ngcuv12":
@@ -96,7 +98,7 @@ def track(
     chosen = seed_list(seed, seeds)
     if write is not None:
         report = _Report(write, steps, rollouts, jobs, scheduler, only, no_run)
-        said = seeds or str(seed)
+        said = seeds or str(chosen[0])
         command = f"bathyfleet evaluate track --write FOLDER --seeds {said} --steps {steps} --rollouts {rollouts}"
         command += f" --jobs {jobs}" + (" --terrain FILE" if terrain else "") + (f" --only {only}" if only else "")
         report.make(sea_floor, chosen, command)
@@ -139,7 +141,7 @@ class _Report:
     def make(self, sea_floor: Terrain, seeds: list[int], command: str) -> None:
         """Fly what is missing and write it all down; ``command`` is how it was asked for."""
         from app.evaluation.runs.facts import made
-        from app.evaluation.runs.jobs import Job, run_jobs
+        from app.evaluation.runs.jobs import Job
         from app.evaluation.runs.store import Results
         from app.evaluation.track.consistency import consistency
         from app.evaluation.track.plots import draw
@@ -163,7 +165,7 @@ class _Report:
             def tell(job: Job, _step: int) -> None:
                 bar.update(task, description=job.title)
 
-            for run in run_jobs(open_, self.jobs, tell, self.scheduler):
+            for run in flown(open_, self.jobs, tell, self.scheduler):
                 results.add(run)
                 bar.advance(task)
         facts = {**made(command, self.jobs), "sea floor": sea_floor.name}

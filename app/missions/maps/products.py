@@ -146,6 +146,8 @@ class ProductKind:
         What has to be loaded to make it.
     of_vehicle
         Whether it holds what one vehicle measured.
+    by_order, with_contours
+        Whether the S-44 order makes a difference, and the interval between contours.
     filename
         Returns what it is saved as, where a standard says so; None: the mission's name.
     """
@@ -157,6 +159,8 @@ class ProductKind:
     make: Callable[[Material, ProductOptions], bytes | FileContent]
     needs: Collection[str]
     of_vehicle: bool = False
+    by_order: bool = False
+    with_contours: bool = False
     filename: Callable[[MissionFacts], str] | None = None
 
     @property
@@ -356,9 +360,15 @@ PRODUCTS = {
     kind.name: kind
     for kind in (
         ProductKind(
-            MAP, "tif", "image/tiff; application=geotiff", "Cloud-Optimized GeoTIFF with every layer", _geotiff, {MAP}
+            MAP,
+            "tif",
+            "image/tiff; application=geotiff",
+            "Cloud-Optimized GeoTIFF with every layer",
+            _geotiff,
+            {MAP},
+            by_order=True,
         ),
-        ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}),
+        ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}, by_order=True),
         ProductKind(
             MAP,
             "bag",
@@ -376,7 +386,13 @@ PRODUCTS = {
             {MAP, TIERS},
         ),
         ProductKind(
-            MAP, "tiers.zip", "application/zip", "a GeoTIFF of each tier of cells by depth", _tiers, {MAP, TIERS}
+            MAP,
+            "tiers.zip",
+            "application/zip",
+            "a GeoTIFF of each tier of cells by depth",
+            _tiers,
+            {MAP, TIERS},
+            by_order=True,
         ),
         ProductKind(
             MAP,
@@ -389,8 +405,10 @@ PRODUCTS = {
         ),
         ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
         ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
-        ProductKind(MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}),
-        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}),
+        ProductKind(
+            MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, with_contours=True
+        ),
+        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}, with_contours=True),
         ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
         ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
         ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
@@ -438,6 +456,7 @@ PRODUCTS = {
             "where lines cross, with both depths and their difference",
             _crossovers,
             {CROSSOVERS},
+            by_order=True,
         ),
         ProductKind(
             f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}

@@ -6,7 +6,9 @@ from shapely import Polygon, unary_union
 
 from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
 from app.missions.errors import InvalidRequestError
+from app.missions.flight.own_legs import least_way_m
 from app.missions.spec.mission import MissionKind, MissionSpec
+from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
 
 
@@ -58,7 +60,21 @@ def check_limits(spec: MissionSpec) -> None:
             f"limits.min_vertical_separation_m, {limits.min_vertical_separation_m:g} m",
             "make limits.com_range_m larger than limits.min_separation_m",
         )
+    _check_way(spec)
     _check_room(spec)
+
+
+def _check_way(spec: MissionSpec) -> None:
+    """Refuse a budget that is flown before anybody moves. Raises InvalidRequestError."""
+    way_m = max((spec.allowance(v).metres or 0.0 for v in spec.vehicles), default=0.0)
+    for name, value in spec.budget:
+        if name != "steps" and value is not None and spec.vehicles and way_m <= least_way_m(spec):
+            raise InvalidRequestError(
+                f"budget.{name}",
+                f"{value:g} comes to {way_m:.2g} m for each vehicle, and one with {least_way_m(spec):g} m left is "
+                "done: none would begin",
+                "give more, or a budget in steps",
+            )
 
 
 def _check_room(spec: MissionSpec) -> None:
@@ -103,6 +119,14 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
             f"{prefix}sensor",
             f"{vehicle.sensor} has no swath, and planner {spec.planner.name!r} plans by swaths",
             f"give it sensor {Sensor.MULTIBEAM}, or the mission another planner",
+        )
+    reach_m = (vehicle.sonar or SwathSonarSpec()).range_m
+    if vehicle.sensor is Sensor.MULTIBEAM and reach_m <= spec.limits.min_altitude_m:
+        raise InvalidRequestError(
+            f"{prefix}sonar.range_m",
+            f"{reach_m:g} m does not reach the bottom from limits.min_altitude_m above it, "
+            f"{spec.limits.min_altitude_m:g} m",
+            "give its range, or make limits.min_altitude_m smaller",
         )
     if vehicle.recovery_point is not None:
         name = f"{prefix}recovery_point"

@@ -188,6 +188,11 @@ def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(
         (("--no-run",), "goes with --write only"),
         (("--planner", "osarses"), "choose from"),
         (("--write", "x", "--only", "figure7"), "choose from"),
+        (("--write", "x", "--no-run", "--planner", "cao"), "Invalid value for --planner: the report of --write flies"),
+        (("--write", "x", "--no-run", "--own-fix", "--setup", "ngcuv12"), "Invalid value for --setup: the report"),
+        (("--seed", "3", "--seeds", "0:2"), "Invalid value for --seed: --seeds names the seeds"),
+        (("--seed", "-1"), "Invalid value for '--seed'"),
+        (("--write", "x", "--scheduler", "nowhere"), "Invalid value for --scheduler: no Dask cluster answers"),
     ],
 )
 def test_what_cannot_be_is_refused_with_what_would_be_right(
@@ -196,4 +201,4 @@ def test_what_cannot_be_is_refused_with_what_would_be_right(
     monkeypatch.chdir(tmp_path)
     result = call(*arguments)
     assert result.exit_code == 2
-    assert said in " ".join(result.output.split())
+    assert said in " ".join(result.output.replace("│", "").split())

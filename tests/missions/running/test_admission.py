@@ -40,6 +40,34 @@ async def test_limits_that_contradict_each_other_are_refused(
     assert await service.rows() == []
 
 
+@pytest.mark.parametrize(
+    ("budget", "field", "words"),
+    [
+        ({"minutes": 0.001}, "budget.minutes", "0.001 comes to 0.078 m for each vehicle, and one with 3 m"),
+        ({"km_per_vehicle": 0.001}, "budget.km_per_vehicle", "0.001 comes to 1 m for each vehicle, and one with 1 m"),
+    ],
+)
+async def test_budgets_that_are_flown_before_anybody_moves_are_refused(
+    service: MissionService, budget: dict[str, float], field: str, words: str
+) -> None:
+    """Such a mission ended as one that was flown, without a sounding."""
+    with pytest.raises(InvalidRequestError, match=words) as caught:
+        await service.create(sim_spec("a", "b", budget=budget))
+    assert caught.value.field == field
+    name = field.removeprefix("budget.")
+    assert (await service.create(sim_spec("a", budget={name: 50 * budget[name]}))).state == "ready"
+
+
+async def test_a_sonar_that_never_reaches_the_bottom_is_refused(service: MissionService) -> None:
+    sonar = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": {"range_m": 10.0}}
+    with pytest.raises(
+        InvalidRequestError, match=r"10 m does not reach the bottom from limits\.min_altitude_m"
+    ) as caught:
+        await service.create(sim_spec(vehicles=[sonar], limits={"min_altitude_m": 10.0}))
+    assert caught.value.field == "vehicles.0.sonar.range_m"
+    assert (await service.create(sim_spec(vehicles=[sonar], limits={"min_altitude_m": 9.0}))).state == "ready"
+
+
 async def test_zones_that_leave_nothing_of_the_area_are_refused(service: MissionService) -> None:
     """Such a mission was taken, engaged its vehicles, and failed with its first leg."""
     zone = rectangle(6.0, 6.0, 54.0, 54.0)
