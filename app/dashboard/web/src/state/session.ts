@@ -20,6 +20,7 @@ import {
   furtherLayers,
   holidays,
   layers,
+  listedAt,
   mission,
   missions,
   now,
@@ -95,6 +96,7 @@ export async function refresh(): Promise<void> {
     ]);
     layers.value = declared;
     missions.value = list;
+    listedAt.value = Date.now();
     fleet.value = vehicles;
     serviceFault.value = null;
     if (!selectedId.value) {

@@ -89,6 +89,17 @@ export const live = computed(
   () => socketStatus.value?.kind === "open" && now.value - view.value.vehiclesAt <= 1000 * STALE_AFTER_S,
 );
 
+/** When the service last answered with its lists, page clock in milliseconds. */
+export const listedAt = signal(0);
+const LISTS_OLD_MS = 15_000;
+
+/** Whether the lists tell what is now: nothing of the service is, while it is silent about the mission that is shown. */
+export const listsLive = computed(() => {
+  const { mission: shown, vehiclesAt } = view.value;
+  const silent = shown !== null && now.value - vehiclesAt > 1000 * STALE_AFTER_S;
+  return serviceFault.value === null && !silent && now.value - listedAt.value <= LISTS_OLD_MS;
+});
+
 export interface Vehicle {
   view: VehicleView;
   waypoint: WaypointView | undefined;
