@@ -111,6 +111,7 @@ export const FRAME = {
     pt: "{b} {remedy} Esta página volta a ligar-se sozinha{it}",
   },
   "notices.wasRefused": { en: "✕ {what} was refused:", pt: "✕ {what}: recusado:" },
+  "notices.wasNotAnswered": { en: "✕ {what} was not answered:", pt: "✕ {what}: sem resposta:" },
   "notices.thereIsNoMission": {
     en: "There is no mission {selectedId}.",
     pt: "Não há nenhuma missão {selectedId}.",
@@ -236,8 +237,8 @@ export const FRAME = {
     pt: "Os veículos estão a regressar; a missão fica {becomes} quando todos chegarem. Parar já, em cima, para-os onde estão.",
   },
   "stop.serviceDoesNotAnswer": {
-    en: "The service does not answer: this order may not have reached it, and vehicles go on meanwhile. Stop them from their own consoles where that cannot wait.",
-    pt: "O serviço não responde: esta ordem pode não lhe ter chegado, e entretanto os veículos continuam. Pare-os nas consolas deles se não puder esperar.",
+    en: "The service does not answer: this order may or may not have reached it, and vehicles may go on meanwhile. Give it again, and stop them from their own consoles where that cannot wait.",
+    pt: "O serviço não responde: esta ordem pode ou não lhe ter chegado, e entretanto os veículos podem continuar. Repita-a, e pare-os nas consolas deles se não puder esperar.",
   },
   "stop.acknowledgedTheStop": { en: "acknowledged the stop", pt: "confirmou a paragem" },
   "stop.didNotAcknowledge": { en: "did not acknowledge", pt: "não confirmou" },
@@ -309,6 +310,14 @@ export const FRAME = {
     pt: "O serviço respondeu {status} {statusText}",
   },
   "service.theServiceDoesNotAnswer": { en: "The service does not answer", pt: "O serviço não responde" },
+  "service.noAnswerWithin": {
+    en: "The service has not answered for {limit} s",
+    pt: "O serviço não responde há {limit} s",
+  },
+  "service.mayHaveBeenDone": {
+    en: "This may or may not have been carried out: look at what is shown once the service is heard again, and ask again where it was not.",
+    pt: "Isto pode ou não ter sido executado: veja o que aparece quando o serviço voltar a ouvir-se, e repita se não foi.",
+  },
   "service.checkThatItIsRunningAnd": {
     en: "Check that it is running and that this device reaches it.",
     pt: "Verifique que está a correr e que este aparelho o alcança.",
