@@ -43,3 +43,11 @@ it("lists are of now while the service answers, and not while it is silent about
   view.value = EMPTY_VIEW;
   expect(listsLive.value).toBe(false);
 });
+
+it("the depth that is typed in a mission's checklist is that mission's alone", async () => {
+  const { floorDepth, selectedId } = await import("./store");
+  selectedId.value = "a";
+  floorDepth.value = "12.5";
+  selectedId.value = "b";
+  expect(floorDepth.value).toBe("");
+});

@@ -278,6 +278,8 @@ export const abortOne = signal<string | null>(null);
 /** Whether the table of all vehicles is shown. */
 export const fleetOpen = signal(false);
 export const preflightOpen = signal(false);
+/** How deep it is where the shown mission goes, as typed in its checklist. */
+export const floorDepth = signal("");
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);
 /** Whether is asked if the mission is to be finished early. */
@@ -301,4 +303,5 @@ effect(() => {
   chosenSounding.value = null;
   steps.value = [];
   telemetry.value = null;
+  floorDepth.value = "";
 });

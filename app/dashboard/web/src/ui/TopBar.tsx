@@ -69,7 +69,7 @@ export function TopBar() {
         {present ? (
           <>
             <Figure
-              label={past ? say("topBar.elapsedThen") : say("topBar.elapsed")}
+              label={past ? say("topBar.decidedAfter") : say("topBar.elapsed")}
               value={duration(elapsed())}
               id="elapsed"
             />

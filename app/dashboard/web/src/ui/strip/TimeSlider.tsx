@@ -75,7 +75,8 @@ export function TimeSlider() {
         <>
           <span class="when" data-testid="replayed-at" role="status">
             {say("time.replay", {
-              it: past ? say("time.utc", { it: clock(new Date(past.committed_at), "utc") }) : "",
+              // Steps are decided before they are flown, by some planners long before.
+              it: past ? say("time.decidedAt", { it: clock(new Date(past.committed_at), "utc") }) : "",
             })}
           </span>
           <label class="pace">
