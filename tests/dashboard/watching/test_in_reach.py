@@ -140,6 +140,17 @@ def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(
     expect_state(page, "running")
 
 
+def test_the_stop_of_twenty_vehicles_is_in_sight_and_at_hand(screen: Page, service: Service) -> None:
+    page = screen
+    team = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in range(1, 21)]
+    show(page, service.create(name="Twenty", vehicles=team))
+    by_id(page, "abort").click()
+    expect_on_top(page, "abort-confirm")
+    expect(by_id(page, "abort-close")).to_be_focused()
+    page.keyboard.press("Tab")
+    expect(by_id(page, "abort-confirm")).to_be_focused()
+
+
 @pytest.mark.parametrize("size", [(390, 844), (844, 390)], ids=["upright", "lying"])
 def test_what_needs_attention_leaves_the_maps_tools_in_reach_on_a_phone(
     page: Page, service: Service, size: tuple[int, int]

@@ -90,6 +90,7 @@ export function StopDialog({
   return (
     <Dialog
       {...frame}
+      asks
       open={open}
       name={name}
       heading={ending ? say("stop.returningHome") : answer.value ? done : question}
