@@ -273,6 +273,7 @@ export const FRAME = {
   "time.stepThatIsShown": { en: "Step that is shown", pt: "Passo à vista" },
   "time.thePresent": { en: "the present", pt: "o presente" },
   "time.stepOf": { en: "step {shown} of {last}", pt: "passo {shown} de {last}" },
+  "time.fetching": { en: "fetching the past…", pt: "a obter o passado…" },
   "time.asItEnded": { en: "as it ended", pt: "como terminou" },
   "time.live": { en: "live", pt: "em direto" },
   "time.notLive": { en: "not live", pt: "não em direto" },
