@@ -87,6 +87,17 @@ describe("a slider that is moved", () => {
   });
 });
 
+it("a mission whose deletion is refused stays in sight", async () => {
+  const { selectedId } = await import("./store");
+  const { deleteMission } = await import("./session");
+  selectedId.value = "q";
+  location.hash = "#/missions/q";
+  answer = (method) =>
+    method === "DELETE" ? new Response(JSON.stringify({ detail: "it runs" }), { status: 409 }) : [];
+  await deleteMission("q");
+  expect(location.hash).toBe("#/missions/q");
+});
+
 it("of missions whose tide table is refused none stays", async () => {
   const { createMissions } = await import("./session");
   const { ServiceError } = await import("../api/client");

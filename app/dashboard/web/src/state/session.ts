@@ -380,8 +380,8 @@ export async function resumeVehicle(name: string): Promise<void> {
 
 /** Deletes a mission in which nothing was measured. */
 export async function deleteMission(id: string): Promise<void> {
-  await send(say("session.deletingTheMission"), api.deleteMission(id));
-  if (selectedId.value === id) location.hash = "#/";
+  const refused = (await send(say("session.deletingTheMission"), api.deleteMission(id))) === null;
+  if (!refused && selectedId.value === id) location.hash = "#/";
   await refresh();
 }
 

@@ -25,7 +25,7 @@ it("what is shown is live while the service tells of it, not as long as its sock
 });
 
 it("lists are of now while the service answers, and not while it is silent about the mission that is shown", async () => {
-  const { listedAt, listsLive, now, serviceFault, view } = await import("./store");
+  const { listedAt, listsLive, now, serviceFault, socketStatus, view } = await import("./store");
   const { ServiceError } = await import("../api/client");
   const { EMPTY_VIEW } = await import("./live");
   view.value = EMPTY_VIEW;
@@ -34,6 +34,9 @@ it("lists are of now while the service answers, and not while it is silent about
   expect(listsLive.value).toBe(true);
   view.value = { ...EMPTY_VIEW, mission: {} as MissionView, vehiclesAt: 100_500 };
   expect(listsLive.value).toBe(false);
+  socketStatus.value = { kind: "waiting", attempt: 1, retryAt: 0, why: "missing" };
+  expect(listsLive.value).toBe(true);
+  socketStatus.value = null;
   view.value = { ...view.value, vehiclesAt: 105_900 };
   expect(listsLive.value).toBe(true);
   serviceFault.value = new ServiceError("gone", 0);

@@ -96,7 +96,10 @@ const LISTS_OLD_MS = 15_000;
 /** Whether the lists tell what is now: nothing of the service is, while it is silent about the mission that is shown. */
 export const listsLive = computed(() => {
   const { mission: shown, vehiclesAt } = view.value;
-  const silent = shown !== null && now.value - vehiclesAt > 1000 * STALE_AFTER_S;
+  const status = socketStatus.value;
+  // A service that says why it tells nothing of that mission is there.
+  const says = status?.kind === "waiting" && status.why !== null;
+  const silent = shown !== null && !says && now.value - vehiclesAt > 1000 * STALE_AFTER_S;
   return serviceFault.value === null && !silent && now.value - listedAt.value <= LISTS_OLD_MS;
 });
 

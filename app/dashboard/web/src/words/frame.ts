@@ -37,6 +37,14 @@ export const FRAME = {
     en: "Service gone{old}; trying again in {wait} s",
     pt: "Sem serviço{old}; nova tentativa em {wait} s",
   },
+  "topBar.noLongerThere": {
+    en: "The service has no such mission any more{old}; trying again in {wait} s",
+    pt: "O serviço já não tem esta missão{old}; nova tentativa em {wait} s",
+  },
+  "topBar.tooManyViewers": {
+    en: "Too many pages are open on the service{old}; trying again in {wait} s",
+    pt: "Há demasiadas páginas abertas no serviço{old}; nova tentativa em {wait} s",
+  },
   "topBar.serviceSilent": {
     en: "Service silent for {silent}",
     pt: "Serviço sem dar sinal há {silent}",
