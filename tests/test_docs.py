@@ -172,7 +172,8 @@ def test_examples_are_taken_by_the_service(page: Path) -> None:
             if "area" in document:
                 MissionSpec.model_validate(document)
             elif isinstance(document.get("items"), list) and "ranges_m" in document["items"][0]:
-                ScanBatch.model_validate(document)
+                scans = ScanBatch.model_validate(document)
+                assert not [item for item in scans.items if isinstance(item, str)]
             elif isinstance(document.get("items"), list) and "accepted" not in document:
                 taken = MeasurementBatch.model_validate(document)
                 assert not [item for item in taken.items if isinstance(item, str)]

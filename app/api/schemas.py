@@ -2,13 +2,13 @@
 
 import re
 from contextvars import ContextVar
-from typing import Annotated, ClassVar
+from functools import partial
+from typing import Annotated, ClassVar, TypeVar
 
 from fastapi import Path
 from pydantic import (
     BaseModel,
     ConfigDict,
-    FailFast,
     Field,
     PlainValidator,
     ValidationError,
@@ -88,18 +88,21 @@ class NoteRequest(BaseModel):
     text: str = Field(min_length=1, max_length=2000, pattern=r"\S", description="Kept in the mission's log")
 
 
-def _item(value: object) -> Measurement | str:
-    """Return the measurement, or in words why ``value`` is none: of the first faults, whatever their number."""
-    if excess := _excess(value, Measurement):
+Item = TypeVar("Item", Measurement, Scan)
+
+
+def _item(kind: type[Item], value: object) -> Item | str:
+    """Return the item, or in words why ``value`` is none: of the first faults, whatever their number."""
+    if excess := _excess(value, kind):
         return excess
     try:
-        return Measurement.model_validate(value)
+        return kind.model_validate(value)
     except ValidationError as error:
         entries = error.errors(include_url=False)[:MAX_FAULTS]
         # What a name may have been meant for is looked for in the first ones only: it takes far longer than the rest.
         left = _suggestions.get()
         _suggestions.set(left - len(entries))
-        model = Measurement if left >= len(entries) else None
+        model = kind if left >= len(entries) else None
         faults = [field_problem(entry, location="body", path=entry["loc"], model=model) for entry in entries]
         return "; ".join(f"{f.field}: {f.message}; {_what_is_right(f)}" for f in faults)
 
@@ -108,11 +111,10 @@ def _what_is_right(fault: FieldProblem) -> str:
     return fault.expected if fault.expected.startswith(SUGGESTION) else f"expected {fault.expected}"
 
 
-def _each_item(items: object, check: ValidatorFunctionWrapHandler) -> list[Measurement | str]:
+def _each_item(items: object, check: ValidatorFunctionWrapHandler) -> object:
     token = _suggestions.set(MAX_ERRORS)
     try:
-        checked: list[Measurement | str] = check(items)
-        return checked
+        return check(items)
     finally:
         _suggestions.reset(token)
 
@@ -125,16 +127,11 @@ def _excess(value: object, model: type[BaseModel]) -> str:
     return f"{len(value)} fields: there are no more than {known}; expected one of {', '.join(model.model_fields)}"
 
 
-def _scan(value: object, check: ValidatorFunctionWrapHandler) -> Scan:
-    # One after the other here: in one go they would hold up every other thread.
-    if excess := _excess(value, Scan):
-        raise ValueError(excess)
-    scan: Scan = check(value)
-    return scan
-
-
-BatchItem = Annotated[Measurement | str, PlainValidator(_item, json_schema_input_type=Measurement)]
-BatchScan = Annotated[Scan, WrapValidator(_scan)]
+# One after the other: in one go they would hold up every other thread.
+BatchItem = Annotated[
+    Measurement | str, PlainValidator(partial(_item, Measurement), json_schema_input_type=Measurement)
+]
+BatchScan = Annotated[Scan | str, PlainValidator(partial(_item, Scan), json_schema_input_type=Scan)]
 
 
 class MeasurementBatch(BaseModel):
@@ -191,7 +188,7 @@ class ScanBatch(BaseModel):
 
     json_bounds: ClassVar = Bounds(values=3_000_000, texts=20_000)
 
-    items: Annotated[list[BatchScan], FailFast()] = Field(min_length=1, max_length=MAX_SCANS)
+    items: Annotated[list[BatchScan], WrapValidator(_each_item)] = Field(min_length=1, max_length=MAX_SCANS)
 
 
 class ComponentHealth(BaseModel):

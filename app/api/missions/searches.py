@@ -13,7 +13,8 @@ from app.api.schemas import API, ScanBatch
 from app.api.state import Service
 from app.missions.operations.maps.mission_maps import export
 from app.missions.operations.scans import scan, search_grid
-from app.missions.views.measurements.soundings import BatchVerdict
+from app.missions.search.scan_schema import Scan
+from app.missions.views.measurements.soundings import BatchVerdict, with_unreadable
 from app.missions.views.search import SearchGridView
 
 router = APIRouter(
@@ -33,12 +34,15 @@ router = APIRouter(
 async def post_scans(batch: Annotated[ScanBatch, Body()], vehicle: VehicleOrOperator, mission: Mission) -> BatchVerdict:
     """Store scans of a mission of kind search, and add them to what is known of its site.
 
-    Each scan has its own verdict; one that came before, by its vehicle and time, is a duplicate. Vehicles of any kind
+    Each scan has its own verdict: one that cannot be read is rejected with the reason, the others are stored; one that
+    came before, by its vehicle and time, is a duplicate. Vehicles of any kind
     but sim may have a computer that posts: those that are commanded over IMC, too.
     """
-    for item in batch.items:
+    readable = [item for item in batch.items if isinstance(item, Scan)]
+    for item in readable:
         check_vehicle(vehicle, item.vehicle)
-    return await scan(mission, batch.items)
+    answer = await scan(mission, readable)
+    return with_unreadable({i: item for i, item in enumerate(batch.items) if isinstance(item, str)}, answer)
 
 
 @router.get(

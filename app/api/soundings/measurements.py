@@ -14,7 +14,7 @@ from app.api.state import Service, State
 from app.missions.operations.measurements import measure
 from app.missions.operations.polling import waypoint
 from app.missions.soundings.measurement import Measurement
-from app.missions.views.measurements.soundings import BatchVerdict, ItemVerdict, Verdict
+from app.missions.views.measurements.soundings import BatchVerdict, with_unreadable
 from app.missions.views.mission import WaypointView
 
 router = APIRouter(
@@ -54,26 +54,11 @@ async def post_measurements(
     Each item has its own verdict: an item that cannot be read or is not plausible is rejected with the reason, the
     others are stored. Whatever is counted as accepted is stored for good.
     """
-    readable = [(i, item) for i, item in enumerate(batch.items) if isinstance(item, Measurement)]
-    for _, item in readable:
+    readable = [item for item in batch.items if isinstance(item, Measurement)]
+    for item in readable:
         check_vehicle(vehicle, item.vehicle)
-    verdicts = [
-        ItemVerdict(index=i, verdict=Verdict.REJECTED, reason=item)
-        for i, item in enumerate(batch.items)
-        if isinstance(item, str)
-    ]
-    answer = await measure(
-        mission, [item for _, item in readable], idempotency_key=idempotency_key, sender=vehicle.identity
-    )
-    if not verdicts:
-        return answer
-    verdicts += [verdict.model_copy(update={"index": readable[verdict.index][0]}) for verdict in answer.items]
-    return answer.model_copy(
-        update={
-            "rejected": answer.rejected + len(batch.items) - len(readable),
-            "items": sorted(verdicts, key=lambda verdict: verdict.index),
-        }
-    )
+    answer = await measure(mission, readable, idempotency_key=idempotency_key, sender=vehicle.identity)
+    return with_unreadable({i: item for i, item in enumerate(batch.items) if isinstance(item, str)}, answer)
 
 
 @router.get(

@@ -17,6 +17,7 @@ from app.api.bodies import json_route
 from app.api.bodies.intake import BodyKind, Intakes
 from app.api.bodies.json_route import JsonRoute
 from app.api.http import json_text, problems
+from app.api.schemas import ScanBatch
 from app.main import Server, create_app
 from app.settings import Settings
 from app.storage.database import Database
@@ -273,13 +274,13 @@ async def test_a_description_far_too_large_costs_little(
     assert all(name.startswith("bodies") for name in explained)
 
 
-async def test_scans_are_looked_at_until_the_first_that_is_wrong(service: Tokens, mission_id: str) -> None:
+def test_ranges_of_a_scan_are_looked_at_until_the_first_that_is_wrong() -> None:
     scan = {"vehicle": "rover", "time_s": 1, "lat_deg": 41, "lon_deg": -8, "bearing_step_deg": 1, "reach_m": 9}
     batch = {"items": [scan | {"ranges_m": [[]] * 3000}] * 100}
-    async with make_client(service.server) as client:
-        answer = await client.post(f"/missions/{mission_id}/scans", json=batch, headers=service.header(Role.VEHICLE))
-    assert answer.status_code == 422
-    assert {error["field"] for error in answer.json()["errors"]} == {"items.0.ranges_m.0"}
+    for item in ScanBatch.model_validate(batch).items:
+        assert isinstance(item, str)
+        assert item.startswith("ranges_m.0: ")
+        assert "ranges_m.1" not in item
 
 
 async def test_large_bodies_are_read_beside_the_loop(service: Tokens, monkeypatch: pytest.MonkeyPatch) -> None:

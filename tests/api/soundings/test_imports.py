@@ -41,6 +41,25 @@ async def send(client: httpx.AsyncClient, path: str, content: bytes, **query: An
     return await client.post(f"{path}/imports", content=content, params={"filename": "old.csv"} | query)
 
 
+async def test_of_another_datum_that_imported_depths_do_not_follow_the_log_warns(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    async def warnings() -> list[str]:
+        events = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+        return [one["message"] for one in events if one["level"] == "warning" and one["kind"] == "corrections"]
+
+    await client.put(f"{path}/tide", json={"level_m": 0.5, "datum_epsg": 5861, "source": "gauge"})
+    await send(client, path, prior_text())
+    before = (await client.get(f"{path}/map")).json()["min_depth_m"]
+    await client.put(f"{path}/tide", json={"level_m": 0.7, "datum_epsg": 5861, "source": "gauge"})
+    assert await warnings() == []
+    await client.put(f"{path}/tide", json={"level_m": 0.7, "datum_epsg": 5861, "datum_offset_m": 2.0})
+    (words,) = await warnings()
+    assert words.startswith("imported depths (old.csv) stay as they are. Soundings were below EPSG:5861 LAT depth, by")
+    assert "datum offset +2.000 m" in words
+    assert (await client.get(f"{path}/map")).json()["min_depth_m"] == pytest.approx(before)
+
+
 async def test_a_map_begins_with_what_was_imported_and_tells_it_apart(client: httpx.AsyncClient, path: str) -> None:
     answer = await send(client, path, prior_text(), source="survey of 2019")
     assert answer.status_code == 201, answer.text

@@ -1,7 +1,9 @@
 """What has to be in sight and in reach whatever is open: the stop, and every vehicle; on every screen."""
 
 import itertools
+import os
 import re
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -138,6 +140,17 @@ def test_nothing_covers_the_stop_and_a_single_vehicle_can_be_stopped_from_there(
     expect_state(page, "running")
 
 
+def test_the_stop_of_twenty_vehicles_is_in_sight_and_at_hand(screen: Page, service: Service) -> None:
+    page = screen
+    team = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in range(1, 21)]
+    show(page, service.create(name="Twenty", vehicles=team))
+    by_id(page, "abort").click()
+    expect_on_top(page, "abort-confirm")
+    expect(by_id(page, "abort-close")).to_be_focused()
+    page.keyboard.press("Tab")
+    expect(by_id(page, "abort-confirm")).to_be_focused()
+
+
 @pytest.mark.parametrize("size", [(390, 844), (844, 390)], ids=["upright", "lying"])
 def test_what_needs_attention_leaves_the_maps_tools_in_reach_on_a_phone(
     page: Page, service: Service, size: tuple[int, int]
@@ -206,9 +219,29 @@ def test_with_the_service_gone_the_mission_is_not_green(page: Page, service: Ser
         expect(by_id(page, "mission-state")).to_have_attribute("data-live", "false")
         expect(by_id(page, "mission-state")).to_contain_text("Running when last heard")
         expect(by_id(page, "mission-state")).to_have_class(re.compile("unknown"))
+        expect(by_id(page, "state-sim-1")).to_contain_text("when last heard")
+        expect(by_id(page, "state-sim-1")).not_to_have_class(re.compile("good"))
+        expect(by_id(page, f"listed-{mission}")).to_contain_text("Running when last heard")
     finally:
         service.start()
     expect(by_id(page, "mission-state")).to_have_attribute("data-live", "true")
+
+
+def test_a_stop_of_a_service_that_hangs_can_be_given_again(page: Page, service: Service) -> None:
+    mission = service.create(name="Hangs")
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "mission-state")).to_have_attribute("data-live", "true")
+    os.kill(service.pid, signal.SIGSTOP)
+    try:
+        by_id(page, "abort").click()
+        by_id(page, "abort-confirm").click()
+        expect(by_id(page, "abort-dialog")).to_contain_text("may or may not have reached it")
+        expect(by_id(page, "abort-confirm")).to_be_enabled()
+        by_id(page, "abort-confirm").click()
+    finally:
+        os.kill(service.pid, signal.SIGCONT)
+    expect(by_id(page, "mission-state")).to_contain_text("Aborted")
 
 
 def test_an_entry_into_a_zone_is_told_over_the_map_and_on_the_card(page: Page, service: Service) -> None:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import update
+from sqlalchemy import select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.mapping.water.tides import TideTable, TideTableError, parse_tid
+from app.mapping.water.vertical import VerticalDatum
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
@@ -25,7 +26,7 @@ from app.missions.spec.water import SoundSpeed, Tide
 from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection, TideTableView
 from app.missions.views.measurements.soundings import Ruling, Verdict
 from app.missions.views.mission import Level
-from app.storage.models import MissionRow, SoundingRow, TideTableRow
+from app.storage.models import ImportRow, MissionRow, SoundingRow, TideTableRow
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import stored_maps
 
@@ -76,11 +77,28 @@ async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> Corre
             session.add(row)
 
     async with live.correcting:
+        datum, offset_m = live.gate.corrections.vertical_datum, live.spec.tide.datum_offset_m
         spec = live.spec.model_copy(update={"tide": plain})
         await recorrect(live, spec, table, live.gate.corrections.adjustment, store)
     what = f"tide table {table.name}" if table is not None else f"a constant level of {plain.level_m:+.2f} m"
     await live.journal.log(Level.INFO, "corrections", f"tide corrected by {what}, set by {actor}", actor=actor)
+    if (datum.epsg, offset_m) != (live.gate.corrections.vertical_datum.epsg, plain.datum_offset_m):
+        await _warn_of_imports(live, datum)
     return corrections_view(live)
+
+
+async def _warn_of_imports(live: LiveMission, datum: VerticalDatum) -> None:
+    """Tell that what was imported is no sounding and stays where it is, now that soundings are below another datum."""
+    async with live.database.reading() as session:
+        named = select(ImportRow.filename).where(ImportRow.mission_id == live.id).order_by(ImportRow.created_at)
+        files = (await session.scalars(named)).all()
+    if not files:
+        return
+    words = (
+        f"imported depths ({', '.join(files)}) stay as they are. Soundings were below {datum.statement}, and are below "
+        f"{live.gate.corrections.vertical_datum.statement} now: import anew, with another datum offset, what is not"
+    )
+    await live.journal.log(Level.WARNING, "corrections", words)
 
 
 async def set_sound_speed(live: LiveMission, sound_speed: SoundSpeed | None, actor: str) -> CorrectionsView:

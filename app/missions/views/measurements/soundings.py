@@ -1,5 +1,6 @@
 """What is answered about soundings, batches of them and logs."""
 
+from collections.abc import Mapping
 from enum import StrEnum
 
 from pydantic import Field
@@ -137,6 +138,23 @@ class LogImportView(View):
     cut_off: bool = Field(description="The file ends in the middle, as after a power loss; what came before is used")
     notes: list[str] = Field(default=[], description="What was assumed or done, in words")
     known: bool = Field(description="The whole log had been imported before; nothing was written")
+
+
+def with_unreadable(unreadable: Mapping[int, str], answer: BatchVerdict) -> BatchVerdict:
+    """Return the verdicts on a whole batch, of which ``answer`` judges in order what could be read."""
+    if not unreadable:
+        return answer
+    places = (i for i in range(len(unreadable) + len(answer.items)) if i not in unreadable)
+    items = [
+        *(ItemVerdict(index=i, verdict=Verdict.REJECTED, reason=reason) for i, reason in unreadable.items()),
+        *(verdict.model_copy(update={"index": i}) for i, verdict in zip(places, answer.items, strict=True)),
+    ]
+    return answer.model_copy(
+        update={
+            "rejected": answer.rejected + len(unreadable),
+            "items": sorted(items, key=lambda verdict: verdict.index),
+        }
+    )
 
 
 def batch_verdict(items: list[ItemVerdict]) -> BatchVerdict:

@@ -48,6 +48,18 @@ import type {
 
 const BASE = "/api/v1";
 const LOG_PAGE = 1000;
+/** How long an answer is waited for, and what is to be done where none came. */
+interface Patience {
+  limit_ms: number;
+  otherwise: "service.mayHaveBeenDone" | "service.checkThatItIsRunningAnd";
+}
+
+/** Stops take seconds, and nobody gives an order again while it waits for an answer. */
+const ORDERED: Patience = { limit_ms: 20_000, otherwise: "service.mayHaveBeenDone" };
+/** Where soundings and maps may follow. */
+const STORED: Patience = { limit_ms: 120_000, otherwise: "service.mayHaveBeenDone" };
+/** What is asked for again and again: few requests may wait at a time, and a stop is one of them. */
+const POLLED: Patience = { limit_ms: 15_000, otherwise: "service.checkThatItIsRunningAnd" };
 
 /** The service refused a request, or could not be reached. Its message is meant for the operator. */
 export class ServiceError extends Error {
@@ -79,11 +91,36 @@ export async function toServiceError(response: Response): Promise<ServiceError> 
   }
 }
 
-async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
+async function request<T>(path: string, init: RequestInit = {}, patience?: Patience): Promise<T> {
   const headers = new Headers(init.headers);
   headers.set("Accept", "application/json");
-  const response = await ask(`${BASE}${path}`, { ...init, headers });
-  return (await response.json()) as T;
+  const answer = async (gone: Pick<RequestInit, "signal">) =>
+    (await ask(`${BASE}${path}`, { ...init, headers, ...gone })).json() as Promise<T>;
+  return patience ? within(patience, (signal) => answer({ signal })) : answer({});
+}
+
+/** What is answered within a time; throws that nothing was. */
+async function within<T>(
+  { limit_ms, otherwise }: Patience,
+  answer: (gone: AbortSignal) => Promise<T>,
+): Promise<T> {
+  const gone = new AbortController();
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const late = new Promise<never>((_, refuse) => {
+    timer = setTimeout(() => {
+      refuse(new ServiceError(say("service.noAnswerWithin", { limit: limit_ms / 1000 }), 0));
+      gone.abort();
+    }, limit_ms);
+  });
+  try {
+    return await Promise.race([answer(gone.signal), late]);
+  } catch (error) {
+    if (error instanceof ServiceError && error.status === 0)
+      throw new ServiceError(error.message, 0, say(otherwise));
+    throw error;
+  } finally {
+    clearTimeout(timer);
+  }
 }
 
 /** After so long an answer that was asked for before the page ran tells what was. */
@@ -132,17 +169,32 @@ async function file(
 
 /** What answers nothing when it succeeds. */
 async function remove(path: string): Promise<void> {
-  await ask(`${BASE}${path}`, { method: "DELETE", headers: { Accept: "application/json" } });
+  const init = { method: "DELETE", headers: { Accept: "application/json" } };
+  await within(ORDERED, (gone) => ask(`${BASE}${path}`, { ...init, signal: gone }));
 }
 
-function post<T>(path: string, body?: unknown): Promise<T> {
-  return request<T>(path, {
-    method: "POST",
-    ...(body === undefined
-      ? {}
-      : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }),
-  });
+function post<T>(path: string, body?: unknown, patience = ORDERED): Promise<T> {
+  return request<T>(
+    path,
+    {
+      method: "POST",
+      ...(body === undefined
+        ? {}
+        : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }),
+    },
+    patience,
+  );
 }
+
+const put = <T>(path: string, body: unknown): Promise<T> =>
+  request<T>(
+    path,
+    { method: "PUT", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } },
+    STORED,
+  );
+
+/** What is asked for again and again. */
+const poll = <T>(path: string): Promise<T> => request<T>(path, {}, POLLED);
 
 const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
 const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/${encodeURIComponent(name)}`;
@@ -159,31 +211,30 @@ const atDepth = (floor_depth_m: string): string =>
   floor_depth_m.trim() === "" ? "" : `?${new URLSearchParams({ floor_depth_m: floor_depth_m.trim() })}`;
 
 export const api = {
-  session: () => request<SessionView>("/session"),
+  session: () => poll<SessionView>("/session"),
   signIn: (token: string) =>
-    request<SessionView>("/session", { method: "POST", headers: { Authorization: `Bearer ${token}` } }),
+    request<SessionView>(
+      "/session",
+      { method: "POST", headers: { Authorization: `Bearer ${token}` } },
+      POLLED,
+    ),
   signOut: () => remove("/session"),
-  missions: () => request<MissionSummary[]>("/missions"),
-  doctor: () => request<DoctorView>("/doctor"),
-  traffic: () => request<TrafficView>("/traffic"),
-  vehicles: () => request<VehicleView[]>("/vehicles"),
-  layers: () => request<LayerView[]>("/layers"),
+  missions: () => poll<MissionSummary[]>("/missions"),
+  doctor: () => poll<DoctorView>("/doctor"),
+  traffic: () => poll<TrafficView>("/traffic"),
+  vehicles: () => poll<VehicleView[]>("/vehicles"),
+  layers: () => poll<LayerView[]>("/layers"),
   planners: () => request<PlannerView[]>("/planners"),
-  create: (mission: NewMission) => post<MissionView>("/missions", mission),
+  create: (mission: NewMission) => post<MissionView>("/missions", mission, STORED),
   /** Replaces what a mission is to do that has not started. */
-  describe: (id: string, mission: NewMission) =>
-    request<MissionView>(missionPath(id), {
-      method: "PUT",
-      body: JSON.stringify(mission),
-      headers: { "Content-Type": "application/json" },
-    }),
+  describe: (id: string, mission: NewMission) => put<MissionView>(missionPath(id), mission),
   /** `home`: whether vehicles go home before the mission ends; undefined: as the service does it. */
   act: (id: string, action: MissionAction, home?: boolean) =>
     post<ActionView>(`${missionPath(id)}/${action}`, home === undefined ? undefined : { return: home }),
   log: readLog,
   mission: (id: string) => request<MissionView>(missionPath(id)),
   deleteMission: (id: string) => remove(missionPath(id)),
-  preflight: (id: string) => request<PreflightView>(`${missionPath(id)}/preflight`),
+  preflight: (id: string) => poll<PreflightView>(`${missionPath(id)}/preflight`),
   forecast: (id: string, depth_m: string, gone: AbortSignal) =>
     request<ForecastView>(`${missionPath(id)}/forecast${atDepth(depth_m)}`, { method: "POST", signal: gone }),
   forecastOf: ({ mission, floor_depth_m }: Described, gone: AbortSignal) =>
@@ -206,7 +257,7 @@ export const api = {
   tracks: (id: string) => request<TimedTracks>(`${missionPath(id)}/tracks.geojson`),
   acknowledge: (alarm: string) => post<AlarmView>(`/alarms/${encodeURIComponent(alarm)}/acknowledge`),
   /** With who was told of it. */
-  alarm: (alarm: string) => request<AlarmReport>(`/alarms/${encodeURIComponent(alarm)}`),
+  alarm: (alarm: string) => poll<AlarmReport>(`/alarms/${encodeURIComponent(alarm)}`),
   note: (id: string, text: string) => post<EventView>(`${missionPath(id)}/notes`, { text }),
   abortVehicle: (id: string, name: string) => post<ActionView>(`${vehiclePath(id, name)}/abort`),
   rejoin: (id: string, name: string) => post<MissionView>(`${vehiclePath(id, name)}/rejoin`),
@@ -227,29 +278,26 @@ export const api = {
   soundingPoints: (id: string, after: number, gone: AbortSignal) =>
     request<SoundingPoints>(`${missionPath(id)}/soundings/points?after=${after}`, { signal: gone }),
   ruleMany: (id: string, ids: readonly number[], ruling: "restore" | "reject", note: string) =>
-    post<RulingsView>(`${missionPath(id)}/soundings/${ruling}`, { ids, note }),
+    post<RulingsView>(`${missionPath(id)}/soundings/${ruling}`, { ids, note }, STORED),
   rule: (id: string, sounding: number, ruling: "restore" | "reject", note: string) =>
-    post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }),
+    post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }, STORED),
   setTide: (id: string, tide: { level_m?: number; table?: string; source: string }) =>
-    request<unknown>(`${missionPath(id)}/tide`, {
-      method: "PUT",
-      body: JSON.stringify(tide),
-      headers: { "Content-Type": "application/json" },
-    }),
+    put<unknown>(`${missionPath(id)}/tide`, tide),
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),
   systematicErrors: (id: string) => request<SystematicErrorsView>(`${missionPath(id)}/systematic-errors`),
   setSystematicErrors: (id: string, errors: SystematicErrors) =>
-    request<unknown>(`${missionPath(id)}/systematic-errors`, {
-      method: "PUT",
-      body: JSON.stringify(errors),
-      headers: { "Content-Type": "application/json" },
-    }),
+    put<unknown>(`${missionPath(id)}/systematic-errors`, errors),
   deleteSystematicErrors: (id: string) =>
     request<unknown>(`${missionPath(id)}/systematic-errors`, { method: "DELETE" }),
   adjustment: (id: string) => request<AdjustmentView>(`${missionPath(id)}/adjustment`),
-  adjust: (id: string) => post<AdjustmentView>(`${missionPath(id)}/adjustment`, {}),
+  adjust: (id: string) =>
+    request<AdjustmentView>(`${missionPath(id)}/adjustment`, {
+      method: "POST",
+      body: "{}",
+      headers: { "Content-Type": "application/json" },
+    }),
   undoAdjustment: (id: string) =>
     request<AdjustmentView>(`${missionPath(id)}/adjustment`, { method: "DELETE" }),
   holidays: (id: string) => request<Holidays>(`${missionPath(id)}/holidays`),

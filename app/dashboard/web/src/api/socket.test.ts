@@ -23,6 +23,7 @@ const TOLD = { data: '{"type":"vehicles","time":"","vehicles":[]}' };
 
 describe("the live socket", () => {
   let statuses: SocketStatus["kind"][];
+  let waited: (string | null)[];
   let messages: LiveMessage[];
   let socket: LiveSocket;
 
@@ -30,12 +31,19 @@ describe("the live socket", () => {
     vi.useFakeTimers();
     Line.opened = [];
     statuses = [];
+    waited = [];
     messages = [];
     vi.stubGlobal("WebSocket", Line);
     vi.stubGlobal("window", new EventTarget());
     socket = new LiveSocket(
       "ws://service/live",
-      { onStatus: (s) => statuses.push(s.kind), onMessage: (m) => messages.push(m) },
+      {
+        onStatus: (s) => {
+          statuses.push(s.kind);
+          if (s.kind === "waiting") waited.push(s.why);
+        },
+        onMessage: (m) => messages.push(m),
+      },
       5000,
     );
   });
@@ -67,6 +75,17 @@ describe("the live socket", () => {
     vi.advanceTimersByTime(600);
     expect(Line.opened).toHaveLength(2);
     expect(statuses).toEqual(["connecting", "open", "waiting", "connecting"]);
+  });
+
+  it.each([
+    [4404, "missing"],
+    [4429, "crowded"],
+    [1006, null],
+  ])("tells why it was closed by %i, and tries again", (code, why) => {
+    newest().onclose?.({ code, reason: "" });
+    expect(waited).toEqual([why]);
+    vi.advanceTimersByTime(600);
+    expect(Line.opened).toHaveLength(2);
   });
 
   it("drops a connection that fell silent", () => {

@@ -4,12 +4,14 @@ export type SocketStatus =
   | { kind: "connecting" }
   /** What is there now was told; what changes will be. */
   | { kind: "open" }
-  | { kind: "waiting"; attempt: number; retryAt: number }
+  /** `why`: what the service said of it; null where the service is gone. */
+  | { kind: "waiting"; attempt: number; retryAt: number; why: "missing" | "crowded" | null }
   /** The service does not let this viewer in; asking again would change nothing. */
   | { kind: "refused"; reason: string };
 
 const UNAUTHENTICATED = 4401;
 const FORBIDDEN = 4403;
+const SAID: Readonly<Record<number, "missing" | "crowded">> = { 4404: "missing", 4429: "crowded" };
 
 export interface SocketHooks {
   onMessage: (message: LiveMessage) => void;
@@ -74,7 +76,7 @@ export class LiveSocket {
     socket.onclose = ({ code, reason }: CloseEvent) => {
       if (this.#socket !== socket) return;
       if (code === UNAUTHENTICATED || code === FORBIDDEN) this.#refused(reason);
-      else this.#lost();
+      else this.#lost(code);
     };
   }
 
@@ -83,12 +85,13 @@ export class LiveSocket {
     this.#watch = setTimeout(() => this.#lost(), this.silenceMs);
   }
 
-  #lost(): void {
+  #lost(code = 0): void {
     this.#drop();
     if (this.#closed) return;
     this.#attempt += 1;
     const delay = backoffMs(this.#attempt);
-    this.hooks.onStatus({ kind: "waiting", attempt: this.#attempt, retryAt: Date.now() + delay });
+    const why = SAID[code] ?? null;
+    this.hooks.onStatus({ kind: "waiting", attempt: this.#attempt, retryAt: Date.now() + delay, why });
     this.#retry = setTimeout(() => this.#connect(), delay);
   }
 

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { direction, durations, fixed, metres } from "./format";
+import { dayAndTimeUtc, direction, durations, fixed, metres } from "./format";
 
 it("ranges of time are told in whole minutes from ten minutes on, and are not narrower then", () => {
   expect(durations(187, 250)).toBe("3 min 07 s to 4 min 10 s");
@@ -17,4 +17,8 @@ it("what is rounded to nothing has no sign", () => {
   expect(metres(-0.04)).toBe("0.0 m");
   expect(fixed(-0.4, 0)).toBe("0");
   expect(fixed(-0.06, 1)).toBe("-0.1");
+});
+
+it("times that leave the page are told in UTC, and say so", () => {
+  expect(dayAndTimeUtc(new Date("2026-06-01T23:30:00Z"))).toBe("1 Jun 2026, 23:30 UTC");
 });

@@ -56,6 +56,10 @@ export function speed(value_mps: number): string {
 export const dayAndTime = (date: Date): string =>
   date.toLocaleString(locale.value, { dateStyle: "medium", timeStyle: "short" });
 
+/** The same in UTC, for what leaves the page. */
+export const dayAndTimeUtc = (date: Date): string =>
+  `${date.toLocaleString(locale.value, { dateStyle: "medium", timeStyle: "short", timeZone: "UTC" })} UTC`;
+
 export const day = (date: Date): string =>
   date.toLocaleDateString(locale.value, { dateStyle: "medium", timeZone: "UTC" });
 

@@ -60,6 +60,44 @@ describe("steps", () => {
   });
 });
 
+describe("a slider that is moved", () => {
+  it("asks for the past once, and shows the step where it was left", async () => {
+    const { replayStep, selectedId } = await import("./store");
+    const { awaited, replay } = await import("./past/replay");
+    selectedId.value = "o";
+    answer = (_, path) =>
+      path.includes("/steps") ? [1, 2, 3, 4].map((n) => step(n, "reached")) : { features: [] };
+    const moves = [4, 3, 2].map(replay);
+    expect(awaited.value).toBe(2);
+    expect(replayStep.value).toBe(null);
+    await Promise.all(moves);
+    expect(replayStep.value).toBe(2);
+    expect(awaited.value).toBe(null);
+    expect(asked.filter((one) => one.includes("tracks"))).toHaveLength(1);
+  });
+
+  it("shows the present where that was asked for meanwhile", async () => {
+    const { replayStep, selectedId } = await import("./store");
+    const { replay, showPresent } = await import("./past/replay");
+    selectedId.value = "p";
+    const move = replay(1);
+    showPresent();
+    await move;
+    expect(replayStep.value).toBe(null);
+  });
+});
+
+it("a mission whose deletion is refused stays in sight", async () => {
+  const { selectedId } = await import("./store");
+  const { deleteMission } = await import("./session");
+  selectedId.value = "q";
+  location.hash = "#/missions/q";
+  answer = (method) =>
+    method === "DELETE" ? new Response(JSON.stringify({ detail: "it runs" }), { status: 409 }) : [];
+  await deleteMission("q");
+  expect(location.hash).toBe("#/missions/q");
+});
+
 it("of missions whose tide table is refused none stays", async () => {
   const { createMissions } = await import("./session");
   const { ServiceError } = await import("../api/client");

@@ -20,6 +20,7 @@ import {
   furtherLayers,
   holidays,
   layers,
+  listedAt,
   mission,
   missions,
   now,
@@ -95,6 +96,7 @@ export async function refresh(): Promise<void> {
     ]);
     layers.value = declared;
     missions.value = list;
+    listedAt.value = Date.now();
     fleet.value = vehicles;
     serviceFault.value = null;
     if (!selectedId.value) {
@@ -378,8 +380,8 @@ export async function resumeVehicle(name: string): Promise<void> {
 
 /** Deletes a mission in which nothing was measured. */
 export async function deleteMission(id: string): Promise<void> {
-  await send(say("session.deletingTheMission"), api.deleteMission(id));
-  if (selectedId.value === id) location.hash = "#/";
+  const refused = (await send(say("session.deletingTheMission"), api.deleteMission(id))) === null;
+  if (!refused && selectedId.value === id) location.hash = "#/";
   await refresh();
 }
 

@@ -17,6 +17,7 @@ import {
   remaining_s,
   sonarWords,
   vehicleState,
+  whenLastHeard,
 } from "./stateNames";
 
 describe("numbers", () => {
@@ -104,6 +105,13 @@ describe("a vehicle's state in words", () => {
     expect(vehicleState(vehicle("engaged"), waypoint("sent")).words).toContain("not acknowledged");
     expect(vehicleState(vehicle("engaged"), waypoint("acknowledged")).words).toBe("To waypoint 7");
     expect(vehicleState(vehicle("engaged"), waypoint("refused")).tone).toBe("alarm");
+  });
+
+  it("says of a silent service what was heard last, whose good news may hold no more", () => {
+    const told = vehicleState(vehicle("engaged"), waypoint("acknowledged"));
+    expect(told.tone).toBe("good");
+    expect(whenLastHeard(told)).toEqual({ words: "To waypoint 7 when last heard", tone: "calm" });
+    expect(whenLastHeard(vehicleState(vehicle("lost"), undefined)).tone).toBe("alarm");
   });
 
   it("prefers the link's trouble to the waypoint's state", () => {

@@ -206,6 +206,12 @@ export const failsafeTone = ({ response }: FailsafeView, of: VehicleView): "warn
 export const failsafeWords = ({ failsafe }: FailsafeView): string =>
   named("failsafe", failsafe, capital(failsafe.replaceAll("_", " ")));
 
+/** What was told before the service fell silent: good news is no news of now. */
+export const whenLastHeard = ({ words, tone }: Told): Told => ({
+  words: say("topBar.whenLastHeard", { words }),
+  tone: tone === "good" ? "calm" : tone,
+});
+
 /** A vehicle's state as one short line and how loud it is. */
 export function vehicleState(vehicle: VehicleView, waypoint: WaypointView | undefined): Told {
   const found = stateOf(vehicle, waypoint);

@@ -89,6 +89,20 @@ export const live = computed(
   () => socketStatus.value?.kind === "open" && now.value - view.value.vehiclesAt <= 1000 * STALE_AFTER_S,
 );
 
+/** When the service last answered with its lists, page clock in milliseconds. */
+export const listedAt = signal(0);
+const LISTS_OLD_MS = 15_000;
+
+/** Whether the lists tell what is now: nothing of the service is, while it is silent about the mission that is shown. */
+export const listsLive = computed(() => {
+  const { mission: shown, vehiclesAt } = view.value;
+  const status = socketStatus.value;
+  // A service that says why it tells nothing of that mission is there.
+  const says = status?.kind === "waiting" && status.why !== null;
+  const silent = shown !== null && !says && now.value - vehiclesAt > 1000 * STALE_AFTER_S;
+  return serviceFault.value === null && !silent && now.value - listedAt.value <= LISTS_OLD_MS;
+});
+
 export interface Vehicle {
   view: VehicleView;
   waypoint: WaypointView | undefined;
@@ -267,6 +281,8 @@ export const abortOne = signal<string | null>(null);
 /** Whether the table of all vehicles is shown. */
 export const fleetOpen = signal(false);
 export const preflightOpen = signal(false);
+/** How deep it is where the shown mission goes, as typed in its checklist. */
+export const floorDepth = signal("");
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);
 /** Whether is asked if the mission is to be finished early. */
@@ -290,4 +306,5 @@ effect(() => {
   chosenSounding.value = null;
   steps.value = [];
   telemetry.value = null;
+  floorDepth.value = "";
 });

@@ -18,6 +18,7 @@ import {
   describing,
   editedMission,
   fleetOpen,
+  listsLive,
   mission,
   missions,
   panelOpen,
@@ -82,9 +83,7 @@ function MissionList() {
               onClick={() => selectMission(m.id)}
             >
               <b>{m.name}</b>
-              <span class={`state ${m.state}`}>
-                <span aria-hidden="true">{missionSign(m)}</span> {missionWords(m)}
-              </span>
+              <State of={m} />
               <small>
                 {capital(lengthWords(m.progress))} · {measuredWords(m.progress)}
               </small>
@@ -96,6 +95,18 @@ function MissionList() {
         ))}
       </ul>
     </>
+  );
+}
+
+/** What a mission is at, or was when the service was last heard; one that has ended stays as it is. */
+function State({ of: m }: { of: MissionSummary }) {
+  const known = listsLive.value || hasEnded(m);
+  const words = missionWords(m);
+  return (
+    <span class={`state ${known ? m.state : "unknown"}`} data-testid={`listed-${m.id}`}>
+      <span aria-hidden="true">{known ? missionSign(m) : "?"}</span>{" "}
+      {known ? words : say("topBar.whenLastHeard", { words })}
+    </span>
   );
 }
 

@@ -69,7 +69,7 @@ export function TopBar() {
         {present ? (
           <>
             <Figure
-              label={past ? say("topBar.elapsedThen") : say("topBar.elapsed")}
+              label={past ? say("topBar.decidedAfter") : say("topBar.elapsed")}
               value={duration(elapsed())}
               id="elapsed"
             />
@@ -188,6 +188,12 @@ function Figure({
   );
 }
 
+const WAITING = {
+  gone: "topBar.serviceGoneTryingAgainInS",
+  missing: "topBar.noLongerThere",
+  crowded: "topBar.tooManyViewers",
+} as const;
+
 function LinkSummary() {
   const status = socketStatus.value;
   const team = vehicles.value.filter((v) => v.view.active);
@@ -210,8 +216,8 @@ function LinkSummary() {
     tone = heard < all ? "warning" : "good";
   } else if (status.kind === "waiting") {
     const wait = Math.max(0, Math.ceil((status.retryAt - now.value) / 1000));
-    words = say("topBar.serviceGoneTryingAgainInS", { old, wait });
-    tone = "alarm";
+    words = say(WAITING[status.why ?? "gone"], { old, wait });
+    tone = status.why === "missing" ? "warning" : "alarm";
   } else if (status.kind === "refused") {
     words = say("topBar.notSignedIn");
     tone = "alarm";

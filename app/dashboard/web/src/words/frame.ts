@@ -4,7 +4,7 @@ export const FRAME = {
   "topBar.linksWhatIsMissing": { en: "Links: what is missing", pt: "Ligações: o que falta" },
   "topBar.linksToVehicles": { en: "Links to vehicles", pt: "Ligações aos veículos" },
   "topBar.noMissionChosen": { en: "No mission chosen", pt: "Nenhuma missão escolhida" },
-  "topBar.elapsedThen": { en: "Elapsed then", pt: "Decorrido então" },
+  "topBar.decidedAfter": { en: "Decided after", pt: "Decidido após" },
   "topBar.elapsed": { en: "Elapsed", pt: "Decorrido" },
   "topBar.remaining": { en: "Remaining", pt: "Restante" },
   "topBar.utc": { en: "UTC", pt: "UTC" },
@@ -36,6 +36,14 @@ export const FRAME = {
   "topBar.serviceGoneTryingAgainInS": {
     en: "Service gone{old}; trying again in {wait} s",
     pt: "Sem serviço{old}; nova tentativa em {wait} s",
+  },
+  "topBar.noLongerThere": {
+    en: "The service has no such mission any more{old}; trying again in {wait} s",
+    pt: "O serviço já não tem esta missão{old}; nova tentativa em {wait} s",
+  },
+  "topBar.tooManyViewers": {
+    en: "Too many pages are open on the service{old}; trying again in {wait} s",
+    pt: "Há demasiadas páginas abertas no serviço{old}; nova tentativa em {wait} s",
   },
   "topBar.serviceSilent": {
     en: "Service silent for {silent}",
@@ -111,6 +119,7 @@ export const FRAME = {
     pt: "{b} {remedy} Esta página volta a ligar-se sozinha{it}",
   },
   "notices.wasRefused": { en: "✕ {what} was refused:", pt: "✕ {what}: recusado:" },
+  "notices.wasNotAnswered": { en: "✕ {what} was not answered:", pt: "✕ {what}: sem resposta:" },
   "notices.thereIsNoMission": {
     en: "There is no mission {selectedId}.",
     pt: "Não há nenhuma missão {selectedId}.",
@@ -236,8 +245,8 @@ export const FRAME = {
     pt: "Os veículos estão a regressar; a missão fica {becomes} quando todos chegarem. Parar já, em cima, para-os onde estão.",
   },
   "stop.serviceDoesNotAnswer": {
-    en: "The service does not answer: this order may not have reached it, and vehicles go on meanwhile. Stop them from their own consoles where that cannot wait.",
-    pt: "O serviço não responde: esta ordem pode não lhe ter chegado, e entretanto os veículos continuam. Pare-os nas consolas deles se não puder esperar.",
+    en: "The service does not answer: this order may or may not have reached it, and vehicles may go on meanwhile. Give it again, and stop them from their own consoles where that cannot wait.",
+    pt: "O serviço não responde: esta ordem pode ou não lhe ter chegado, e entretanto os veículos podem continuar. Repita-a, e pare-os nas consolas deles se não puder esperar.",
   },
   "stop.acknowledgedTheStop": { en: "acknowledged the stop", pt: "confirmou a paragem" },
   "stop.didNotAcknowledge": { en: "did not acknowledge", pt: "não confirmou" },
@@ -272,6 +281,7 @@ export const FRAME = {
   "time.stepThatIsShown": { en: "Step that is shown", pt: "Passo à vista" },
   "time.thePresent": { en: "the present", pt: "o presente" },
   "time.stepOf": { en: "step {shown} of {last}", pt: "passo {shown} de {last}" },
+  "time.fetching": { en: "fetching the past…", pt: "a obter o passado…" },
   "time.asItEnded": { en: "as it ended", pt: "como terminou" },
   "time.live": { en: "live", pt: "em direto" },
   "time.notLive": { en: "not live", pt: "não em direto" },
@@ -280,7 +290,7 @@ export const FRAME = {
     pt: "Terminar a missão antes do último passo",
   },
   "time.finishEarly": { en: "Finish early…", pt: "Terminar mais cedo…" },
-  "time.utc": { en: ", {it} UTC", pt: ", {it} UTC" },
+  "time.decidedAt": { en: ", decided {it} UTC", pt: ", decidido às {it} UTC" },
   "time.replay": { en: "Replay{it}", pt: "Repetição{it}" },
   "time.paceOfTheReplay": { en: "Pace of the replay", pt: "Ritmo da repetição" },
   "time.stepsS": { en: "{n} steps/s", pt: "{n} passos/s" },
@@ -309,6 +319,14 @@ export const FRAME = {
     pt: "O serviço respondeu {status} {statusText}",
   },
   "service.theServiceDoesNotAnswer": { en: "The service does not answer", pt: "O serviço não responde" },
+  "service.noAnswerWithin": {
+    en: "The service has not answered for {limit} s",
+    pt: "O serviço não responde há {limit} s",
+  },
+  "service.mayHaveBeenDone": {
+    en: "This may or may not have been carried out: look at what is shown once the service is heard again, and ask again where it was not.",
+    pt: "Isto pode ou não ter sido executado: veja o que aparece quando o serviço voltar a ouvir-se, e repita se não foi.",
+  },
   "service.checkThatItIsRunningAnd": {
     en: "Check that it is running and that this device reaches it.",
     pt: "Verifique que está a correr e que este aparelho o alcança.",

@@ -55,23 +55,40 @@ export const elapsedThen = computed(() => {
   return first && then ? (Date.parse(then.committed_at) - Date.parse(first.committed_at)) / 1000 : null;
 });
 
-/** Shows a step of the past; asks for what is needed the first time. */
+/** The step that is shown as soon as what is needed of the past has come; null: none is waited for. */
+export const awaited = signal<number | null>(null);
+/** One at a time: a slider that is moved asks for many steps, and whole ways are long. */
+let fetching: { id: string; done: Promise<void> } | null = null;
+
+async function fetchPast(id: string): Promise<void> {
+  const [tracks] = await Promise.all([api.tracks(id), fetchSteps(true)]);
+  if (selectedId.peek() === id) ways.value = waysOf(tracks);
+}
+
+/** Shows a step of the past, the one that was asked for last; asks for what is needed the first time. */
 export async function replay(step: number): Promise<void> {
   const id = selectedId.peek();
   if (!id) return;
+  awaited.value = step;
   try {
     // The mission may have gone on since the past was asked for.
     if (replayStep.peek() === null || step > (steps.peek().at(-1)?.number ?? 0)) {
-      const [tracks] = await Promise.all([api.tracks(id), fetchSteps(true)]);
-      if (selectedId.peek() === id) ways.value = waysOf(tracks);
+      if (fetching?.id !== id) fetching = { id, done: fetchPast(id) };
+      const mine = fetching;
+      await mine.done.finally(() => {
+        if (fetching === mine) fetching = null;
+      });
     }
-    if (selectedId.peek() === id) replayStep.value = step;
+    if (selectedId.peek() === id && awaited.peek() === step) replayStep.value = step;
   } catch (error) {
     noteFault(error);
+  } finally {
+    if (selectedId.peek() === id && awaited.peek() === step) awaited.value = null;
   }
 }
 
 export function showPresent(): void {
+  awaited.value = null;
   playing.value = false;
   replayStep.value = null;
 }
@@ -91,4 +108,5 @@ effect(() => {
   selectedId.value;
   ways.value = {};
   playing.value = false;
+  awaited.value = null;
 });

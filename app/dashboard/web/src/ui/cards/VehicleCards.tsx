@@ -22,6 +22,7 @@ import {
   type Tone,
   vehicleState,
   WAYPOINT_WORDS,
+  whenLastHeard,
 } from "../../state/stateNames";
 import {
   abortDialogOpen,
@@ -98,7 +99,9 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
   const then = replayed.value?.find((one) => one.vehicle === vehicle.view.name);
   if (replayStep.value !== null) return <PastCard vehicle={vehicle} depth_m={then?.depth_m ?? null} />;
   const v = vehicle.view;
-  const state = vehicleState(v, vehicle.waypoint);
+  const told = vehicleState(v, vehicle.waypoint);
+  const state = live.value ? told : whenLastHeard(told);
+  const sign = live.value ? { calm: "◌", good: "●", warning: "▲", alarm: "✕" }[state.tone] : "?";
   const away = v.kind === "sim" && v.link === "unknown";
   const ended = mission.value !== null && hasEnded(mission.value);
   const byEndurance = v.battery_pct === null && v.energy_left_pct !== null;
@@ -113,8 +116,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
       <header>
         <h2>{v.name}</h2>
         <span class={`tone ${state.tone}`} data-testid={`state-${v.name}`}>
-          <span aria-hidden="true">{{ calm: "◌", good: "●", warning: "▲", alarm: "✕" }[state.tone]}</span>{" "}
-          {state.words}
+          <span aria-hidden="true">{sign}</span> {state.words}
         </span>
       </header>
       <dl class="big">

@@ -8,18 +8,21 @@ import { paletteOf, symbolOf } from "../../map/picture/layerColours";
 import { colourAt, type Rgb } from "../../map/picture/palette";
 import { drawSheet, fitted, type SheetLegend, type SheetVehicle, sheetFor } from "../../map/print/mapSheet";
 import { pdfOf } from "../../map/print/pdf";
-import { dayAndTime, distance, latitude, longitude, plain, units } from "../../state/format";
+import { dayAndTimeUtc, distance, latitude, longitude, plain, units } from "../../state/format";
 import { replayed } from "../../state/past/replay";
 import { missionWords } from "../../state/stateNames";
 import {
   depthPalette,
+  live,
   mission,
   replayStep,
+  serviceNow,
   showHatching,
   shownCertainty,
   shownLayer,
   shownRange,
   vehicles,
+  view,
 } from "../../state/store";
 import { named, say } from "../../words/say";
 import { overlaid } from "./layout";
@@ -49,11 +52,16 @@ export async function mapPicture(kind: PictureKind): Promise<{ name: string; con
   if (!context) throw new Error(say("paper.thisBrowserCannotDrawOnA"));
   context.setTransform(RATIO, 0, 0, RATIO, 0, 0);
   const step = replayStep.peek();
-  const when = step === null ? missionWords(present) : say("cards.atStep", { replayStep: step });
+  const words = live.peek()
+    ? missionWords(present)
+    : say("topBar.whenLastHeard", { words: missionWords(present) });
+  const when = step === null ? words : say("cards.atStep", { replayStep: step });
+  const { vehiclesAt, clockAhead_ms } = view.peek();
+  const shownAt = live.peek() ? serviceNow.peek() : vehiclesAt + clockAhead_ms;
   drawSheet(context, sheet, at, {
     words: {
       title: present.name,
-      subtitle: `${when} · ${dayAndTime(new Date())}`,
+      subtitle: `${when} · ${dayAndTimeUtc(new Date(shownAt))}`,
       notes: notes(),
       latitude,
       longitude,

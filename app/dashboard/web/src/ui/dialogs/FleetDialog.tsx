@@ -1,8 +1,9 @@
 import "./FleetDialog.css";
 import type { VehicleView } from "../../api/types";
 import { age, metres, place, speed } from "../../state/format";
-import { batteryWords, vehicleState } from "../../state/stateNames";
-import { coordinateFormat, fleet, fleetOpen, missions } from "../../state/store";
+import { ageSeconds } from "../../state/live";
+import { batteryWords, vehicleState, whenLastHeard } from "../../state/stateNames";
+import { coordinateFormat, fleet, fleetOpen, listedAt, listsLive, missions, now } from "../../state/store";
 import { say } from "../../words/say";
 import { sets } from "../parts/Controls";
 import { Dialog } from "../parts/Dialog";
@@ -52,7 +53,8 @@ export function FleetDialog() {
 }
 
 function Line({ vehicle: v }: { vehicle: VehicleView }) {
-  const state = vehicleState(v, undefined);
+  const told = vehicleState(v, undefined);
+  const state = listsLive.value ? told : whenLastHeard(told);
   const name = missions.value?.find((m) => m.id === v.mission_id)?.name;
   const link = [v.kind, v.imc_id === null ? null : `0x${v.imc_id.toString(16).padStart(4, "0")}`, v.address];
   return (
@@ -69,7 +71,7 @@ function Line({ vehicle: v }: { vehicle: VehicleView }) {
           <a href={`#/missions/${v.mission_id}`}>{name ?? say("fleet.shownBelow")}</a>
         )}
       </td>
-      <td>{age(v.age_s)}</td>
+      <td>{age(ageSeconds(v, listedAt.value, now.value))}</td>
       <td>{batteryWords(v)}</td>
       <td>{metres(v.depth_m)}</td>
       <td>{metres(v.altitude_m)}</td>

@@ -6,7 +6,7 @@ import SPEC from "../../api/mission.json";
 import type { CheckStatus, PreflightView } from "../../api/types";
 import { pointed } from "../../state/format";
 import { act, actionWords, busyWith, refusal, said } from "../../state/session";
-import { mission, preflightOpen, selectedId } from "../../state/store";
+import { floorDepth, mission, preflightOpen, selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Forecast } from "../forecast/Forecast";
 import { Button, sets, Typed } from "../parts/Controls";
@@ -20,7 +20,6 @@ const AGAIN_MS = 3000;
 export function PreflightDialog() {
   const found = useSignal<PreflightView | null>(null);
   const fault = useSignal("");
-  const depth = useSignal("");
   const open = preflightOpen.value;
 
   useEffect(() => {
@@ -102,12 +101,12 @@ export function PreflightDialog() {
         <>
           <label class="field">
             {say("asked.depthOfTheBottomM")}
-            <Typed text={depth} id="preflight-floor_depth_m" placeholder={say("asked.aGuess")} />
+            <Typed text={floorDepth} id="preflight-floor_depth_m" placeholder={say("asked.aGuess")} />
             <small>{SPEC.floor_depth_m.description}</small>
           </label>
           <Forecast
-            of={`${selectedId.value} ${depth.value}`}
-            asks={[(gone) => api.forecast(selectedId.peek() ?? "", pointed(depth.value), gone)]}
+            of={`${selectedId.value} ${floorDepth.value}`}
+            asks={[(gone) => api.forecast(selectedId.peek() ?? "", pointed(floorDepth.value), gone)]}
           />
         </>
       ) : null}

@@ -2,6 +2,7 @@ import "./StopDialog.css";
 import { useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import type { ServiceError } from "../../api/client";
 import type { ActionView, StopView } from "../../api/types";
 import { refusal, said } from "../../state/session";
 import { MISSION_WORDS } from "../../state/stateNames";
@@ -62,6 +63,8 @@ export function StopDialog({
     }
   };
   const stopping = sending.value === "stop";
+  // Whoever hears nothing of a stop asks again: it stays in reach.
+  const waiting = stopping && live.value;
   const confirming = (
     <>
       {sendHome ? (
@@ -76,10 +79,10 @@ export function StopDialog({
       <Button
         id={confirmId}
         kind={name === "abort" ? "abort" : "command primary"}
-        disabled={stopping}
+        disabled={waiting}
         onClick={() => void ask("stop", send)}
       >
-        {confirm(stopping)}
+        {confirm(waiting)}
       </Button>
     </>
   );
@@ -87,6 +90,7 @@ export function StopDialog({
   return (
     <Dialog
       {...frame}
+      asks
       open={open}
       name={name}
       heading={ending ? say("stop.returningHome") : answer.value ? done : question}
@@ -94,7 +98,7 @@ export function StopDialog({
         sending.value !== null && !live.value
           ? say("stop.serviceDoesNotAnswer")
           : refusal.value?.what === what
-            ? said(refusal.value.error)
+            ? stopFault(refusal.value.error)
             : ""
       }
       closing={answer.value ? say("dialog.close") : say("stop.keepGoing")}
@@ -112,6 +116,10 @@ export function StopDialog({
     </Dialog>
   );
 }
+
+/** Why there is no answer to a stop. */
+const stopFault = (error: ServiceError): string =>
+  error.status === 0 ? say("stop.serviceDoesNotAnswer") : said(error);
 
 /** What every vehicle answered to a stop, and what to do about one that did not. */
 function Receipts({ stops }: { stops: readonly StopView[] }) {

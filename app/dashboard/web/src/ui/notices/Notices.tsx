@@ -40,8 +40,12 @@ export function Notices() {
       {refused && !refused.inDialog && !preflightOpen.value ? (
         <div class="notice alarm" role="alert" data-testid="refusal">
           <p>
-            <b>{say("notices.wasRefused", { what: refused.what })}</b> {refused.error.message}.{" "}
-            {refused.error.remedy}
+            <b>
+              {say(refused.error.status === 0 ? "notices.wasNotAnswered" : "notices.wasRefused", {
+                what: refused.what,
+              })}
+            </b>{" "}
+            {refused.error.message}. {refused.error.remedy}
           </p>
           <Button onClick={sets(refusal, null)}>{say("log.taken")}</Button>
         </div>

@@ -24,6 +24,8 @@ interface DialogProps {
   kind?: string;
   /** Over another dialog. */
   above?: boolean;
+  /** Whether its buttons come first for the keyboard, before what it shows. */
+  asks?: boolean;
   /** For tests and styles. */
   data?: Record<`data-${string}`, string | boolean>;
   children: ComponentChildren;
@@ -43,6 +45,7 @@ export function Dialog({
   actions,
   kind = "",
   above = false,
+  asks = false,
   data = {},
   children,
 }: DialogProps) {
@@ -57,6 +60,7 @@ export function Dialog({
     const before = document.activeElement;
     stack.push(me);
     element.show();
+    if (asks) element.querySelector<HTMLElement>(".dialog-actions>button")?.focus({ preventScroll: true });
     const leave = () => {
       const at = stack.indexOf(me);
       if (at >= 0) stack.splice(at, 1);
@@ -90,13 +94,15 @@ export function Dialog({
       >
         <h2 id={`${name}-title`}>{heading}</h2>
         {children}
-        <Trouble words={fault} />
-        <div class="dialog-actions">
-          <Button id={`${name}-close`} onClick={onClose}>
-            {closing}
-          </Button>
-          {actions}
-        </div>
+        <footer class="dialog-foot">
+          <Trouble words={fault} />
+          <div class="dialog-actions">
+            <Button id={`${name}-close`} onClick={onClose}>
+              {closing}
+            </Button>
+            {actions}
+          </div>
+        </footer>
       </dialog>
     </>
   );

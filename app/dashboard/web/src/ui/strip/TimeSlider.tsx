@@ -1,6 +1,6 @@
 import "./TimeSlider.css";
 import { clock } from "../../state/format";
-import { pace, playing, replay, showPresent } from "../../state/past/replay";
+import { awaited, pace, playing, replay, showPresent } from "../../state/past/replay";
 import { flownWords, hasEnded, isAllowed } from "../../state/stateNames";
 import { finishOpen, live, mission, replayStep, steps } from "../../state/store";
 import { say, sayWith } from "../../words/say";
@@ -44,7 +44,7 @@ export function TimeSlider() {
         type="range"
         min={last > 0 ? 1 : 0}
         max={Math.max(1, last)}
-        value={shown ?? last}
+        value={awaited.value ?? shown ?? last}
         disabled={last === 0}
         aria-label={say("time.stepThatIsShown")}
         aria-valuetext={shown === null ? say("time.thePresent") : say("time.stepOf", { shown, last })}
@@ -57,7 +57,13 @@ export function TimeSlider() {
       {shown === null ? (
         <>
           <span class="when">
-            {over ? say("time.asItEnded") : live.value ? say("time.live") : say("time.notLive")}
+            {awaited.value !== null
+              ? say("time.fetching")
+              : over
+                ? say("time.asItEnded")
+                : live.value
+                  ? say("time.live")
+                  : say("time.notLive")}
           </span>
           {isAllowed("finish", present) ? (
             <Button
@@ -75,7 +81,8 @@ export function TimeSlider() {
         <>
           <span class="when" data-testid="replayed-at" role="status">
             {say("time.replay", {
-              it: past ? say("time.utc", { it: clock(new Date(past.committed_at), "utc") }) : "",
+              // Steps are decided before they are flown, by some planners long before.
+              it: past ? say("time.decidedAt", { it: clock(new Date(past.committed_at), "utc") }) : "",
             })}
           </span>
           <label class="pace">
