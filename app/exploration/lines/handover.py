@@ -24,7 +24,9 @@ def hand_over(routes: dict[str, FloatArray], vehicles: tuple[str, ...], en_m: Fl
         if name not in result:
             donor = max(sorted(result), key=lambda k: route_length(here[k], result[k]))
             half = (len(result[donor]) + 1) // 2
-            result[donor], rest = result[donor][:half], result[donor][half:]
+            # The piece between the halves may be a whole line: it belongs to the second one.
+            begin = half - 1 if len(result[donor]) > half else half
+            result[donor], rest = result[donor][:half], result[donor][begin:]
             backwards = len(rest) > 1 and np.hypot(*(rest[-1] - here[name])) < np.hypot(*(rest[0] - here[name]))
             result[name] = rest[::-1] if backwards else rest
     return result

@@ -173,9 +173,11 @@ class LawnmowerPlanner(PlannerBase):
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
-        if vehicle in self._routes:
+        if self._routes:
             begin = np.zeros((0, 2)) if resume_at_m is None else resume_at_m[None]
-            self._routes[vehicle] = np.vstack([begin, ends_m.reshape(-1, 2), self._routes[vehicle]])
+            # Its rest may be handed on already: then this is, too.
+            rest = self._routes.get(vehicle, np.zeros((0, 2)))
+            self._routes[vehicle] = np.vstack([begin, ends_m.reshape(-1, 2), rest])
 
     def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
         """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""

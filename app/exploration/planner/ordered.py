@@ -89,7 +89,7 @@ class OrderedPlanner:
         self.taken: dict[str, int] = {}
         self.refused: dict[str, tuple[int, str]] = {}
         self._since: dict[str, int] = {}
-        """How many legs the planner has decided for vehicles since their last ordered one."""
+        """How many legs the planner has decided for vehicles since their last ordered one, or they left a line."""
         self._spaces: list[tuple[Constraints, FreeSpace]] = []
         """Of plans' limits and of checks'."""
 
@@ -162,6 +162,19 @@ class OrderedPlanner:
             kept -= 1
         way.corners_m = np.vstack([way.passed_m[kept:], way.corners_m])
         way.passed_m = way.passed_m[:kept]
+
+    def leave(self, vehicle: str, place_m: FloatArray, ends_m: FloatArray) -> None:
+        """Learn that a vehicle leaves its line at a place (2,) without its last legs, which were to end at ``ends_m``.
+
+        Whoever goes on with the line does so from there: the vehicle itself when it comes back, or another one.
+        """
+        if self.is_ordered(vehicle) or self._since.get(vehicle) == 0:
+            return  # its line waits where it left that before
+        self.put_back(vehicle, ends_m)
+        self._leave_way_round(vehicle)
+        self._since[vehicle] = 0
+        if len(self.planner.ways_ahead_m().get(vehicle, ())):
+            self.planner.put_back(vehicle, np.zeros((0, 2)), place_m)
 
     def reach(self, vehicle: str, place_m: FloatArray) -> None:
         """Take note that a vehicle has flown all its legs, the last of which ended at ``place_m`` (2,).
@@ -299,7 +312,7 @@ class OrderedPlanner:
     def snapshot(self) -> bytes:
         """Return the planner's memory, and the ordered ways."""
         memory = self.planner.snapshot()
-        if not self.taken and not self.ways:
+        if not self.taken and not self.ways and not self._since:
             return memory
         ways = {name: way.remember() for name, way in self.ways.items()}
         state: dict[str, Any] = {"ways": ways, "taken": self.taken, "refused": self.refused, "since": self._since}

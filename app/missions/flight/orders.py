@@ -238,6 +238,11 @@ class OrderBook:
         """Take no more orders until the next flight."""
         self._flight = None
 
+    def leave(self, member: Member) -> None:
+        """Give up the legs of a vehicle that is taken out of its mission: others go on with its line."""
+        if self._flight is not None and member.withdrawal is None:
+            self._flight.dispatch.leave_line(member, "it left the mission")
+
     @property
     def _given_up_now(self) -> dict[str, list[FloatArray]]:
         """Legs given up that were not looked at yet."""

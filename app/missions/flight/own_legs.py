@@ -14,6 +14,7 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
+from app.exploration.core.routes import FreeSpace
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
 from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, planned_way_m
@@ -136,6 +137,7 @@ class OwnLegs:
             while not self._over():
                 for name in await self._orders.look():
                     self._again_at_s.pop(name, None)
+                await self._take_lines_back()
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
@@ -158,6 +160,17 @@ class OwnLegs:
             return "nobody surveys any more"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
         return f"{words} but {', '.join(m.name for m in left)}" if left else words
+
+    async def _take_lines_back(self) -> None:
+        """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet."""
+        if not self._dispatch.left_lines:
+            return
+        planner, space = self._decider.planner, await self._live.in_thread(FreeSpace, self._constraints, 0.0)
+        for name in list(self._dispatch.left_lines):
+            place_m, ends_m = self._dispatch.left_lines.pop(name)
+            planner.leave(name, space.nearest(place_m), np.array(ends_m).reshape(-1, 2))
+        # What was stored with the legs has these as flown, and a restart would go on from that.
+        await self._committing.remember(planner.snapshot())
 
     def _all_seen(self) -> str:
         but = f" but {self._left_pct:.1f} % of the area, which lines do not see" if self._left_pct >= TOLD_PCT else ""
@@ -456,7 +469,8 @@ class OwnLegs:
         ]
         if not left:
             return bool(list(self._live.team)) and not any(self._has_way(m) for m in self._live.team.held)
-        somebody_is_done = self._somebody_is_home or any(m.present for m in team if m not in left)
+        names = {m.name for m in left}
+        somebody_is_done = self._somebody_is_home or any(m.present for m in team if m.name not in names)
         if any(m.present and not (somebody_is_done and m.misses >= NOT_WAITED_FOR) for m in left):
             return False
         if not somebody_is_done and any(self._wants_legs(m) for m in left):

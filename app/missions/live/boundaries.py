@@ -52,6 +52,8 @@ class Boundaries:
         self._zones = [Polygon(zone) for zone in zones]
         shapely.prepare([self._area, *self._zones])
         self._been_inside: set[str] = set()
+        """Vehicles that were inside of the area since they were put to sea, or led out of it."""
+        self._coming_in: set[str] = set()
         self._breaches: dict[str, dict[int, _Breach]] = {}
         self._recalled: set[tuple[AlarmKind, str | None]] = set()
 
@@ -84,7 +86,11 @@ class Boundaries:
         outside_m = _signed_distance_m(self._area, place)
         if outside_m <= 0:
             self._been_inside.add(vehicle)
-        # One that comes from outside for the first time is on its way in.
+        elif may_leave:
+            self._been_inside.discard(vehicle)
+        coming_in = vehicle not in self._been_inside and not may_leave
+        self._coming_in = self._coming_in | {vehicle} if coming_in else self._coming_in - {vehicle}
+        # One that comes from outside for the first time, or from home again, is on its way in.
         astray = vehicle in self._been_inside and not may_leave and outside_m > OUTSIDE_ALARM_M
         crossings += self._follow(
             vehicle, 0, "outside the area", outside_m, astray, outside_m <= OUTSIDE_OVER_M, depth_m, at_s
@@ -107,10 +113,15 @@ class Boundaries:
         """Return where a vehicle is that it must not be; empty when all is well."""
         return ", ".join(breach.words for breach in self._breaches.get(vehicle, {}).values())
 
+    def comes_in(self, vehicle: str) -> bool:
+        """Whether a vehicle is outside of the area and was not inside since it was put to sea, or led out of it."""
+        return vehicle in self._coming_in
+
     def forget(self, vehicle: str) -> None:
         """A vehicle left the mission: where it goes is no matter of the mission any more."""
         self._breaches.pop(vehicle, None)
         self._been_inside.discard(vehicle)
+        self._coming_in.discard(vehicle)
 
     def _follow(
         self, vehicle: str, key: int, words: str, by_m: float, began: bool, over: bool, depth_m: float, at_s: float

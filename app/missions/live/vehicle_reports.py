@@ -193,7 +193,8 @@ class VehicleReports:
             return phase_of(member.withdrawal)
         if member.surfacing:
             return Phase.SURFACING
-        if member.legs == 0 or self._boundaries.breach(member.name):
+        outside = self._boundaries.comes_in(member.name) or self._boundaries.breach(member.name)
+        if member.legs == 0 or outside:
             return Phase.TRANSIT
         return Phase.SURVEY if member.ordered or member.ahead or way_left_m > 0.0 else Phase.STOPPED
 

@@ -76,6 +76,10 @@ class Energy:
     _level_pct: float | None = None
     _first_pct: float = field(default=0.0, repr=False)
     _first_used_s: float = field(default=0.0, repr=False)
+    _least_pct: float = field(default=math.inf, repr=False)
+    """The lowest level since then,"""
+    _least_used_s: float = field(default=0.0, repr=False)
+    """and what had been used when it was told last."""
     _rate_pct_s: float | None = field(default=None, repr=False)
     """What was learned before it was charged, percent a nominal second."""
     _told_pct_s: float | None = field(default=None, repr=False)
@@ -83,12 +87,19 @@ class Energy:
 
     def begin(self) -> None:
         """Learn anew from here: nothing was counted until now."""
-        self._first_pct, self._first_used_s = self._level_pct or 0.0, self.used_s
+        self._learn_from(self._level_pct or 0.0)
+
+    def _learn_from(self, level_pct: float) -> None:
+        self._first_pct = self._least_pct = level_pct
+        self._first_used_s = self._least_used_s = self.used_s
 
     def renew(self) -> None:
         """Take a vehicle that tells no level to be charged: it has its whole endurance again."""
         if self._level_pct is None:
             self.used_s = 0.0
+        elif self._level_pct >= self._first_pct:
+            # What it used on a cable its level does not tell.
+            self._learn_from(self._level_pct)
 
     def pass_time(self, seconds: float, speed_mps: float | None) -> None:
         """Count time under way at a speed; None: the usual one."""
@@ -101,11 +112,16 @@ class Energy:
         """Take what the battery tells: its level, how sure it is of that, percent, and how long it says that lasts."""
         if level_pct is None or (confidence_pct is not None and confidence_pct < TRUSTED_PCT):
             return
-        charged = self._level_pct is not None and level_pct > self._level_pct + CHARGED_PCT
-        if charged:
-            self._rate_pct_s = self.rate_pct_s
-        if charged or self._level_pct is None:
-            self._first_pct, self._first_used_s = level_pct, self.used_s
+        if self._level_pct is None:
+            self._learn_from(level_pct)
+        elif level_pct > self._least_pct + CHARGED_PCT:
+            # On a cable it rises a little from one report to the next. Nothing is learned of that.
+            self._rate_pct_s = self._rate_of(self._first_pct - self._least_pct, self._least_used_s - self._first_used_s)
+            self._learn_from(level_pct)
+        elif level_pct > self._first_pct:
+            self._learn_from(level_pct)
+        elif level_pct <= self._least_pct:
+            self._least_pct, self._least_used_s = level_pct, self.used_s
         self._level_pct = level_pct
         if lasts_s and level_pct > 0.0:
             self._told_pct_s = level_pct / lasts_s
@@ -118,8 +134,11 @@ class Energy:
     @property
     def rate_pct_s(self) -> float | None:
         """Percent of the battery that a nominal second takes; None while nobody can know."""
+        return self._rate_of(*self._seen())
+
+    def _rate_of(self, drop_pct: float, load_s: float) -> float | None:
+        """Return the consumption by what was seen used of the battery, percent, and done with it, nominal seconds."""
         prior = self._prior_pct_s
-        drop_pct, load_s = self._seen()
         if prior is not None:
             return (PRIOR_PCT + drop_pct) / (PRIOR_PCT / prior + load_s)
         return drop_pct / load_s if drop_pct >= LEAST_USED_PCT and load_s > 0 else None

@@ -8,6 +8,7 @@ from app.missions.clock import now
 from app.missions.errors import ConflictError, VehicleNotFoundError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import StopReceipt
+from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_vehicle
 from app.missions.running.claims import Claims, free_elsewhere
@@ -97,6 +98,7 @@ class TeamChanges:
         written = asyncio.ensure_future(_store_leaving(live, member.name, at))
         await asyncio.wait([written], timeout=PATIENCE_S)
         claimed = self._hub.claimed_by(member.key) == live.id
+        live.part(OrderBook).leave(member)
         live.team.leave(member.name, at)
         live.boundaries.forget(member.name)
         live.changed.set()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, Polygon
+from shapely import LineString, Point, Polygon
 
 from app.estimation import SingleBeam
 from app.exploration.core.constraints import Constraints
@@ -265,3 +265,21 @@ def test_legs_that_a_vehicle_was_not_given_are_still_to_be_flown(name: str, orde
     again = fly(planner, replace(alone, positions=decided[kept]), min(8 - kept, 3))
     expected = decided[kept : kept + len(again)]
     np.testing.assert_allclose([place[0, :2] for place in again], [place[0, :2] for place in expected], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+def test_a_line_that_is_left_goes_on_where_it_was_left(name: str) -> None:
+    planner, situation = planner_of(name), make_situation(steps=200, vehicles=("a",))
+    places = fly(planner, situation, 9)
+    planner.leave("a", places[6][0, :2], np.array([place[0, :2] for place in places[7:]]))
+    # Meanwhile it is led home: that says nothing of its line.
+    planner.leave("a", np.array([50.0, -20.0]), np.array([[50.0, 5.0], [50.0, -20.0]]))
+    restored = planner_of(name)
+    restored.restore(planner.snapshot())
+    restored.leave("a", np.array([50.0, -20.0]), np.array([[50.0, 5.0]]))
+    elsewhere = np.array([[50.0, 1.0, places[-1][0, 2]]])
+    again = fly(restored, replace(situation, positions=elsewhere), 30)
+    way = LineString([place[0, :2] for place in again])
+    assert max(way.distance(Point(place[0, :2])) for place in places[6:]) < 1.0
+    left = LineString([place[0, :2] for place in places[6:]])
+    assert way.buffer(1.0).covers(left)

@@ -63,6 +63,19 @@ def test_leaving_the_area_is_an_alarm_beyond_the_circle_of_waiting_and_coming_fr
     assert boundaries.breach("a") == ""
 
 
+def test_who_was_led_out_of_the_area_comes_in_again_without_an_alarm() -> None:
+    boundaries = Boundaries(AREA, [])
+    assert not boundaries.judge("a", (50, 50), 2.0, 0.0)
+    assert not boundaries.judge("a", (-10, 50), 2.0, 0.0, may_leave=True)
+    assert not boundaries.judge("a", (-80, 50), 2.0, 0.0, may_leave=True)
+    assert not boundaries.comes_in("a")
+    assert told(boundaries, [(-80, 50), (-30, 50)]) == []
+    assert boundaries.comes_in("a")
+    assert told(boundaries, [(5, 50)]) == []
+    assert not boundaries.comes_in("a")
+    assert len(told(boundaries, [(-21, 50)])) == 1
+
+
 def test_a_vehicle_that_left_the_mission_is_forgotten() -> None:
     boundaries = Boundaries(AREA, [ZONE])
     assert len(told(boundaries, [(50, 50)])) == 1

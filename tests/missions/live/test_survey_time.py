@@ -92,6 +92,19 @@ async def test_who_is_faster_than_its_speed_gets_no_more_legs_for_that(under_way
     assert vehicle.left_m == pytest.approx(WHOLE_M - 100.0)
 
 
+async def test_the_way_into_the_area_is_no_time_of_the_survey(under_way: Made) -> None:
+    vehicle = await under_way()
+    vehicle.live.boundaries.forget("a")
+    vehicle.reports(1.0, -200.0)
+    before_s = vehicle.member.flown.survey_s
+    for time_s, north_m in ((21.0, -160.0), (61.0, -80.0), (101.0, 0.5)):
+        vehicle.reports(time_s, north_m)
+    assert vehicle.member.flown.phase is Phase.TRANSIT
+    assert vehicle.member.flown.survey_s == before_s
+    vehicle.reports(111.0, 20.5)
+    assert vehicle.member.flown.survey_s == before_s + 10.0
+
+
 async def test_a_silence_is_time_too(under_way: Made) -> None:
     vehicle = await under_way()
     vehicle.reports(600.0, 110.0)

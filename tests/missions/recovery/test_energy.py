@@ -72,6 +72,28 @@ def test_a_charged_battery_lasts_as_the_last_one_did() -> None:
     assert left.time_s == pytest.approx(700.0, rel=0.05)
 
 
+@pytest.mark.parametrize("step_pct", [0.1, 0.5, 2.9])
+def test_a_battery_that_is_charged_slowly_lasts_no_longer_than_one_that_is_exchanged(step_pct: float) -> None:
+    energy = Energy(1.0, 10_000.0)
+    energy.take_level(100.0)
+    used_up(energy, 10_000.0, 0.8)
+    level_pct = 20.0
+    while level_pct < 100.0:  # on a cable, two hours long
+        level_pct = min(level_pct + step_pct, 100.0)
+        energy.pass_time(7200.0 * step_pct / 80.0, 0.0)
+        energy.take_level(level_pct)
+    energy.pass_time(3600.0, 0.0)
+    energy.take_level(100.0)
+    energy.renew()
+    left = energy.left
+    assert left is not None
+    assert left.time_s == pytest.approx(10_000.0, rel=0.05)
+    used_up(energy, 10_000.0, 0.7)
+    left = energy.left
+    assert left is not None
+    assert left.safe_s <= 3000.0
+
+
 def test_only_a_vehicle_that_tells_no_level_is_taken_to_be_charged() -> None:
     told, silent = Energy(1.0, 1000.0), Energy(1.0, 1000.0)
     told.take_level(40.0)

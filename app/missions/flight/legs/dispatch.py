@@ -56,6 +56,9 @@ class Dispatch:
         """Where legs were to end that vehicles did not fly, each (2,), until somebody takes note of it."""
         self.dropped: dict[str, list[FloatArray]] = {}
         """Where legs were to end that something barred, each (2,), until the planner is told to lead round that."""
+        self.left_lines: dict[str, tuple[FloatArray, list[FloatArray]]] = {}
+        """Where vehicles left their lines, and where legs were to end that they did not fly then, each (2,), until the
+        planner is told."""
         self.turned_down: dict[str, int] = {}
         """How often vehicles refused the order that they have."""
 
@@ -186,6 +189,13 @@ class Dispatch:
             self.settle(member, WaypointStatus.MISSED, reason)
             member.misses = misses  # it would have got there
         return self._note_given_up(member, [*ends, *self._spare(member, ends, reason)])
+
+    def leave_line(self, member: Member, reason: str) -> None:
+        """End the legs of a vehicle that surveys no more, and note where it left its line."""
+        flown = member.legs > 0
+        ends_m = self.give_up_legs(member, reason)
+        if self._persistent and flown and member.report is not None:
+            self.left_lines[member.name] = member.place_m(self._live.frame), ends_m
 
     def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:
         """Take the legs back that a vehicle has not begun; returns where they were to end, each (2,).

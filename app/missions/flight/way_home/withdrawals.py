@@ -206,7 +206,10 @@ class Withdrawals:
         """Write a withdrawal down and give up the vehicle's legs."""
         withdrawal.led = True
         await self._keep(member, withdrawal)
-        self._dispatch.give_up_legs(member, withdrawal.why)
+        if withdrawal.told:
+            self._dispatch.give_up_legs(member, withdrawal.why)
+        else:
+            self._dispatch.leave_line(member, withdrawal.why)
         does = {
             Response.HOLD: "holds",
             Response.RETURN: "goes home",

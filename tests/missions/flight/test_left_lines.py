@@ -1,0 +1,49 @@
+"""Lines that vehicles leave in the middle, held or taken out of the mission: they go on with them where they left."""
+
+import asyncio
+
+import numpy as np
+import pytest
+from shapely import LineString
+from sqlalchemy import select
+
+from app.missions.running import homecoming
+from app.missions.states import MissionState
+from app.storage.database import Database
+from app.storage.models import WaypointRow
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_state
+from tests.support.waiting import until
+
+pytestmark = pytest.mark.usefixtures("simulated_time")
+
+
+@pytest.mark.parametrize("how", ["held", "taken out"])
+async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
+    harbour_closed: Harbour, database: Database, how: str
+) -> None:
+    service = await harbour_closed.open(time_scale=5.0)
+    limits = {"max_step_m": 8.0, "min_separation_m": 0.0}
+    spec = sim_spec("a", side_m=40.0, budget={"km_per_vehicle": 0.2}, planner={"name": "lawnmower"}, limits=limits)
+    mission = (await service.create(spec)).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: live.team.named("a").flown.on_plan_m > 60.0, "it surveys")
+    if how == "held":
+        await homecoming.hold(live, "a", "Ana")
+        # It circles for a while, elsewhere.
+        await asyncio.sleep(30.0 / service.settings.time_scale)
+        await service.send_on(live, "a", "Ana")
+    else:
+        await service.team_changes.take_out(live, "a", "Ana")
+        await service.team_changes.rejoin(live, "a", "Ana")
+    await until_state(service, mission, MissionState.FINISHED)
+    async with database.reading() as session:
+        rows = (await session.scalars(select(WaypointRow).order_by(WaypointRow.step))).all()
+    ends = np.array([[row.east_m, row.north_m] for row in rows])
+    missed = np.flatnonzero([row.status == "missed" for row in rows])
+    assert {row.status for row in rows} == {"reached", "missed"}
+    assert 1 < len(missed) == np.ptp(missed) + 1
+    again = ends[missed[-1] + 1 :]
+    assert LineString(again).buffer(1.0).covers(LineString(ends[missed]))
+    # Legs that it did not begin take nothing of its way.
+    assert live.team.named("a").spared == len(missed) - 1
