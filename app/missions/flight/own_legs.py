@@ -27,6 +27,7 @@ from app.missions.flight.legs.exchange import LegExchange
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
+from app.missions.live.remaining import remaining
 from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
@@ -157,9 +158,18 @@ class OwnLegs:
         team = self._live.team
         gave_up = (m for m in team if m.withdrawal is not None and not m.withdrawal.done)
         if any(m.name not in self._sent_home and self._has_way(m) for m in gave_up):
-            return "nobody surveys any more"
+            return f"nobody surveys any more{self._left_words()}"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
         return f"{words} but {', '.join(m.name for m in left)}" if left else words
+
+    def _left_words(self) -> str:
+        """Return how much of the mission's length is left, as words after a reason; '' where it is counted in steps."""
+        left, budget = remaining(self._spec, self._live.team), self._spec.budget
+        if budget.minutes is not None and left.minutes:
+            return f", {left.minutes:.0f} min before the mission's time is up"
+        if budget.km_per_vehicle is not None and left.km_per_vehicle:
+            return f", {left.km_per_vehicle:.1f} km before a vehicle has flown its way"
+        return ""
 
     async def _take_lines_back(self) -> None:
         """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet."""
