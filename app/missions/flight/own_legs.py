@@ -138,7 +138,8 @@ class OwnLegs:
             while not self._over():
                 for name in await self._orders.look():
                     self._again_at_s.pop(name, None)
-                await self._take_lines_back()
+                if await self._take_lines_back():
+                    continue  # meanwhile somebody may have flown its way
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
@@ -171,16 +172,20 @@ class OwnLegs:
             return f", {left.km_per_vehicle:.1f} km before a vehicle has flown its way"
         return ""
 
-    async def _take_lines_back(self) -> None:
-        """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet."""
+    async def _take_lines_back(self) -> bool:
+        """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet.
+
+        Returns whether there were any.
+        """
         if not self._dispatch.left_lines:
-            return
+            return False
         planner, space = self._decider.planner, await self._live.in_thread(FreeSpace, self._constraints, 0.0)
         for name in list(self._dispatch.left_lines):
             place_m, ends_m = self._dispatch.left_lines.pop(name)
             planner.leave(name, space.nearest(place_m), np.array(ends_m).reshape(-1, 2))
         # What was stored with the legs has these as flown, and a restart would go on from that.
         await self._committing.remember(planner.snapshot())
+        return True
 
     def _all_seen(self) -> str:
         but = f" but {self._left_pct:.1f} % of the area, which lines do not see" if self._left_pct >= TOLD_PCT else ""
