@@ -50,6 +50,8 @@ class CommittedLeg:
     """Where it ends in the mission's frame, (2,): east, north."""
     surfacing: bool = False
     """Whether it brings its vehicle up for a fix."""
+    homeward: bool = False
+    """Whether it leads home, or up: it takes nothing of its vehicle's way."""
 
 
 @dataclass

@@ -27,6 +27,7 @@ from app.missions.flight.legs.exchange import LegExchange
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
+from app.missions.live.remaining import remaining
 from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
@@ -137,7 +138,8 @@ class OwnLegs:
             while not self._over():
                 for name in await self._orders.look():
                     self._again_at_s.pop(name, None)
-                await self._take_lines_back()
+                if await self._take_lines_back():
+                    continue  # meanwhile somebody may have flown its way
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
@@ -157,20 +159,33 @@ class OwnLegs:
         team = self._live.team
         gave_up = (m for m in team if m.withdrawal is not None and not m.withdrawal.done)
         if any(m.name not in self._sent_home and self._has_way(m) for m in gave_up):
-            return "nobody surveys any more"
+            return f"nobody surveys any more{self._left_words()}"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
         return f"{words} but {', '.join(m.name for m in left)}" if left else words
 
-    async def _take_lines_back(self) -> None:
-        """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet."""
+    def _left_words(self) -> str:
+        """Return how much of the mission's length is left, as words after a reason; '' where it is counted in steps."""
+        left, budget = remaining(self._spec, self._live.team), self._spec.budget
+        if budget.minutes is not None and left.minutes:
+            return f", {left.minutes:.0f} min before the mission's time is up"
+        if budget.km_per_vehicle is not None and left.km_per_vehicle:
+            return f", {left.km_per_vehicle:.1f} km before a vehicle has flown its way"
+        return ""
+
+    async def _take_lines_back(self) -> bool:
+        """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet.
+
+        Returns whether there were any.
+        """
         if not self._dispatch.left_lines:
-            return
+            return False
         planner, space = self._decider.planner, await self._live.in_thread(FreeSpace, self._constraints, 0.0)
         for name in list(self._dispatch.left_lines):
             place_m, ends_m = self._dispatch.left_lines.pop(name)
             planner.leave(name, space.nearest(place_m), np.array(ends_m).reshape(-1, 2))
         # What was stored with the legs has these as flown, and a restart would go on from that.
         await self._committing.remember(planner.snapshot())
+        return True
 
     def _all_seen(self) -> str:
         but = f" but {self._left_pct:.1f} % of the area, which lines do not see" if self._left_pct >= TOLD_PCT else ""

@@ -1,4 +1,4 @@
-"""Lines that vehicles leave in the middle, held or taken out of the mission: they go on with them where they left."""
+"""Lines that vehicles leave in the middle, which are flown on from there; missions that are left early."""
 
 import asyncio
 
@@ -8,10 +8,12 @@ from shapely import LineString
 from sqlalchemy import select
 
 from app.missions.running import homecoming
+from app.missions.service import MissionService
 from app.missions.states import MissionState
 from app.storage.database import Database
 from app.storage.models import WaypointRow
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state
+from tests.support.missions.specs import lon_lat
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.usefixtures("simulated_time")
@@ -47,3 +49,17 @@ async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
     assert LineString(again).buffer(1.0).covers(LineString(ends[missed]))
     # Legs that it did not begin take nothing of its way.
     assert live.team.named("a").spared == len(missed) - 1
+
+
+@pytest.mark.parametrize(("budget", "left"), [({"minutes": 90}, "90 min"), ({"km_per_vehicle": 2.0}, "2.0 km")])
+async def test_a_mission_whose_vehicles_all_came_home_early_says_how_much_of_it_is_left(
+    service: MissionService, budget: dict[str, float], left: str
+) -> None:
+    spec = sim_spec("a", budget=budget, planner={"name": "lawnmower"}, recovery={"point": lon_lat(15.0, 15.0)})
+    mission = (await service.create(spec)).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: live.team.named("a").legs, "it surveys")
+    await homecoming.call_home(live, "a", "Ana")
+    ended = await until_state(service, mission, MissionState.FINISHED)
+    assert ended.reason.startswith(f"nobody surveys any more, {left} before ")

@@ -171,7 +171,7 @@ class LegCommit:
         for en_m, depth_m in corners:
             member.legs += 1
             place = self._position(float(en_m[0]), float(en_m[1]), depth_m)
-            member.ahead.append(CommittedLeg(member.legs, place, np.asarray(en_m, dtype=np.float64)))
+            member.ahead.append(CommittedLeg(member.legs, place, np.asarray(en_m, dtype=np.float64), homeward=True))
 
     def begin_next(self, member: Member) -> None:
         """Make a vehicle's next leg its order."""

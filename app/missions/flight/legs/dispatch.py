@@ -209,7 +209,7 @@ class Dispatch:
             self._live.journal.waypoint(report)
         if not flown_to_m and member.report is not None:
             flown_to_m = [member.place_m(self._live.frame)]
-        if legs:
+        if legs and not legs[0].homeward:
             member.spared += len(legs)
             member.committed_m = max(member.committed_m - way_m([*flown_to_m, *ends_m], self._live.spec), 0.0)
         return ends_m
