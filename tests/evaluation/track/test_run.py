@@ -73,6 +73,10 @@ def test_whom_its_altimeter_lifts_gets_less_far_in_a_step() -> None:
     assert (floor - np.concatenate(places)[:, 2] >= scenario.clearance - 1e-9).all()
 
 
+def test_drift_that_is_reckoned_with_breaks_no_limit() -> None:
+    assert run_track(FADING, "random", OPTIONS).broken_constraints == 0
+
+
 def test_nobody_is_told_where_an_unseen_landmark_is() -> None:
     """Two worlds whose landmarks differ look the same before anything is seen."""
     far = replace(SMALL, visibility=0.01)
