@@ -63,6 +63,17 @@ export const dayAndTimeUtc = (date: Date): string =>
 export const day = (date: Date): string =>
   date.toLocaleDateString(locale.value, { dateStyle: "medium", timeZone: "UTC" });
 
+/** Of moments, newest first, those that begin another day than what is above them, which is now at first. */
+export function daysOf(times: readonly string[], now: number): (string | null)[] {
+  let above = new Date(now).toISOString().slice(0, 10);
+  return times.map((time) => {
+    const date = new Date(time);
+    const changed = date.toISOString().slice(0, 10) !== above;
+    above = date.toISOString().slice(0, 10);
+    return changed ? day(date) : null;
+  });
+}
+
 export function area(value_m2: number): string {
   return value_m2 < 1e6 ? `${count(Math.round(value_m2))} m²` : `${fixed(value_m2 / 1e6, 2)} km²`;
 }

@@ -1,6 +1,16 @@
 import { describe, expect, it } from "vitest";
 import type { AlarmView, EventView, LiveMessage, MissionView, VehicleView, WaypointView } from "../api/types";
-import { ageSeconds, allDecided, allWait, EMPTY_VIEW, nextOf, reduce, withEvents, withMission } from "./live";
+import {
+  ageSeconds,
+  allDecided,
+  allWait,
+  EMPTY_VIEW,
+  type LiveView,
+  nextOf,
+  reduce,
+  withEvents,
+  withMission,
+} from "./live";
 
 const vehicle = (
   name: string,
@@ -296,4 +306,12 @@ it("the service's clock counts where the page's is wrong, not what messages take
   expect(wrong.clockAhead_ms).toBe(3_600_000);
   expect(told(wrong, -3_599_200).clockAhead_ms).toBe(3_600_000);
   expect(told(wrong, 100).clockAhead_ms).toBe(-100);
+});
+
+it("what vehicles tell goes on to be kept for charts when the device's clock is set back", () => {
+  const heard = (view: LiveView, at: number) =>
+    reduce(view, { type: "vehicles", time: new Date(at).toISOString(), vehicles: [vehicle("a", 0, 0)] }, at);
+  const before = heard(withMission(EMPTY_VIEW, { vehicles: [] } as unknown as MissionView, 0), 7_200_000);
+  const after = heard(before, 3_600_000);
+  expect(after.samples.a).toHaveLength(2);
 });

@@ -111,7 +111,8 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
         mission: { ...view.mission, vehicles: message.vehicles },
         tracks: extendTracks(view.tracks, message.vehicles),
         vehiclesAt: at,
-        ...(at - view.sampledAt >= SAMPLE_PERIOD_MS
+        // A clock that is set back leaves no gap.
+        ...(Math.abs(at - view.sampledAt) >= SAMPLE_PERIOD_MS
           ? { samples: sampled(view.samples, message.vehicles, Date.parse(message.time)), sampledAt: at }
           : {}),
       };

@@ -151,6 +151,10 @@ export const WATCHING = {
   "log.wordsInTheLine": { en: "Words in the line", pt: "Palavras na linha" },
   "log.words": { en: "Words", pt: "Palavras" },
   "log.noLineIsLikeThat": { en: "No line is like that.", pt: "Não há linhas assim." },
+  "log.olderLines": {
+    en: "These are the newest {shown} lines. For older ones choose a kind, a vehicle or words above.",
+    pt: "Estas são as {shown} linhas mais recentes. Para as mais antigas escolha em cima um tipo, um veículo ou palavras.",
+  },
   "log.logNewestFirst": { en: "Log, newest first", pt: "Registo, do mais recente para o mais antigo" },
   "log.local": { en: "{it} local", pt: "{it} hora local" },
   "log.noteForTheLog": { en: "Note for the log", pt: "Nota para o registo" },

@@ -22,8 +22,10 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
     return <Mark name={past.name} colour={past.colour} heading_deg={heading} age="" title={past.name} />;
   }
   if (!vehicle) return null;
-  const { name, heading_deg, link, active, breach } = vehicle.view;
-  const old = vehicle.stale || link === "lost" || link === "unknown";
+  const { name, kind, heading_deg, link, active, breach } = vehicle.view;
+  // A simulation that is over is nobody who ought to be heard.
+  const away = kind === "sim" && link === "unknown";
+  const old = !away && (vehicle.stale || link === "lost" || link === "unknown");
   return (
     <Mark
       name={name}
@@ -34,7 +36,7 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
       left={!active}
       alarm={breach}
       age={old ? age(vehicle.age_s) : ""}
-      title={`${name}${vehicle.stale ? say("marks.lastHeardAgo", { ageS: age(vehicle.age_s) }) : ""}`}
+      title={`${name}${vehicle.stale && !away ? say("marks.lastHeardAgo", { ageS: age(vehicle.age_s) }) : ""}`}
     />
   );
 }

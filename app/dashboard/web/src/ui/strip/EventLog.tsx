@@ -3,11 +3,11 @@ import { useComputed, useSignal } from "@preact/signals";
 import { api } from "../../api/client";
 import type { EventView, Level } from "../../api/types";
 import { whyNotCommand } from "../../state/access";
-import { clock } from "../../state/format";
+import { clock, daysOf } from "../../state/format";
 import { vehicleOf } from "../../state/past/placeThen";
 import { showEvent } from "../../state/past/whereabouts";
 import { said } from "../../state/session";
-import { selectedId, view } from "../../state/store";
+import { selectedId, serviceNow, view } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, Choice, into, same, Typed } from "../parts/Controls";
 
@@ -30,13 +30,18 @@ export function EventLog() {
   const named = useComputed(() => [...new Set(view.value.events.flatMap((e) => vehicleOf(e) ?? []))].sort());
   const kinds = useComputed(() => [...new Set(view.value.events.map((e) => e.kind))].sort());
   const wanted = words.value.trim().toLowerCase();
-  const lines = view.value.events
+  const found = view.value.events
     .filter((e) => least.value !== "important" || e.level !== "info")
     .filter((e) => least.value !== "notes" || e.kind === "note")
     .filter((e) => kind.value === "" || e.kind === kind.value)
     .filter((e) => vehicle.value === "" || vehicleOf(e) === vehicle.value)
     .filter((e) => wanted === "" || `${e.message} ${e.kind}`.toLowerCase().includes(wanted))
-    .slice(-MOST_SHOWN);
+    .reverse();
+  const lines = found.slice(0, MOST_SHOWN);
+  const days = daysOf(
+    lines.map(({ time }) => time),
+    serviceNow.value,
+  );
   return (
     <div class="log" data-testid="log">
       <NoteForm />
@@ -71,8 +76,9 @@ export function EventLog() {
       </div>
       {lines.length === 0 ? <p class="empty">{say("log.noLineIsLikeThat")}</p> : null}
       <ol aria-label={say("log.logNewestFirst")}>
-        {lines.reverse().map((event) => (
+        {lines.map((event, i) => (
           <li key={event.id} class={`${event.level}${event.kind === "note" ? " note" : ""}`}>
+            {days[i] == null ? null : <b class="day">{days[i]}</b>}
             <time
               dateTime={event.time}
               title={say("log.local", { it: clock(new Date(event.time), "local") })}
@@ -99,6 +105,7 @@ export function EventLog() {
           </li>
         ))}
       </ol>
+      {found.length > MOST_SHOWN ? <p class="empty">{say("log.olderLines", { shown: MOST_SHOWN })}</p> : null}
     </div>
   );
 }
