@@ -395,6 +395,13 @@ class Team:
             m for m in self.members.values() if m.withdrawal is not None and m.withdrawal.over and m.report is not None
         ]
 
+    def awaits_batteries(self, spec: MissionSpec) -> bool:
+        """Whether nobody surveys, and who is home with some of its way left, or goes there, is waited for."""
+        if spec.recovery is None or not spec.recovery.wait_for_batteries or spec.search is not None or self.going_on:
+            return False
+        called = [m.withdrawal for m in self.members.values() if m.withdrawal is not None]
+        return any(one.response is Response.RETURN and not one.done for one in called)
+
     @property
     def held(self) -> list[Member]:
         """Those that wait where they are, for a person or for something to be over, and may survey again."""

@@ -140,6 +140,9 @@ class OwnLegs:
                     self._again_at_s.pop(name, None)
                 if await self._take_lines_back():
                     continue  # meanwhile somebody may have flown its way
+                if self._awaits_batteries:
+                    await self._waiting.for_batteries(self._left_words())
+                    continue
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
@@ -210,6 +213,7 @@ class OwnLegs:
                 or self._orders.waiting
                 or self._over()
                 or self._nobody_to_lead
+                or self._awaits_batteries
                 or bool(self._flown_out())
                 or sending.done()
             ),
@@ -483,7 +487,8 @@ class OwnLegs:
             if (self._wants_legs(m) and (m.name not in self._done or m.asked is not None)) or m.ordered or m.ahead
         ]
         if not left:
-            return bool(list(self._live.team)) and not any(self._has_way(m) for m in self._live.team.held)
+            held = any(self._has_way(m) for m in self._live.team.held)
+            return bool(list(self._live.team)) and not held and not self._awaits_batteries
         names = {m.name for m in left}
         somebody_is_done = self._somebody_is_home or any(m.present for m in team if m.name not in names)
         if any(m.present and not (somebody_is_done and m.misses >= NOT_WAITED_FOR) for m in left):
@@ -492,6 +497,13 @@ class OwnLegs:
             return False
         patience_s = self._spec.step_deadline_s / self._time_scale
         return all(m.present or self._absent_s(m) >= patience_s for m in left)
+
+    @property
+    def _awaits_batteries(self) -> bool:
+        """Whether nobody surveys, and somebody may do so again with another battery."""
+        if not self._live.team.awaits_batteries(self._spec):
+            return False
+        return any(self._has_way(m) and m.name not in self._sent_home for m in self._live.team)
 
     @property
     def _somebody_is_home(self) -> bool:

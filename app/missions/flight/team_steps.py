@@ -61,7 +61,12 @@ class TeamSteps:
             await self._dispatch.begin()
             await self._arrive(self._deadline_s())
         decision: Decision | None = None
-        while live.header.step < self._spec.steps and (self._somebody_surveys or live.team.held):
+        while live.header.step < self._spec.steps and (
+            self._somebody_surveys or live.team.held or live.team.awaits_batteries(self._spec)
+        ):
+            if live.team.awaits_batteries(self._spec):
+                await self._waiting.for_batteries(f", {self._spec.steps - live.header.step} steps before the end")
+                continue
             if not self._somebody_surveys:
                 await self._waiting.until(lambda: self._somebody_surveys or not live.team.held, None)
                 continue

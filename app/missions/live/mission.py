@@ -493,7 +493,8 @@ class LiveMission:
         if self.search is not None:
             return max(self.search.left_s(), 0.0) / self._time_scale
         if list(self.team) and not self.team.going_on:
-            return 0.0  # what they still fly is their way home
+            # What they still fly is their way home.
+            return None if self.team.awaits_batteries(self.spec) else 0.0
         left = remaining(self.spec, self.team)
         if left.minutes is not None and self.header.state not in NOT_STARTED:
             return 60.0 * left.minutes / self._time_scale

@@ -35,3 +35,8 @@ class Recovery(Model):
         default=Homecoming.RETURN,
         description="What a vehicle does whose link was lost for long, once it is heard again",
     )
+    wait_for_batteries: bool = Field(
+        default=False,
+        description="Whether a mission goes on while all are home with some of their way left, until one is resumed "
+        "with another battery; otherwise it is finished then",
+    )

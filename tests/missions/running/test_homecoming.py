@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
+from app.missions.alarm_kinds import AlarmKind
 from app.missions.errors import ConflictError
 from app.missions.fleet.interface import FaultKind
 from app.missions.fleet.links.sim import SimFleetLink
@@ -378,6 +379,67 @@ async def test_who_is_sent_on_while_nobody_else_surveys_goes_on(
     ended = await until_ended(service, mission.id)
     assert (ended.state, ended.vehicles[0].phase) == (MissionState.FINISHED, Phase.HOME)
     assert limits or ended.reason == "nobody surveys any more"
+
+
+WAITS: dict[str, Any] = {"recovery": {"wait_for_batteries": True}}
+
+
+@pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
+async def test_a_mission_may_wait_until_its_only_vehicle_has_another_battery(
+    harbour: Harbour, limits: dict[str, Any]
+) -> None:
+    service = harbour.service
+    mission = await service.create(recovered("a", steps=9, **(WAITS | ({"limits": limits} if limits else {}))))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+
+    async def home_again(times: int) -> MissionView:
+        live = await service.get(mission.id)
+        await call_home(live, "a", "Ana")
+
+        async def told() -> bool:
+            return (
+                len([w for w in await words_of(service, mission, "waiting") if "every vehicle is home" in w]) == times
+            )
+
+        await until(told, "the operator is told")
+        return await view_of(service, mission.id)
+
+    waits = await home_again(1)
+    assert (waits.state, waits.vehicles[0].phase, waits.progress.eta_s) == (MissionState.RUNNING, Phase.HOME, None)
+    assert (await words_of(service, mission, "waiting"))[0].endswith(
+        ": resume who has another battery, or finish the mission"
+    )
+    # Also when the service is started anew meanwhile.
+    service = await harbour.reopen()
+    await service.missions()
+    live = await service.get(mission.id)
+    a = live.team.members["a"]
+    before = a.legs
+    await service.send_on(live, "a", "Ana")
+    await until(lambda: a.legs > before, "a surveys again")
+    await until(lambda: not live.journal.alarms.standing([AlarmKind.NO_VEHICLE]), "the alarm is over")
+    ended = await until_ended(service, mission.id)
+    assert (ended.state, ended.vehicles[0].phase) == (MissionState.FINISHED, Phase.HOME)
+    assert ended.reason in ("every step is done", "everybody has flown its way")
+
+
+async def test_a_mission_that_waits_for_batteries_can_be_finished(service: MissionService) -> None:
+    mission = await service.create(recovered("a", "b", steps=1000, **WAITS))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    for name in ("a", "b"):
+        await call_home(live, name, "Ana")
+
+    async def told() -> bool:
+        return bool(await words_of(service, mission, "waiting"))
+
+    await until(told, "both are home, and the operator is told")
+    await act(service, mission.id, "finish", actor="Ana")
+    ended = await until_state(service, mission.id, MissionState.FINISHED)
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+    assert not live.journal.alarms.standing([AlarmKind.NO_VEHICLE])
 
 
 async def test_who_joins_while_everybody_goes_home_surveys_and_comes_home_too(service: MissionService) -> None:

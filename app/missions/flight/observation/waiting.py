@@ -42,6 +42,24 @@ class Waiting:
             await self._for_anybody()
         return await self._note_over()
 
+    async def for_batteries(self, left: str) -> None:
+        """Wait until one that is home for another battery is resumed, or nobody is waited for any more.
+
+        ``left``: how much of the mission is left, as words after others.
+        """
+        live, team = self._live, self._live.team
+
+        def home() -> bool:
+            return all(member.withdrawal is not None and member.withdrawal.over for member in team)
+
+        await self.until(lambda: not team.awaits_batteries(live.spec) or home(), None)
+        if team.awaits_batteries(live.spec):
+            if not live.journal.alarms.standing([AlarmKind.NO_VEHICLE]):
+                message = f"every vehicle is home{left}: resume who has another battery, or finish the mission"
+                await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=[member.name for member in team])
+            await self.until(lambda: not team.awaits_batteries(live.spec), None)
+        await self._note_over()
+
     async def _for_anybody(self) -> None:
         live, team = self._live, self._live.team
         absent = [member.name for member in team]

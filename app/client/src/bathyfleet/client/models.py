@@ -1510,6 +1510,10 @@ class Recovery(Model):
     """What a vehicle does when its energy is just enough for its way home"""
     on_lost_link: Homecoming = "return"
     """What a vehicle does whose link was lost for long, once it is heard again"""
+    wait_for_batteries: bool = False
+    """Whether a mission goes on while all are home with some of their way left, until one is resumed with another
+    battery; otherwise it is finished then
+    """
 
 
 class ReferenceView(Model):

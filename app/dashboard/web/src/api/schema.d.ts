@@ -1496,7 +1496,8 @@ export interface paths {
          * Post scans
          * @description Store scans of a mission of kind search, and add them to what is known of its site.
          *
-         *     Each scan has its own verdict; one that came before, by its vehicle and time, is a duplicate. Vehicles of any kind
+         *     Each scan has its own verdict: one that cannot be read is rejected with the reason, the others are stored; one that
+         *     came before, by its vehicle and time, is a duplicate. Vehicles of any kind
          *     but sim may have a computer that posts: those that are commanded over IMC, too.
          */
         post: operations["postScans"];
@@ -5191,6 +5192,12 @@ export interface components {
              * @default return
              */
             on_lost_link: components["schemas"]["Homecoming"];
+            /**
+             * Wait For Batteries
+             * @description Whether a mission goes on while all are home with some of their way left, until one is resumed with another battery; otherwise it is finished then
+             * @default false
+             */
+            wait_for_batteries: boolean;
         };
         /**
          * ReferenceView

@@ -253,6 +253,7 @@ export const PLANNING = {
   "fields.onFinish": { en: "On finish", pt: "Ao terminar" },
   "fields.onLowEnergy": { en: "On low energy", pt: "Com energia baixa" },
   "fields.onALostLink": { en: "On a lost link", pt: "Com ligação perdida" },
+  "fields.waitForBatteries": { en: "Wait for other batteries", pt: "Esperar por outras baterias" },
   "fields.heightAboveBottom": { en: "Height above bottom", pt: "Altura ao fundo" },
   "fields.endurance": { en: "Endurance", pt: "Autonomia" },
   "fields.aperture": { en: "Aperture", pt: "Abertura" },

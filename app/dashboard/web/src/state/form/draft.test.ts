@@ -290,6 +290,7 @@ describe("recovery", () => {
       on_finish: "return",
       on_low_energy: "return",
       on_lost_link: "stop",
+      wait_for_batteries: false,
     });
     expect(mission.vehicles[1]).toMatchObject({
       altitude_m: 4,

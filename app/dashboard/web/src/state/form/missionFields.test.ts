@@ -39,7 +39,9 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
   const least = schema.minimum ?? schema.exclusiveMinimum ?? 0;
   const inside = Math.ceil(0.3 * least + 0.7 * (schema.maximum ?? least + 20));
   const other = schema.enum?.find((choice) => choice !== schema.default);
-  const text = other ?? String(inside / (field.factor ?? 1));
+  const isSwitch = schema.type === "boolean";
+  const switched = isSwitch ? !schema.default : undefined;
+  const text = String(other ?? switched ?? inside / (field.factor ?? 1));
   const length = field.part === "length" ? { length: name as LengthUnit } : {};
 
   it("begins with what the service takes where nothing is said", () => {
@@ -52,7 +54,7 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
 
   it("is held to the service's bounds", () => {
     const past = [least - 1, ...(schema.maximum === undefined ? [] : [schema.maximum + 1])];
-    const wrong = other ? [] : past;
+    const wrong = other || isSwitch ? [] : past;
     for (const value of wrong) {
       const faults = faultsOf(draftWith({ ...length, [name]: String(value / (field.factor ?? 1)) }, kind));
       expect(faults[name]).toContain(`${field.label} must be`);
@@ -66,7 +68,7 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
       kind,
     );
     const mission = toMission(draft);
-    expect(valueAt(mission, field.path)).toBe(other ?? Number(text) * (field.factor ?? 1));
+    expect(valueAt(mission, field.path)).toBe(other ?? switched ?? Number(text) * (field.factor ?? 1));
     expect(copyOf(shown(mission))).toMatchObject({ ...length, [name]: text });
     expect(fieldOf(field.path)).toBe(name);
   });

@@ -370,6 +370,14 @@ export const FIELDS = {
       return say("fields.onALostLink");
     },
   },
+  wait_for_batteries: {
+    path: "recovery.wait_for_batteries",
+    part: "recovery",
+    get label() {
+      return say("fields.waitForBatteries");
+    },
+    kind: "survey",
+  },
 } as const satisfies Record<string, Field>;
 
 /** The numbers that a single vehicle may have of its own. */
