@@ -28,6 +28,7 @@ from app.missions.forecast.preview import PlanPreviews
 from app.missions.forecast.request import Forecaster
 from app.missions.live.header import Ending
 from app.missions.live.mission import LiveMission
+from app.missions.live.threads import make_threads
 from app.missions.operations.corrections.recorrection import check_level_is_known
 from app.missions.operations.imports.imports import Imports
 from app.missions.operations.imports.reader_process import Reader
@@ -67,7 +68,7 @@ from app.storage.upkeep.retention import finish_removing
 
 log = structlog.get_logger(__name__)
 
-WORKERS = 2
+COMPILERS = 2
 
 
 class MissionService:
@@ -117,20 +118,20 @@ class MissionService:
         self._processes = WorkProcesses()
         self.compute = Compute(settings.compute, self._processes)
         """Does what computes long."""
-        self._executor = ThreadPoolExecutor(WORKERS, thread_name_prefix="planning")
+        self._threads = make_threads()
         self._claims = Claims(self.hub)
         self.maps = FinalMaps()
         """Maps that are made while nobody waits for them."""
         self.map_pictures = MapPictures()
         """Pictures of maps for web maps and GIS."""
-        self._compiling = ThreadPoolExecutor(WORKERS, thread_name_prefix="compiling")
+        self._compiling = ThreadPoolExecutor(COMPILERS, thread_name_prefix="compiling")
         self._compilation = Compilation(self._compiling)
         self.forecaster = Forecaster(self.hub, self._compilation, self.compute)
         """Flies missions ahead."""
         self.previews = PlanPreviews(self.hub, self._compilation)
         """Plans of missions that are being described."""
         self._supervisor = MissionSupervisor(
-            self.hub, self._claims, self._executor, self.maps, self._compilation, settings
+            self.hub, self._claims, self._threads.planning, self.maps, self._compilation, settings
         )
         self._runs = self._supervisor.runs
         self.team_changes = TeamChanges(self.hub, self._claims, self._supervisor)
@@ -141,7 +142,7 @@ class MissionService:
         self._registry = MissionRegistry(
             database,
             self.hub,
-            self._executor,
+            self._threads,
             self.maps,
             self._ping_files,
             settings.time_scale,
@@ -207,7 +208,7 @@ class MissionService:
         await self.process.leave()
         self._compilation.end()
         self._compiling.shutdown(wait=True, cancel_futures=True)
-        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._threads.close()
         await self.compute.close()
         self.forecaster.close()
         self.previews.close()

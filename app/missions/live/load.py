@@ -1,7 +1,6 @@
 """Takes a mission up from the database, as it was last committed."""
 
 import asyncio
-from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 
@@ -13,6 +12,7 @@ from app.missions.flown import Flown
 from app.missions.live.header import StoredMission
 from app.missions.live.journals.journal import RISES, Counts
 from app.missions.live.mission import LiveMission, builder_of
+from app.missions.live.threads import Threads
 from app.missions.search.scan_log import report_of
 from app.missions.search.state import Search
 from app.missions.soundings.adjustment import TrackAdjustment
@@ -36,7 +36,7 @@ from app.storage.queries import telemetry as telemetry_queries
 async def take_up(
     database: Database,
     hub: FleetHub,
-    executor: Executor,
+    threads: Threads,
     row: MissionRow,
     ping_files: PingFiles,
     time_scale: float = 1.0,
@@ -59,28 +59,28 @@ async def take_up(
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
     loop = asyncio.get_running_loop()
-    spec = await loop.run_in_executor(executor, stored_spec, row)
+    spec = await loop.run_in_executor(threads.planning, stored_spec, row)
     table = None
     if tide is not None:
-        table = await loop.run_in_executor(executor, partial(parse_tid, tide.text, name=tide.name))
+        table = await loop.run_in_executor(threads.planning, partial(parse_tid, tide.text, name=tide.name))
     adjustment = None
     if drift is not None:
-        adjustment = await loop.run_in_executor(executor, TrackAdjustment.unpack, drift.content)
+        adjustment = await loop.run_in_executor(threads.planning, TrackAdjustment.unpack, drift.content)
     search = None
     if spec.search is not None:
-        search = await loop.run_in_executor(executor, Search, spec, spec.search, spec.frame(), time_scale)
+        search = await loop.run_in_executor(threads.planning, Search, spec, spec.search, spec.frame(), time_scale)
     counts = Counts(stored.accepted, stored.rejected)
     # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
     builder = await asyncio.to_thread(builder_of, spec)
     mission = StoredMission(row, spec, counts, table, adjustment)
-    live = LiveMission(database, hub, executor, ping_files, time_scale, mission, search, builder)
+    live = LiveMission(database, hub, threads, ping_files, time_scale, mission, search, builder)
     async with database.reading() as session:
         pinged = await live.pings.open(session)
     live.journal.alarms.recall(standing)
     live.boundaries.recall(live.journal.alarms.standing([AlarmKind.ZONE_ENTERED, AlarmKind.AREA_LEFT]))
     live.journal.counts = replace(counts, pings=pinged.pings, beams=pinged.beams, rejected_pings=pinged.rejected)
     if spec.targets:
-        await loop.run_in_executor(executor, tracking_warm_up)
+        await loop.run_in_executor(threads.planning, tracking_warm_up)
         async with database.reading() as session:
             await live.ranges.load(session, step)
     await live.whole.show(stored, imported, imported=prior, ended=live.header.state in ENDED)

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -28,6 +27,7 @@ from app.missions.live.journals.swath_intake import SwathIntake
 from app.missions.live.remaining import remaining, within_window
 from app.missions.live.ships import ShipsAbout
 from app.missions.live.sounding_store import SoundingStore
+from app.missions.live.threads import Threads
 from app.missions.live.trails import Trails
 from app.missions.live.vehicle_reports import VehicleReports
 from app.missions.live.watchers.broadcast import Broadcaster
@@ -76,7 +76,7 @@ class LiveMission:
         self,
         database: Database,
         hub: FleetHub,
-        executor: Executor,
+        threads: Threads,
         ping_files: PingFiles,
         time_scale: float,
         stored: StoredMission,
@@ -167,7 +167,7 @@ class LiveMission:
         """Ships near the mission."""
         self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ships.message)
         self._time_scale = time_scale
-        self._executor = executor
+        self._threads = threads
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
         self.notice_imports = Shared(self._notice_imports)
         """Take up the soundings of logs that the command line imported while this process had the mission."""
@@ -371,14 +371,18 @@ class LiveMission:
         self.builder.elsewhere = compute.in_thread
 
     async def mapped(self, work: Callable[..., Made], *arguments: Any) -> Made:
-        """Have the builder make a map in a worker thread; planning threads do not wait for a cluster."""
+        """Have the builder make a map in a worker thread that no vehicle waits for."""
         many = self.compute is not None and self.journal.counts.accepted >= HEAVY
         waiting = self.compute.waiting if self.compute is not None and many else None
-        return await asyncio.get_running_loop().run_in_executor(waiting or self._executor, work, *arguments)
+        return await asyncio.get_running_loop().run_in_executor(waiting or self._threads.making, work, *arguments)
 
     async def in_thread(self, work: Callable[..., Made], *arguments: Any) -> Made:
-        """Compute something in a worker thread."""
-        return await asyncio.get_running_loop().run_in_executor(self._executor, work, *arguments)
+        """Compute something that a vehicle may wait for, or that takes a moment, in a worker thread."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads.planning, work, *arguments)
+
+    async def in_background(self, work: Callable[..., Made], *arguments: Any) -> Made:
+        """Compute something that takes long where no vehicle waits for it."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads.making, work, *arguments)
 
     @property
     def facts(self) -> MissionFacts:

@@ -219,7 +219,7 @@ class Sites:
         """Let a mission that did not start yet begin with what its site knows now, in place of what it knew before."""
         spec = live.spec
         site = await self._map(spec.site) if spec.site is not None and spec.site_prior else None
-        rows = np.zeros((0, 4)) if site is None else await live.in_thread(_prior, site, live)
+        rows = np.zeros((0, 4)) if site is None else await live.in_background(_prior, site, live)
         if site is None or not len(rows):
             await self._imports.begin_with(live, None)
             return

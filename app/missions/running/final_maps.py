@@ -19,7 +19,7 @@ class FinalMaps:
     """Makes maps beside everything else: no state changes and no vehicle waits for one."""
 
     def __init__(self) -> None:
-        # Those of missions that were taken up come one at a time, so that planning has a thread.
+        # Those of missions that were taken up come one at a time: a map that somebody asks for has a thread, too.
         self._one_at_a_time = asyncio.Lock()
         self._taken_up: dict[str, asyncio.Task[None]] = {}
         self._last: dict[str, asyncio.Task[None]] = {}

@@ -3,7 +3,6 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import partial
 
@@ -24,6 +23,7 @@ from app.missions.errors import (
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import stored_spec, take_up
 from app.missions.live.mission import LiveMission
+from app.missions.live.threads import Threads
 from app.missions.running.ended_missions import EndedMissions, store_summary
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
@@ -56,7 +56,7 @@ class MissionRegistry:
         self,
         database: Database,
         hub: FleetHub,
-        executor: Executor,
+        threads: Threads,
         maps: FinalMaps,
         ping_files: PingFiles,
         time_scale: float,
@@ -65,7 +65,7 @@ class MissionRegistry:
     ) -> None:
         self._database = database
         self._hub = hub
-        self._executor = executor
+        self._threads = threads
         self._maps = maps
         self._ping_files = ping_files
         self._time_scale = time_scale
@@ -152,7 +152,7 @@ class MissionRegistry:
                 async with database.reading() as session:
                     row = await session.get_one(MissionRow, mission_id)
             with _opening(mission_id):
-                live = await take_up(database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+                live = await take_up(database, self._hub, self._threads, row, self._ping_files, self._time_scale)
             if row.summary is not None:
                 await store_summary(live, None)
             live.ships.traffic = self._traffic
@@ -203,7 +203,7 @@ class MissionRegistry:
         """
         try:
             with _opening(row.id):
-                live = await take_up(self._database, self._hub, self._executor, row, self._ping_files, self._time_scale)
+                live = await take_up(self._database, self._hub, self._threads, row, self._ping_files, self._time_scale)
         except MissionUnreadableError as error:
             log.exception("a mission is refused that could not be opened", name=row.name)
             words = f"no mission can be made of it: {_reason(error.__cause__)}"

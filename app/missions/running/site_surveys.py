@@ -40,7 +40,7 @@ async def keep_survey(live: LiveMission) -> None:
         survey, content = None, b""
     else:
         survey = survey_of(own, period[1], live.facts.common_sd_m)
-        content = await live.in_thread(pack_survey, survey, live.frame)
+        content = await live.in_background(pack_survey, survey, live.frame)
     async with live.journal.writing:
         if live.map_is_missing or live.builder.arrivals.at_rest or made_of != _made_of(live):
             return  # Something else is the case by now.

@@ -10,13 +10,15 @@ import pytest
 
 from app.missions.errors import ConflictError, MissionError
 from app.missions.fleet.interface import LinkState
+from app.missions.live.threads import WORKERS
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.corrections.recorrection import corrections_view, set_tide
 from app.missions.operations.corrections.review import rule, soundings_page
 from app.missions.operations.history import write_note
-from app.missions.operations.maps.mission_maps import newest_map
+from app.missions.operations.maps.mission_maps import export, newest_map
 from app.missions.operations.measurements import measure
-from app.missions.service import WORKERS, MissionService
+from app.missions.service import MissionService
+from app.missions.settings import ProviderSettings
 from app.missions.states import Action, MissionState, MoveRefusedError
 from app.missions.views.measurements.corrections import TideCorrection
 from app.missions.views.measurements.soundings import Ruling
@@ -79,7 +81,9 @@ async def test_a_mission_ends_before_its_last_map_is_made(service: MissionServic
     assert snapshot.built.soundings == (await view_of(service, mission)).progress.soundings
 
 
-async def test_an_abort_answers_while_all_planning_threads_are_taken(service: MissionService, held_maps: Hold) -> None:
+async def test_an_abort_answers_while_all_threads_that_make_maps_are_taken(
+    service: MissionService, held_maps: Hold
+) -> None:
     """Maps of other missions, being made for someone's download."""
     other = (await service.create(make_spec())).id
     await measure(await service.get(other), measured())
@@ -88,7 +92,11 @@ async def test_an_abort_answers_while_all_planning_threads_are_taken(service: Mi
     await until_step(service, mission, 1)
     maps = [asyncio.create_task(newest_map(await service.get(other), service.maps)) for _ in range(WORKERS)]
     await until(held_maps.begun.is_set, "they are begun")
+    step = (await view_of(service, mission)).progress.step
+    await until_step(service, mission, step + 5)  # more than was decided: vehicles do not wait for them
     async with asyncio.timeout(LONG_S):
+        ways = await export(await service.get(mission), service.maps, ProviderSettings(), service.compute, "tracks.geojson")
+        assert ways.content
         one = await service.team_changes.stop_one(await service.get(mission), "c", actor="operator")
         assert [(stop.vehicle, stop.acknowledged) for stop in one] == [("c", True)]
         rest = await act(service, mission, "abort", actor="Ana")

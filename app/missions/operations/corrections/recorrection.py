@@ -62,7 +62,7 @@ async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> Corre
     row: TideTableRow | None = None
     if tide.table is not None:
         try:
-            table = await live.in_thread(partial(parse_tid, tide.table, name=tide.table_name))
+            table = await live.in_background(partial(parse_tid, tide.table, name=tide.table_name))
         except TideTableError as error:
             raise InvalidRequestError("table", str(error), "correct that line and send the whole table again") from None
         row = TideTableRow(mission_id=live.id, name=table.name, text=tide.table)
@@ -238,7 +238,9 @@ async def _recorrected_pieces(live: LiveMission, corrections: Corrections) -> li
         if not rows:
             return found
         after = rows[-1].id
-        found.append(await live.in_thread(lambda rows: _Changed.of(recorrected(rows, corrections, live.gate)), rows))
+        found.append(
+            await live.in_background(lambda rows: _Changed.of(recorrected(rows, corrections, live.gate)), rows)
+        )
 
 
 def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gate) -> list[dict[str, Any]]:

@@ -117,7 +117,7 @@ class Imports:
             if known is not None:
                 return known
             found = await self._reader.read(upload, kind, "soundings", _place(live), _read_options(options))
-            kept, merged = await live.in_thread(_kept, live, found.values)
+            kept, merged = await live.in_background(_kept, live, found.values)
             if not len(kept):
                 wrong = "none of its depths lies near the mission's area"
                 raise InvalidRequestError("file", wrong, "check file and crs")
@@ -178,7 +178,7 @@ class Imports:
             known = [row for row in await _rows_of(session, live.id) if row.summary.get("site")]
         row = None
         if depths is not None:
-            kept, merged = await live.in_thread(_kept, live, depths)
+            kept, merged = await live.in_background(_kept, live, depths)
             notes = [f"{merged} depths were merged per cell of the map"] if merged else []
             row = await asyncio.to_thread(_row_of_site, live, kept, len(depths), dict(described or {}), notes)
             if [(one.digest, one.summary["notes"]) for one in known] == [(row.digest, row.summary["notes"])]:

@@ -139,7 +139,10 @@ async def export(
     try:
         if snapshot is not None and snapshot.large:
             return await compute.make(make_product, name, material, chosen)
-        return await live.in_thread(make_product, name, material, chosen)
+        if snapshot is None:
+            # The page asks for ways again and again: they wait for no map.
+            return await asyncio.to_thread(make_product, name, material, chosen)
+        return await live.in_background(make_product, name, material, chosen)
     except OSError as error:
         if error.errno != errno.ENOSPC:
             raise
