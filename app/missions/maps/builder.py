@@ -133,7 +133,6 @@ class MapBuilder:
             self._nodes = self.mask.copy()
         self.elsewhere: Callable[..., Any] = _here
         """Computes a function of a module with its arguments, in place of the thread that asks."""
-        self._away = False
         self._nodes_xy = self.grid.centres_m[self._nodes.ravel()]
         self.arrivals = MapQueue()
         self.live = LiveGrid(self.grid, self.mask) if live else None
@@ -212,33 +211,39 @@ class MapBuilder:
         """Make a map of everything added so far; None without soundings.
 
         Gross outliers are judged by ``learn``; a sounding that came since is trusted until then. A thorough map judges
-        every sounding and learns the model first, as a product should. While the soundings are not in memory, or a
-        thorough map is made elsewhere, the newest map stays as it is: no decision waits for a cluster.
+        every sounding and learns the model first, as a product should. While the soundings are not in memory, or
+        another map is being made, the newest map stays as it is: no decision waits for what somebody else asked for.
         """
-        if self._away and not thorough and self._newest is not None:
+        if not self._building.acquire(blocking=thorough or self._newest is None):
             return self._newest
-        with self._building:
-            came = self.arrivals.take()
-            if came is None:
-                return self._newest
-            upto, generation = self.arrivals.taken, self._generation
-            self._take_in(came[0])
-            if self.live is not None and (generation != self._generation or self.live.outgrown(len(self._soundings))):
-                self.live.begin_anew(self._soundings, upto)
-            beams = self.swath.beams
-            if thorough and self._newest is not None and self._newest.thorough and not came[0] and not beams:
-                return self._newest  # who asked for it at the same time has made it
-            if not len(self._soundings) and self._prior is None and not beams:
-                self._newest = None
-                return None
-            own = self._learn(self._compute(thorough=True), always=True, mapping=not beams) if thorough else None
-            if came[0] or beams != self._beams_mapped or (self._newest is not None and thorough):
-                self._newest = self._build(own, thorough=thorough)
-                self._beams_mapped = beams
-                self._replaced_mapped = came[1]
-                if self.live is not None:
-                    self.live.settle(self._soundings, upto)
+        try:
+            return self._make(thorough=thorough)
+        finally:
+            self._building.release()
+
+    def _make(self, *, thorough: bool) -> BuiltMap | None:
+        """Do so, alone."""
+        came = self.arrivals.take()
+        if came is None:
             return self._newest
+        upto, generation = self.arrivals.taken, self._generation
+        self._take_in(came[0])
+        if self.live is not None and (generation != self._generation or self.live.outgrown(len(self._soundings))):
+            self.live.begin_anew(self._soundings, upto)
+        beams = self.swath.beams
+        if thorough and self._newest is not None and self._newest.thorough and not came[0] and not beams:
+            return self._newest  # who asked for it at the same time has made it
+        if not len(self._soundings) and self._prior is None and not beams:
+            self._newest = None
+            return None
+        own = self._learn(self._compute(thorough=True), always=True, mapping=not beams) if thorough else None
+        if came[0] or beams != self._beams_mapped or (self._newest is not None and thorough):
+            self._newest = self._build(own, thorough=thorough)
+            self._beams_mapped = beams
+            self._replaced_mapped = came[1]
+            if self.live is not None:
+                self.live.settle(self._soundings, upto)
+        return self._newest
 
     def _take_in(self, came: list[SoundingRows | Replacement]) -> None:
         """Add what came."""
@@ -304,14 +309,7 @@ class MapBuilder:
 
     def _compute(self, *, thorough: bool) -> Callable[..., Any]:
         """Return who computes: maps that vehicles are led by are always made here."""
-        return self._elsewhere if thorough and len(self._soundings) >= HEAVY else _here
-
-    def _elsewhere(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        self._away = True
-        try:
-            return self.elsewhere(work, *arguments)
-        finally:
-            self._away = False
+        return self.elsewhere if thorough and len(self._soundings) >= HEAVY else _here
 
     def _measured(self, compute: Callable[..., Any]) -> BathymetricMap:
         """Return the map of the mission's own soundings."""

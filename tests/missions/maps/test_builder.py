@@ -53,17 +53,19 @@ def test_a_map_of_its_own_soundings_knows_nothing_of_imported_ones() -> None:
     assert np.abs(fused.map.depth_m - own.depth_m).max() > 0.03
 
 
-def test_no_decision_waits_for_a_map_that_is_made_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(builder_module, "HEAVY", 1)
+@pytest.mark.parametrize("heavy", [1, 10**9], ids=["elsewhere", "here"])
+def test_no_decision_waits_for_a_thorough_map(monkeypatch: pytest.MonkeyPatch, heavy: int) -> None:
+    monkeypatch.setattr(builder_module, "HEAVY", heavy)
     builder = built_of(soundings(60))
     newest, begun, go_on = builder.newest, threading.Event(), threading.Event()
 
-    def elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:
+    def held(work: Callable[..., Any], *arguments: Any) -> Any:
         begun.set()
         assert go_on.wait(240)
         return work(*arguments)
 
-    builder.elsewhere = elsewhere
+    builder.elsewhere = held
+    monkeypatch.setattr(builder_module, "_here", held)
     with ThreadPoolExecutor(1) as pool:
         thorough = pool.submit(builder.build, thorough=True)
         assert begun.wait(240)
@@ -71,6 +73,7 @@ def test_no_decision_waits_for_a_map_that_is_made_elsewhere(monkeypatch: pytest.
         assert builder.build() is newest
         go_on.set()
         made = thorough.result()
+    monkeypatch.undo()
     assert made is not None
     assert made.thorough
     after = builder.build()

@@ -95,7 +95,9 @@ async def test_an_abort_answers_while_all_threads_that_make_maps_are_taken(
     step = (await view_of(service, mission)).progress.step
     await until_step(service, mission, step + 5)  # more than was decided: vehicles do not wait for them
     async with asyncio.timeout(LONG_S):
-        ways = await export(await service.get(mission), service.maps, ProviderSettings(), service.compute, "tracks.geojson")
+        ways = await export(
+            await service.get(mission), service.maps, ProviderSettings(), service.compute, "tracks.geojson"
+        )
         assert ways.content
         one = await service.team_changes.stop_one(await service.get(mission), "c", actor="operator")
         assert [(stop.vehicle, stop.acknowledged) for stop in one] == [("c", True)]
