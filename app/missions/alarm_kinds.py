@@ -128,7 +128,10 @@ ALARMS: Mapping[AlarmKind, AlarmRule] = {
         _CRITICAL, "no way leads a vehicle home that keeps clear of zones", "recover it where it comes up", "recovery"
     ),
     AlarmKind.NO_VEHICLE: AlarmRule(
-        _MAJOR, "no vehicle of a mission can be sent anywhere", "bring one into contact, resume one that is home, or add one", "waiting"
+        _MAJOR,
+        "no vehicle of a mission can be sent anywhere",
+        "bring one into contact, resume one that is home, or add one",
+        "waiting",
     ),
     AlarmKind.NO_WAYPOINT: AlarmRule(
         _MAJOR, "no vehicle may go anywhere", "read why; change limits or zones in a new mission", "waiting"
