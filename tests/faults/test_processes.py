@@ -29,7 +29,8 @@ async def two(tmp_path: Path, databases: Databases) -> AsyncIterator[tuple[Runni
         running = []
         for name in ("one", "other"):
             (folder := tmp_path / name).mkdir()
-            world = {"HUNG_LOOKS": "5"}
+            # Sooner than by default, and not so soon that one is taken for dead whose machine is only busy.
+            world = {"HUNG_LOOKS": "15"}
             running.append(await stack.enter_async_context(service_in(folder, database_url=url, world=world)))
         yield running[0], running[1]
 
