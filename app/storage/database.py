@@ -12,7 +12,7 @@ from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
 
 from app.storage import private
-from app.storage.application import called, new_application
+from app.storage.application_name import connect_arguments, new_application_name
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.db_errors import trouble_of
 
@@ -26,10 +26,10 @@ RECENT_S = 60.0
 """A trouble that did not show for this long is taken to be over."""
 
 
-def make_engine(url: str, application: str = "") -> AsyncEngine:
+def make_engine(url: str, application_name: str = "") -> AsyncEngine:
     """Return an engine for ``url``; SQLite is put into WAL mode with foreign keys and durable commits.
 
-    ``application``: what PostgreSQL is told that its connections are called.
+    ``application_name``: what PostgreSQL is told that its connections are called.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def make_engine(url: str, application: str = "") -> AsyncEngine:
             f"database_url names {parsed.drivername!r}: use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER@HOST/NAME"
         )
     if parsed.get_backend_name() != "sqlite":
-        return create_async_engine(url, pool_pre_ping=True, connect_args=called(application))
+        return create_async_engine(url, pool_pre_ping=True, connect_args=connect_arguments(application_name))
     engine = create_async_engine(url)
     file = Path(parsed.database) if parsed.database and parsed.database != ":memory:" else None
 
@@ -101,8 +101,8 @@ class Database:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.application = new_application()
-        self._engine = make_engine(url, self.application)
+        self.application_name = new_application_name()
+        self._engine = make_engine(url, self.application_name)
         # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
         # locked"). Those of this process stand in line instead; the timeout is left for other processes.
         self._turn = asyncio.Lock() if self._engine.dialect.name == "sqlite" else None

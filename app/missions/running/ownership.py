@@ -62,7 +62,7 @@ class Ownership:
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
         self.called = asyncio.Event()
-        self._membership = make_membership(database.url, self.called.set, database.application)
+        self._membership = make_membership(database.url, self.called.set, database.application_name)
         self._number = 0
         self._mine: set[str] = set()
         self._peers: dict[int, Peer] = {}

@@ -19,7 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncSession, create_async_engine
 from sqlalchemy.pool import NullPool
 
-from app.storage.application import APPLICATION, called
+from app.storage.application_name import PREFIX, connect_arguments
 from app.storage.processes.process_lock import LockHeldError, ProcessLock, is_held
 
 LOCKS = 0x62617468
@@ -36,7 +36,7 @@ HEARD = f"SELECT objid::bigint, state_change {_OURS}"
 SESSIONS = (
     "SELECT pg_terminate_backend(session.pid) FROM pg_stat_activity session "  # noqa: S608 - the same
     "WHERE session.application_name IN "
-    f"(SELECT application_name {_OURS} AND objid::bigint = ANY($1) AND application_name LIKE '{APPLICATION}%')"
+    f"(SELECT application_name {_OURS} AND objid::bigint = ANY($1) AND application_name LIKE '{PREFIX}%')"
 )
 """Ends everything that some processes have begun in PostgreSQL."""
 HUNG_LOOKS = 60
@@ -75,15 +75,15 @@ class Membership(Protocol):
         """Give the lock up."""
 
 
-def make_membership(url: str, on_call: Callable[[], None], application: str = "") -> Membership:
+def make_membership(url: str, on_call: Callable[[], None], application_name: str = "") -> Membership:
     """Return the membership for a database; ``on_call`` is called when another process says that something changed.
 
-    ``application``: what the process is called on all its connections, see :mod:`app.storage.application`.
+    ``application_name``: what the process is called on all its connections, see :mod:`app.storage.application_name`.
     """
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":
         return FileMembership(Path(parsed.database or "bathyfleet.db"))
-    return AdvisoryMembership(url, on_call, application)
+    return AdvisoryMembership(url, on_call, application_name)
 
 
 async def alive_beside(session: AsyncSession, url: str, numbers: Iterable[int]) -> set[int]:
@@ -176,8 +176,8 @@ class Silence:
 class AdvisoryMembership:
     """Processes that share a PostgreSQL database: each holds an advisory lock on a connection of its own."""
 
-    def __init__(self, url: str, on_call: Callable[[], None], application: str = "") -> None:
-        self._engine = create_async_engine(url, poolclass=NullPool, connect_args=called(application))
+    def __init__(self, url: str, on_call: Callable[[], None], application_name: str = "") -> None:
+        self._engine = create_async_engine(url, poolclass=NullPool, connect_args=connect_arguments(application_name))
         self._number = 0
         self._silence = Silence()
         self._on_call = on_call

@@ -128,7 +128,7 @@ async def test_who_hangs_does_not_live_for_who_looks_on(databases: Databases, mo
 async def test_all_that_a_process_has_begun_is_ended_when_it_is_taken_for_dead(databases: Databases) -> None:
     url = databases.fresh("postgresql")
     hung, own = Database(url), Database(url)
-    held = make_membership(url, lambda: None, hung.application)
+    held = make_membership(url, lambda: None, hung.application_name)
     await held.enter(1)
     async with AsyncExitStack() as stack:
         stack.push_async_callback(held.leave)
@@ -136,7 +136,7 @@ async def test_all_that_a_process_has_begun_is_ended_when_it_is_taken_for_dead(d
         stack.push_async_callback(own.close)
         async with hung.reading() as session:
             await session.execute(text("SELECT 1"))
-            one = make_membership(url, lambda: None, own.application)
+            one = make_membership(url, lambda: None, own.application_name)
             await one.enter(2)
             stack.push_async_callback(one.leave)
             await one.end_sessions([1])
