@@ -28,6 +28,9 @@ from app.missions.flight.legs.dispatch import GIVEN_UP, Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.giving_way import GivingWay
 from app.missions.flight.legs.keeping_off import KeepingOff, KeepOutZones
+from app.missions.flight.legs.next_moment import NextMoment
+from app.missions.flight.legs.other_vehicles import OtherVehicles
+from app.missions.flight.legs.room_aside import RoomAside
 from app.missions.flight.observation.elapsed_time import keep_time, save_elapsed
 from app.missions.flight.observation.engagement import Engagement
 from app.missions.flight.observation.telemetry_sampler import keep_telemetry
@@ -58,6 +61,8 @@ class Runner:
 
     Parameters
     ----------
+    others
+        What there is to meet beside the mission's own vehicles.
     time_scale
         How much faster than the wall clock the vehicles live.
     map_pause_s
@@ -70,6 +75,7 @@ class Runner:
         self,
         live: LiveMission,
         hub: FleetHub,
+        others: OtherVehicles,
         executor: Executor,
         time_scale: float,
         map_pause_s: float,
@@ -94,7 +100,9 @@ class Runner:
         zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
         asides = Asides(live, self._committing, self._dispatch)
         self._keeping_off = KeepingOff(live, constraints, zones, asides, time_scale)
-        self._giving_way = GivingWay(live, constraints, self._committing, zones, asides, time_scale)
+        moment = NextMoment(live, time_scale)
+        room = RoomAside(live, constraints, self._committing, zones, asides, moment)
+        self._giving_way = GivingWay(live, moment, room, asides, others, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
         self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)

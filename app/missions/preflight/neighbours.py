@@ -22,7 +22,7 @@ Ring = Sequence[tuple[float, float]]
 def neighbour_checks(live: LiveMission, at_sea: Sequence[MissionRow]) -> Iterator[CheckView]:
     """Return a line for each mission at sea that is flown where this one is, among some as they are stored.
 
-    Nobody keeps vehicles of different missions apart. Simulated ones cannot meet others.
+    Legs of different missions are not decided apart, and not every vehicle can give way. Simulated ones meet no others.
     """
     if all(member.capabilities.simulated for member in live.team):
         return
@@ -36,7 +36,7 @@ def neighbour_checks(live: LiveMission, at_sea: Sequence[MissionRow]) -> Iterato
             title="Other mission",
             status=CheckStatus.WARNING,
             message=f"mission {called(row.name, row.id)} is {row.state} in the same place: vehicles of different "
-            "missions are not kept apart and do not give way to each other",
+            "missions are not planned apart, they only give way to each other when they are about to meet",
             remedy="Fly them one after the other, or all vehicles in one mission; else at depths that are far apart, "
             "with an eye on who comes up",
         )

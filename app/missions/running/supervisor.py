@@ -14,6 +14,7 @@ from app.missions.compilation import Compilation
 from app.missions.errors import MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
+from app.missions.flight.legs.other_vehicles import OtherVehicles
 from app.missions.flight.runner import Runner
 from app.missions.live.header import Ending
 from app.missions.live.journals.journal import ENDS, add_lines
@@ -61,6 +62,7 @@ class MissionSupervisor:
         self._maps = maps
         self._compilation = compilation
         self._settings = settings
+        self._others = OtherVehicles(hub, settings.time_scale)
         self.runs: dict[str, asyncio.Task[None]] = {}
         self._acting: dict[str, asyncio.Lock] = {}
         self._ending: dict[str, asyncio.Task[list[StopReceipt]]] = {}
@@ -96,7 +98,8 @@ class MissionSupervisor:
         def fly() -> Awaitable[str]:
             # Made where its failure ends this mission alone: its planner may be gone since the mission was begun.
             scale, pause_s = self._settings.time_scale, self._settings.compute.map_pause_s
-            return Runner(live, self._hub, self._executor, scale, pause_s, self._compilation.maps).run()
+            shared = (self._hub, self._others, self._executor)
+            return Runner(live, *shared, scale, pause_s, self._compilation.maps).run()
 
         self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
 

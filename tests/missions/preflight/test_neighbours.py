@@ -37,4 +37,4 @@ async def test_missions_at_sea_in_the_same_place_are_told_of(
     await act(service, second.id, "start")
     said = [event.message for event in await events_after(second) if event.kind == "safety"]
     assert said == [check.message for check in checks]
-    assert all(name in message and "not kept apart" in message for message in said)
+    assert all(name in message and "not planned apart" in message for message in said)

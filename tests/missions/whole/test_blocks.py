@@ -6,7 +6,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from shapely.geometry import LineString, Polygon
 
-from app.missions.flight.legs.giving_way import VERTICAL_SHARE
+from app.missions.flight.legs.next_moment import VERTICAL_SHARE
 from app.missions.operations.history import events_after
 from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec

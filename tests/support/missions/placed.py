@@ -17,6 +17,9 @@ from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.giving_way import GivingWay
 from app.missions.flight.legs.keeping_off import KeepingOff, KeepOutZones
+from app.missions.flight.legs.next_moment import NextMoment
+from app.missions.flight.legs.other_vehicles import OtherVehicles
+from app.missions.flight.legs.room_aside import RoomAside
 from app.missions.live.mission import LiveMission
 from app.missions.team import Member
 
@@ -26,7 +29,13 @@ Place = tuple[float, float, float]
 class PlacedVehicles:
     """The vehicles of a mission that are placed by hand, and what they are ordered."""
 
-    def __init__(self, live: LiveMission, hub: FleetHub, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(
+        self,
+        live: LiveMission,
+        hub: FleetHub,
+        monkeypatch: pytest.MonkeyPatch,
+        others: OtherVehicles | None = None,
+    ) -> None:
         self.live = live
         self.ordered: list[WaypointOrder] = []
         constraints = make_constraints(live.spec)
@@ -34,7 +43,10 @@ class PlacedVehicles:
         self.dispatch = dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
         zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
         self.asides = asides = Asides(live, committing, dispatch)
-        self.giving_way = GivingWay(live, constraints, committing, zones, asides, 1.0)
+        moment = NextMoment(live, 1.0)
+        room = RoomAside(live, constraints, committing, zones, asides, moment)
+        self.others = OtherVehicles(hub, 1.0) if others is None else others
+        self.giving_way = GivingWay(live, moment, room, asides, self.others, 1.0)
         self.keeping_off = KeepingOff(live, constraints, zones, asides, 1.0)
         for slot, vehicle in enumerate(live.spec.vehicles):
             member = live.team.get(vehicle.name) or live.team.join(vehicle, slot)
