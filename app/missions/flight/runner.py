@@ -204,7 +204,8 @@ class Runner:
             of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             if not was_led:
-                self._leave_out_passed(member, came_to_m.get(member.name))  # after a pause all that was flown is written down
+                # After a pause all that was flown is written down.
+                self._leave_out_passed(member, came_to_m.get(member.name))
             member.count_late(live.spec, live.frame)
         await live.journal.log(Level.INFO, "resumed", f"going on after step {step.number}", step=step.number)
         return True
