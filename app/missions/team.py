@@ -232,6 +232,11 @@ class Member:
         return self.ordered and self.link not in OUT_OF_REACH
 
     @property
+    def left_alone(self) -> bool:
+        """Whether it can be reached and does not follow: another console has it, or it refuses."""
+        return self.followed and not self.engaged and self.link not in OUT_OF_REACH
+
+    @property
     def unsent(self) -> bool:
         """Whether it has a waypoint that was never sent, as when its link was lost just then."""
         return self.order is not None and self.status is WaypointStatus.PLANNED

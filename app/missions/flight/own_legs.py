@@ -501,7 +501,7 @@ class OwnLegs:
     @property
     def _awaits_batteries(self) -> bool:
         """Whether nobody surveys, and somebody may do so again with another battery."""
-        if not self._live.team.awaits_batteries(self._spec):
+        if not self._live.awaits_batteries:
             return False
         return any(self._has_way(m) and m.name not in self._sent_home for m in self._live.team)
 

@@ -194,11 +194,15 @@ class Runner:
             if step is None:
                 return False
             rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
+            ended = await mission_queries.settled_waypoints(session, live.id, SETTLED)
             newest = await mission_queries.newest_waypoints(session, live.id)
             way_m, spared = await mission_queries.committed_way(session, live.id, GIVEN_UP)
         await self._remember(step.memory)
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}
+        came_to_m = {
+            row.vehicle: np.array([row.east_m, row.north_m]) for row in ended if row.status == WaypointStatus.REACHED
+        }
         for member in live.team.left.values():
             # It may come back, and goes on with its own numbers.
             self._count_legs(member, last, way_m, spared)
@@ -208,7 +212,8 @@ class Runner:
             of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
             member.ahead += [committed_leg(row) for row in of_it if self._apart or row.step == step.number]
             if not was_led:
-                self._leave_out_passed(member)  # after a pause all that was flown is written down
+                # After a pause all that was flown is written down.
+                self._leave_out_passed(member, came_to_m.get(member.name))
             member.count_late(live.spec, live.frame)
         await live.journal.log(Level.INFO, "resumed", f"going on after step {step.number}", step=step.number)
         return True
@@ -234,11 +239,15 @@ class Runner:
             )
             await self._live.journal.log(Level.WARNING, "resumed", said)
 
-    def _leave_out_passed(self, member: Member) -> None:
-        """Leave out the legs that a vehicle had flown before anybody could write that down."""
+    def _leave_out_passed(self, member: Member, begin_m: FloatArray | None) -> None:
+        """Leave out the legs that a vehicle had flown before anybody could write that down.
+
+        ``begin_m``: where the first of them begins, (2,), if it got to the end of the one before.
+        """
         if member.report is None or len(member.ahead) < 2:
             return
-        first = nearest_leg(member.place_m(self._live.frame), np.array([leg.target_m for leg in member.ahead]))
+        ends_m = np.array([leg.target_m for leg in member.ahead])
+        first = nearest_leg(member.place_m(self._live.frame), ends_m, begin_m)
         for leg in member.ahead[:first]:
             reason = "flown while nobody was there to note it"
             self._live.journal.waypoint(
@@ -257,16 +266,18 @@ async def kept_going(keep: Callable[[], Coroutine[Any, Any, None]]) -> None:
         await asyncio.sleep(BEGIN_ANEW_S)
 
 
-def nearest_leg(place_m: FloatArray, ends_m: FloatArray) -> int:
+def nearest_leg(place_m: FloatArray, ends_m: FloatArray, begin_m: FloatArray | None = None) -> int:
     """Return which of a vehicle's legs goes on from where it is: the one that passes it closest, the first of equals.
 
     Parameters
     ----------
     place_m : (2,)
     ends_m : (n, 2)
-        Where the legs end; each begins at the end before, the first one anywhere.
+        Where the legs end; each begins at the end before.
+    begin_m : (2,) or None
+        Where the first one begins; None: anywhere.
     """
-    starts = np.vstack([ends_m[:1], ends_m[:-1]])
+    starts = np.vstack([ends_m[:1] if begin_m is None else begin_m[None], ends_m[:-1]])
     along = ends_m - starts
     length2 = np.einsum("ij,ij->i", along, along)
     part = np.einsum("ij,ij->i", place_m - starts, along) / np.where(length2 > 0.0, length2, 1.0)

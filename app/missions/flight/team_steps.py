@@ -62,9 +62,9 @@ class TeamSteps:
             await self._arrive(self._deadline_s())
         decision: Decision | None = None
         while live.header.step < self._spec.steps and (
-            self._somebody_surveys or live.team.held or live.team.awaits_batteries(self._spec)
+            self._somebody_surveys or live.team.held or live.awaits_batteries
         ):
-            if live.team.awaits_batteries(self._spec):
+            if live.awaits_batteries:
                 await self._waiting.for_batteries(f", {self._spec.steps - live.header.step} steps before the end")
                 continue
             if not self._somebody_surveys:

@@ -333,6 +333,11 @@ class LiveMission:
         if self.ending is not None:
             raise ConflictError("everybody goes home: the mission is ending", "create a new mission")
 
+    @property
+    def awaits_batteries(self) -> bool:
+        """Whether nobody surveys, and who is home with some of its way left, or goes there, is waited for."""
+        return self.ending is None and self.team.awaits_batteries(self.spec)
+
     def call_everybody_home(self) -> None:
         """Withdraw all vehicles of a mission that is ending; those without a recovery point stop."""
         if self.ending is None:
@@ -498,7 +503,7 @@ class LiveMission:
             return max(self.search.left_s(), 0.0) / self._time_scale
         if list(self.team) and not self.team.going_on:
             # What they still fly is their way home.
-            return None if self.team.awaits_batteries(self.spec) else 0.0
+            return None if self.awaits_batteries else 0.0
         left = remaining(self.spec, self.team)
         if left.minutes is not None and self.header.state not in NOT_STARTED:
             return 60.0 * left.minutes / self._time_scale

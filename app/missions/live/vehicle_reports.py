@@ -191,6 +191,8 @@ class VehicleReports:
     def _phase(self, member: Member, way_left_m: float) -> Phase:
         if member.withdrawal is not None:
             return phase_of(member.withdrawal)
+        if member.left_alone:
+            return Phase.STOPPED
         if member.surfacing:
             return Phase.SURFACING
         outside = self._boundaries.comes_in(member.name) or self._boundaries.breach(member.name)
@@ -221,6 +223,8 @@ class VehicleReports:
     def _receive_waypoint(self, member: Member, event: WaypointReport) -> None:
         if event.mission_id != self._mission_id or member.order is None or event.step != member.order.step:
             return
+        if member.status is WaypointStatus.MISSED:
+            return  # its vehicle acknowledged it, or came to its end, after it was given up
         member.status = event.status
         member.reason = event.reason
         if event.status is WaypointStatus.REACHED:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Select, func, select, update
+from sqlalchemy import Select, Subquery, func, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import aliased, defer
 
@@ -160,12 +160,7 @@ async def unsettled_waypoints(
     session: AsyncSession, mission_id: str, settled: Collection[str]
 ) -> Sequence[WaypointRow]:
     """Return every vehicle's waypoints after the last one whose status is among ``settled``, first to last."""
-    last = (
-        select(WaypointRow.vehicle, func.max(WaypointRow.step).label("step"))
-        .where(WaypointRow.mission_id == mission_id, WaypointRow.status.in_(settled))
-        .group_by(WaypointRow.vehicle)
-        .subquery()
-    )
+    last = _last_settled(mission_id, settled)
     query = (
         select(WaypointRow)
         .outerjoin(last, WaypointRow.vehicle == last.c.vehicle)
@@ -173,6 +168,26 @@ async def unsettled_waypoints(
         .order_by(WaypointRow.step, WaypointRow.vehicle)
     )
     return (await session.scalars(query)).all()
+
+
+async def settled_waypoints(session: AsyncSession, mission_id: str, settled: Collection[str]) -> Sequence[WaypointRow]:
+    """Return each vehicle's last waypoint whose status is among ``settled``."""
+    last = _last_settled(mission_id, settled)
+    query = (
+        select(WaypointRow)
+        .join(last, (WaypointRow.vehicle == last.c.vehicle) & (WaypointRow.step == last.c.step))
+        .where(WaypointRow.mission_id == mission_id)
+    )
+    return (await session.scalars(query)).all()
+
+
+def _last_settled(mission_id: str, settled: Collection[str]) -> Subquery:
+    return (
+        select(WaypointRow.vehicle, func.max(WaypointRow.step).label("step"))
+        .where(WaypointRow.mission_id == mission_id, WaypointRow.status.in_(settled))
+        .group_by(WaypointRow.vehicle)
+        .subquery()
+    )
 
 
 async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | None:

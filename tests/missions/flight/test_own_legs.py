@@ -375,6 +375,47 @@ def test_the_leg_that_goes_on_from_a_place_on_it_is_found(seed: int) -> None:
     assert nearest_leg(before, ends) == 0
 
 
+@pytest.mark.parametrize("part", [0.05, 0.5, 0.95])
+def test_a_vehicle_in_the_middle_of_its_line_is_on_it_and_not_on_the_one_beside_it(part: float) -> None:
+    begin = np.array([0.0, 150.0])
+    ends = np.array([[0.0, 5.0], [25.0, 5.0], [25.0, 150.0], [50.0, 150.0]])
+    assert nearest_leg(begin + part * (ends[0] - begin) + 1.0, ends, begin) == 0
+
+
+async def test_after_a_restart_the_rest_of_a_line_is_flown(harbour_closed: Harbour) -> None:
+    service = await harbour_closed.open(time_scale=10.0)
+    spec = sim_spec(
+        "a",
+        side_m=100.0,
+        planner={"name": "lawnmower"},
+        budget={"minutes": 10},
+        limits={"max_step_m": 100.0},
+    )
+    mission = (await service.create(spec)).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+
+    def half_way() -> bool:
+        member = live.team.named("a")
+        if not (member.ordered and len(member.ahead) >= 2 and member.legs - len(member.ahead) >= 2):
+            return False
+        assert member.target_m is not None
+        assert member.leg_start_m is not None
+        long_m = np.hypot(*(member.target_m - member.leg_start_m))
+        left_m = np.hypot(*(member.target_m - member.place_m(live.frame)))
+        return bool(long_m > 50.0 and 0.3 * long_m < left_m < 0.7 * long_m)
+
+    await until(half_way, "it is in the middle of a line")
+    flown = live.team.named("a").legs - len(live.team.named("a").ahead)
+    service = await harbour_closed.reopen(time_scale=10.0)
+    live = await service.get(mission)
+    await until(lambda: live.team.named("a").ordered, "it goes on")
+    order = live.team.named("a").order
+    assert order is not None
+    assert order.step == flown
+    await act(service, mission, "abort")
+
+
 async def test_legs_that_are_barred_are_flown_another_way_and_none_goes_on_from_where_they_were_to_end(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:

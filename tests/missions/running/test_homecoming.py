@@ -442,6 +442,24 @@ async def test_a_mission_that_waits_for_batteries_can_be_finished(service: Missi
     assert not live.journal.alarms.standing([AlarmKind.NO_VEHICLE])
 
 
+@pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
+@pytest.mark.parametrize("action", [Action.FINISH, Action.ABORT])
+async def test_a_mission_that_is_ended_while_somebody_surveys_waits_for_no_batteries(
+    service: MissionService, limits: dict[str, Any], action: Action
+) -> None:
+    mission = await service.create(recovered("a", "b", steps=1000, **(WAITS | ({"limits": limits} if limits else {}))))
+    await act(service, mission.id, "start")
+    await until_step(service, mission.id, 2)
+    live = await service.get(mission.id)
+    await call_home(live, "a", "Ana")
+    await until(lambda: live.team.members["a"].is_home, "a is home")
+    await service.act(live, action, actor="Ana", return_home=True)
+    ended = await until_ended(service, mission.id)
+    assert ended.state is (MissionState.FINISHED if action is Action.FINISH else MissionState.ABORTED)
+    assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
+    assert await words_of(service, mission, "waiting") == []
+
+
 async def test_who_joins_while_everybody_goes_home_surveys_and_comes_home_too(service: MissionService) -> None:
     mission = await service.create(recovered("a", point=lon_lat(15.0, -300.0), steps=4))
     await act(service, mission.id, "start")

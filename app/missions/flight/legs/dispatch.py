@@ -65,12 +65,17 @@ class Dispatch:
     async def keep(self) -> None:
         """Keep every vehicle flying its own legs until cancelled."""
         loop = asyncio.get_running_loop()
+        looked_s = loop.time()
         while True:
             await self.begin()
+            now_s = loop.time()
             for member in self._live.team:
                 if member.ordered and not member.busy:
-                    member.leg_began_s = loop.time()  # it is out of reach
-            under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy}
+                    member.leg_began_s = now_s  # it is out of reach
+                elif member.left_alone:
+                    member.leg_began_s += now_s - looked_s
+            looked_s = now_s
+            under_way = {m.name: late_at_s(m, self._time_scale) for m in self._live.team if m.busy and not m.left_alone}
             late = await self.settle_late()
             holds_s = await self._hold_idle()
             if late or (self._waiting and not self._live.halted):
@@ -86,7 +91,8 @@ class Dispatch:
         """End the legs that take too long, of some vehicles or of all; returns their vehicles."""
         now_s = asyncio.get_running_loop().time()
         asked = self._live.team if of is None else of
-        late = [member for member in asked if member.busy and late_at_s(member, self._time_scale) <= now_s]
+        flying = [member for member in asked if member.busy and not member.left_alone]
+        late = [member for member in flying if late_at_s(member, self._time_scale) <= now_s]
         # All at once: while a line of the log is written, others may be sent on to their next legs.
         numbers = [self._settle_missed(member, missed(member.leg_allowed_s)) for member in late]
         for member, number in zip(late, numbers, strict=True):

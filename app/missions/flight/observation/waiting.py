@@ -52,12 +52,12 @@ class Waiting:
         def home() -> bool:
             return all(member.withdrawal is not None and member.withdrawal.over for member in team)
 
-        await self.until(lambda: not team.awaits_batteries(live.spec) or home(), None)
-        if team.awaits_batteries(live.spec):
+        await self.until(lambda: not live.awaits_batteries or home(), None)
+        if live.awaits_batteries:
             if not live.journal.alarms.standing([AlarmKind.NO_VEHICLE]):
                 message = f"every vehicle is home{left}: resume who has another battery, or finish the mission"
                 await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=[member.name for member in team])
-            await self.until(lambda: not team.awaits_batteries(live.spec), None)
+            await self.until(lambda: not live.awaits_batteries, None)
         await self._note_over()
 
     async def _for_anybody(self) -> None:

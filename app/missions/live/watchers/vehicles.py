@@ -67,9 +67,7 @@ class VehicleViews:
 
     def _view(self, member: Member, info: VehicleInfo | None) -> VehicleView:
         info = info or self._hub.info(member.key)
-        # Whoever left is not heard by the mission any more, but perhaps by its link.
-        report = (info.report or member.report) if member.left_at is not None else (member.report or info.report)
-        heard_s = member.heard_s if info.age_s is None else now().timestamp() - info.age_s
+        report, heard_s = self._last_heard(member, info)
         view = VehicleView(
             name=member.name,
             kind=member.spec.kind,
@@ -115,6 +113,18 @@ class VehicleViews:
                 "localization": _position_quality(report.position_sd_m, self._spec.surface_policy),
             }
         )
+
+    def _last_heard(self, member: Member, info: VehicleInfo) -> tuple[VehicleReport | None, float | None]:
+        """Return what a vehicle reported last, as far as this is to be shown, and when it was heard, Unix seconds."""
+        owner = self._hub.claimed_by(member.key)
+        if owner not in (None, self._mission_id) and member.left_at is None:
+            # It is in another mission by now: here it stays where it was when this one ended.
+            return member.report, member.heard_s
+        heard_s = member.heard_s if info.age_s is None else now().timestamp() - info.age_s
+        if owner == self._mission_id and member.left_at is None:
+            return member.report or info.report, heard_s
+        # The mission does not hear it any more, but perhaps its link does: it comes up, and drifts.
+        return near_report(self._frame, info.report) or member.report or info.report, heard_s
 
     def _order(self, member: Member) -> OrderView | None:
         """Return what its operator ordered a vehicle to do."""

@@ -5,16 +5,25 @@ import asyncio
 import numpy as np
 import pytest
 
-from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointOrder, WaypointStatus
+from app.missions.fleet.interface import (
+    LinkState,
+    Position,
+    VehicleReport,
+    WaypointOrder,
+    WaypointReport,
+    WaypointStatus,
+)
 from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
-from app.missions.team import Member
+from app.missions.spec.failsafes import Response
+from app.missions.team import Member, Withdrawal
 from app.missions.views.mission import Level
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.specs import LAT, LON
+from tests.support.waiting import until
 
 
 def send_on(live: LiveMission, member: Member, step: int) -> None:
@@ -77,3 +86,35 @@ async def test_only_those_that_are_asked_about_are_judged(late: tuple[LiveMissio
     first, second = live.team.members["a"], live.team.members["b"]
     assert await dispatch.settle_late([second]) == [second]
     assert (first.ordered, second.ordered) == (True, False)
+
+
+async def test_a_leg_that_was_given_up_is_over_whatever_its_vehicle_still_tells_of_it(
+    late: tuple[LiveMission, Dispatch],
+) -> None:
+    """Else who is held, or called home, just when a leg is sent to it has that leg to fly again."""
+    live, dispatch = late
+    member = live.team.members["a"]
+    member.status = WaypointStatus.SENT
+    dispatch.give_up_legs(member, "held by Ana")
+    for status in (WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED):
+        live.receive(WaypointReport("a", live.id, 1, status))
+        assert not member.ordered
+        assert member.status is WaypointStatus.MISSED
+    member.withdrawal = Withdrawal(Response.HOLD, "held by Ana")
+    assert await dispatch.settle_late([member]) == []
+
+
+async def test_who_is_left_alone_with_another_console_keeps_its_leg(late: tuple[LiveMission, Dispatch]) -> None:
+    live, dispatch = late
+    first, second = live.team.members["a"], live.team.members["b"]
+    for member in (first, second):
+        member.leg_allowed_s = 0.05
+    first.link, first.engaged = LinkState.READY, False
+    keeping = asyncio.create_task(dispatch.keep())
+    await until(lambda: not second.ordered, "the other one is late")
+    assert first.ordered
+    first.link, first.engaged = LinkState.ENGAGED, True
+    live.changed.set()
+    await until(lambda: not first.ordered, "it follows again, and is late")
+    keeping.cancel()
+    await asyncio.gather(keeping, return_exceptions=True)

@@ -1,7 +1,12 @@
 """What operators are shown of vehicles."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from app.missions.clock import now
+from app.missions.fleet.interface import FleetEvent, LinkState, Position, VehicleInfo
 from app.missions.flown import Phase
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec
@@ -24,3 +29,30 @@ async def test_a_vehicle_that_has_flown_its_length_says_that_it_waits_for_the_ot
     # Nobody waits any more when the mission is over.
     live.team.members["a"].engaged = False
     assert {vehicle.reason == waits for vehicle in live.vehicles.all()} == {False}
+
+
+async def test_once_its_mission_is_over_a_vehicle_is_shown_where_its_link_hears_it_until_another_one_takes_it(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live = await service.get((await service.create(sim_spec("a", side_m=60.0))).id)
+    member = PlacedVehicles(live, service.hub, monkeypatch).put("a", (5.0, 5.0, 3.0), (50.0, 5.0, 3.0))
+    assert member.report is not None
+    member.heard_s = now().timestamp() - 100.0
+    lat, lon = live.frame.to_geographic(np.array(20.0), np.array(5.0))
+    drifted = replace(member.report, position=Position(float(lat), float(lon), 0.0))
+    info = VehicleInfo("a", "sim", LinkState.READY, age_s=1.0, report=drifted)
+    monkeypatch.setattr(service.hub, "infos", lambda: {member.key: info})
+
+    def shown() -> tuple[float | None, float | None, float | None]:
+        [view] = live.vehicles.all()
+        return view.east_m, view.depth_m, view.age_s
+
+    def ignore(_event: FleetEvent) -> None:
+        """Of no interest here."""
+
+    service.hub.claim(member.key, live.id, ignore, name="this one")
+    assert shown()[:2] == (pytest.approx(5.0, abs=0.01), 3.0)
+    service.hub.release(member.key, live.id)
+    assert shown() == (pytest.approx(20.0, abs=0.01), 0.0, pytest.approx(1.0, abs=0.5))
+    service.hub.claim(member.key, "another", ignore, name="the other one")
+    assert shown() == (pytest.approx(5.0, abs=0.01), 3.0, pytest.approx(100.0, abs=1.0))
