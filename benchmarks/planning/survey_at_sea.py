@@ -22,6 +22,7 @@ import numpy as np
 from rich.progress import Progress as ProgressBar
 
 from app.evaluation.runs.jobs import run_jobs
+from app.evaluation.runs.summary import spread
 from app.evaluation.survey.job import SurveyJob
 from app.evaluation.survey.world import SPEED_MPS, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
@@ -65,20 +66,18 @@ def figures(runs: Sequence[dict[str, Any]]) -> dict[str, str]:
 
 
 def _ratio(runs: Sequence[dict[str, Any]]) -> str:
-    ratios = np.array([run["ratio"] for run in runs])
+    ratios = spread([run["ratio"] for run in runs])
     ours = np.mean([run["rmse_m"] for run in runs])
     patterns = np.min([np.mean([run[name]["rmse_m"] for run in runs]) for name in PATTERNS])
-    half = 1.96 * ratios.std(ddof=1) / np.sqrt(len(ratios)) if len(ratios) > 1 else 0.0
-    interval = f" ± {half:.3f}" if len(ratios) > 1 else ""
-    return f"{ratios.mean():.3f}{interval} of {len(ratios)}, worst {ratios.max():.3f}, lasting {ours / patterns:.3f}"
+    interval = f" ± {ratios.ci95:.3f}" if len(runs) > 1 else ""
+    return f"{ratios.mean:.3f}{interval} of {len(runs)}, worst {ratios.max:.3f}, lasting {ours / patterns:.3f}"
 
 
 def _over_lawnmower(runs: Sequence[dict[str, Any]]) -> str:
-    logs = np.log([run["rmse_m"] / run[YARDSTICK]["rmse_m"] for run in runs])
-    half = 1.96 * logs.std(ddof=1) / np.sqrt(len(logs)) if len(logs) > 1 else 0.0
-    mean = float(np.exp(logs.mean()))
-    interval = f" ± {mean * half:.3f}" if len(logs) > 1 else ""
-    return f"{mean:.3f}{interval} of {len(logs)}, {np.exp(logs.min()):.3f} to {np.exp(logs.max()):.3f}"
+    logs = spread([float(np.log(run["rmse_m"] / run[YARDSTICK]["rmse_m"])) for run in runs])
+    mean = float(np.exp(logs.mean))
+    interval = f" ± {mean * logs.ci95:.3f}" if len(runs) > 1 else ""
+    return f"{mean:.3f}{interval} of {len(runs)}, {np.exp(logs.min):.3f} to {np.exp(logs.max):.3f}"
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.evaluation.cli import evaluate_app
+from app.evaluation.runs.command import planners_named, seed_list
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
 from simulator.floors.terrain_files import save_npz
@@ -52,6 +53,11 @@ def test_several_runs_print_runs_and_a_summary(terrain: Terrain) -> None:
     spread = document["summary"]["cao"]["remaining_pct"]
     assert spread.keys() == {"mean", "ci95", "min", "max"}
     assert spread["min"] <= spread["mean"] <= spread["max"]
+
+
+def test_no_run_is_made_and_counted_twice() -> None:
+    assert seed_list(None, "5,1,5") == [5, 1]
+    assert planners_named("cao, random,cao", ("cao", "random")) == ["cao", "random"]
 
 
 def test_where_there_is_little_room_no_name_of_a_column_is_cut_off(

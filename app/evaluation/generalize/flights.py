@@ -137,7 +137,7 @@ def coverage(floor: Terrain, seed: int, size: Size) -> Trial:
         "dense_pct": ours.density_ok_pct,
     }
     extent = np.array([floor.width_m, floor.height_m])
-    tracks = [rounded(np.array(craft.ends_m) / extent) for craft in fleet.crafts.values()]
+    tracks = [rounded(np.reshape(craft.ends_m, (-1, 2)) / extent) for craft in fleet.crafts.values()]
     rows, cols = np.nonzero(fleet.wanted & ~fleet.density.ensonified)
     missed = np.column_stack([scenario.grid.east_m[cols], scenario.grid.north_m[rows]]) / extent
     kept = ours.km <= FIXED_RATIO * fixed.km and ours.holidays == 0

@@ -115,8 +115,8 @@ def model_of(path: Path | None, planners: Collection[str] = ("pcao",)) -> PcaoMo
 
 
 def planners_named(text: str, known: tuple[str, ...]) -> list[str]:
-    """Return the planners that an option names."""
-    names = [name.strip() for name in text.split(",") if name.strip()]
+    """Return the planners that an option names, each once."""
+    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     for name in names:
         if name not in known:
             raise typer.BadParameter(f"{missing(name)}; choose from {', '.join(known)}", param_hint="--planner")
@@ -126,7 +126,7 @@ def planners_named(text: str, known: tuple[str, ...]) -> list[str]:
 
 
 def seed_list(seed: int | None, seeds: str | None, option: str = "--seeds") -> list[int]:
-    """Return the seeds that the options name."""
+    """Return the seeds that the options name, each once: a run that is counted twice makes intervals too narrow."""
     if seeds is None:
         return [seed or 0]
     if seed is not None:
@@ -138,7 +138,7 @@ def seed_list(seed: int | None, seeds: str | None, option: str = "--seeds") -> l
         raise typer.BadParameter(f"{seeds!r} is neither FIRST:END nor a list like 1,5,9", param_hint=option) from None
     if not chosen or min(chosen) < 0:
         raise typer.BadParameter(f"{seeds!r} holds no number, or a negative one", param_hint=option)
-    return chosen
+    return list(dict.fromkeys(chosen))
 
 
 def check_report(

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.evaluation.cli import evaluate_app
+from app.evaluation.generalize.flights import coverage
 from app.evaluation.generalize.report import markdown
 from app.evaluation.generalize.site import site_of
 from app.evaluation.generalize.summary import figure_of, summary_of, worst_of
@@ -43,6 +44,11 @@ def test_every_task_has_its_table_and_its_picture(name: str, tmp_path: Path) -> 
     assert (tmp_path / "images" / f"generalization-{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_floor_that_one_vehicle_covers_alone_is_told() -> None:
+    flown = coverage(unseen_floor("outcrops", 0, width_m=42.0, height_m=30.0), 0, "quick")
+    assert [] in flown.tracks
+
+
 def test_an_interrupted_evaluation_goes_on(tmp_path: Path) -> None:
     arguments = ("--quick", "--tasks", "pcao", "--seeds", "1", "--json", "--out", str(tmp_path))
     first = json.loads(call(*arguments, "--floors", "1").stdout)
@@ -64,6 +70,7 @@ def test_an_interrupted_evaluation_goes_on(tmp_path: Path) -> None:
         (("--tasks", "diving"), "diving"),
         (("--seeds", "some"), "some"),
         (("--seeds", "3", "--floors", "20"), "10 floors"),
+        (("--seeds", "3,3", "--floors", "20"), "10 floors"),
         (("--no-run",), "--out"),
     ],
 )

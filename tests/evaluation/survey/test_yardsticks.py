@@ -7,6 +7,7 @@ from app.evaluation.survey.oracle import oracle_soundings
 from app.evaluation.survey.symmetry import SYMMETRIES, turned, turned_soundings
 from app.evaluation.survey.world import SurveyScenario, default_map, rmse_m
 from app.mapping.types import Soundings
+from benchmarks.planning.survey_at_sea import figures
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
 
@@ -52,3 +53,14 @@ def test_sounders_hear_so_many_beams_across_the_way(sounder: Any, beams: Any, as
     np.testing.assert_allclose(soundings.depth_m, 10.0, atol=1e-3)
     np.testing.assert_allclose(soundings.north_m, 30.0, atol=1e-3)
     assert np.ptp(soundings.east_m) / 2 == pytest.approx(aside_m, abs=0.1)
+
+
+def test_intervals_of_few_surveys_at_sea_are_students() -> None:
+    def flown(ratio: float) -> dict[str, Any]:
+        even = {"rmse_m": 1.0}
+        return {"set": "demo", "terrain": "demo", "ratio": ratio, "rmse_m": ratio,
+                "usual_practice": even, "coverage": even, "even": even, "lawnmower": even}  # fmt: skip
+
+    found = figures([flown(1.0), flown(1.1)])
+    assert found["demo"].startswith("1.050 ± 0.635 of 2,")
+    assert found["demo, over lawnmower lines"].startswith("1.049 ± 0.635 of 2,")
