@@ -133,7 +133,13 @@ class OtherVehicles:
         ]
         self._look()
         leading = {live.id, *(led.live.id for led in self._led.values() if not led.live.halted)}
-        others += [unled.seen for key, unled in self._unled.items() if self._hub.claimed_by(key) not in leading]
+        # One of this name that another link hears of is the same vehicle.
+        names = {member.name for member in live.team}
+        others += [
+            unled.seen
+            for key, unled in self._unled.items()
+            if self._hub.claimed_by(key) not in leading and key[1] not in names
+        ]
         origin = live.frame.origin_lat_deg, live.frame.origin_lon_deg
         return [vehicle for vehicle in others if _is_near(vehicle, *origin)]
 

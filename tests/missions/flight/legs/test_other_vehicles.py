@@ -125,6 +125,7 @@ async def test_who_can_be_led_aside_gives_way_to_another_missions_that_cannot(sc
         (Heard(heading_deg=None), False),
         (Heard(age_s=UNHEARD_S + 1.0), False),
         (Heard(place=(50.0, 60_000.0, 3.0)), False),
+        (Heard(name="a"), False),
     ],
     ids=[
         "head-on",
@@ -136,6 +137,7 @@ async def test_who_can_be_led_aside_gives_way_to_another_missions_that_cannot(sc
         "tells no heading",
         "not heard for long",
         "far away",
+        "the same vehicle, heard by another link",
     ],
 )
 async def test_a_vehicle_that_no_mission_leads_is_given_way_to(
