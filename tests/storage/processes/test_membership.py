@@ -99,7 +99,7 @@ async def test_others_are_called_and_hear_it(databases: Databases) -> None:
     called = asyncio.Event()
     async with member(url, 1, called.set), member(url, 2) as two:
         await two.call()
-        await asyncio.wait_for(called.wait(), 10)
+        assert await asyncio.wait_for(called.wait(), 10)
 
 
 async def test_whose_connection_broke_is_told_so(databases: Databases) -> None:

@@ -117,8 +117,11 @@ class OtherVehicles:
             del self._led[led.live.id]
 
     def led(self, live: LiveMission) -> LedVehicles | None:
-        """Return what another mission leads its vehicles by; None while it leads none."""
-        return None if live.halted else self._led.get(live.id)
+        """Return what another mission leads its vehicles by; None while it leads none, or keeps none apart.
+
+        Who keeps none apart would send nobody on that was led aside.
+        """
+        return None if live.halted or live.spec.limits.min_separation_m <= 0.0 else self._led.get(live.id)
 
     def about(self, live: LiveMission) -> list[OtherVehicle]:
         """Return the vehicles about that a mission does not lead."""
@@ -171,7 +174,8 @@ class OtherVehicles:
 
 def _led_elsewhere(member: Member, led: LedVehicles, report: VehicleReport) -> OtherVehicle:
     place = report.position
-    return OtherVehicle(place.lat_deg, place.lon_deg, led.moment.reach_m(member), partial(led.moment.as_led, member))
+    reach_m = led.moment.reach_m(member) + led.live.spec.limits.min_separation_m
+    return OtherVehicle(place.lat_deg, place.lon_deg, reach_m, partial(led.moment.as_led, member))
 
 
 def _is_near(vehicle: OtherVehicle, lat_deg: float, lon_deg: float) -> bool:

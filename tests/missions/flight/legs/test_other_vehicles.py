@@ -113,6 +113,19 @@ async def test_who_can_be_led_aside_gives_way_to_another_missions_that_cannot(sc
     assert {order.vehicle for it in missions for order in it.ordered} == {"ba"[which]}
 
 
+@pytest.mark.parametrize("which", [0, 1])
+async def test_a_mission_that_keeps_nobody_apart_has_nobody_led_aside(scene: Scene, which: int) -> None:
+    """It would never send them on."""
+    careless = LIMITS | {"min_separation_m": 0.0}
+    missions = [await scene(name, limits=careless if k == which else LIMITS) for k, name in enumerate("ab")]
+    missions[0].put("a", WEST, EAST)
+    missions[1].put("b", EAST, WEST)
+    others = missions[0].others
+    with others.flown(missions[0].giving_way.led), others.flown(missions[1].giving_way.led):
+        await missions[1 - which].giving_way.look()
+    assert {order.vehicle for it in missions for order in it.ordered} == {"ba"[which]}
+
+
 @pytest.mark.parametrize(
     ("heard", "meets"),
     [
