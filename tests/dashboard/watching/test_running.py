@@ -125,6 +125,36 @@ def test_one_vehicle_is_aborted_the_others_go_on_and_it_is_noted(page: Page, ser
     expect(by_id(page, "log").locator("li")).to_have_count(1)
 
 
+PLACES = """
+    (name) => {
+      window.places = [];
+      const look = () => {
+        const { top } = document.querySelector(`[data-testid="${name}"]`).getBoundingClientRect();
+        if (window.places.at(-1) !== top) window.places.push(top);
+        requestAnimationFrame(look);
+      };
+      look();
+    }
+"""
+"""Notes where an element is, picture by picture, each time it has moved."""
+
+
+def test_a_vehicles_buttons_stay_where_they_are_while_it_tells_more(page: Page, service: Service) -> None:
+    # A press met what had come to lie there: the words of a card come and go several times a second.
+    vehicles = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]
+    show(page, service.create(name="Still", vehicles=vehicles))
+    start(page)
+    for name in ("sim-1", "sim-2"):
+        expect(by_id(page, f"card-{name}")).to_have_attribute("data-link", "engaged")
+        expect(by_id(page, f"card-{name}")).to_contain_text("Surveying")
+    page.evaluate(PLACES, "abort-sim-2")
+    expect(by_id(page, "step")).to_have_text(re.compile(r"^\d\d"))
+    places = page.evaluate("window.places")
+    # They give way to more words than there were so far, and never come back.
+    assert places == sorted(places), places
+    assert len(places) <= 3, places
+
+
 def test_the_page_survives_a_killed_service(watched: Watched, service: Service) -> None:
     page = watched.page
     mission = service.create(name="Crossing")

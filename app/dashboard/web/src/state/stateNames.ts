@@ -321,5 +321,9 @@ type Allowed = Pick<MissionView, "allowed_actions">;
 export const isAllowed = (action: MissionAction, mission: Allowed): boolean =>
   mission.allowed_actions.includes(action);
 
+/** Whether a mission's vehicles have been sent out. */
+export const hasStarted = ({ state }: Pick<MissionView, "state">): boolean =>
+  state !== "draft" && state !== "ready";
+
 /** Whether nothing can be asked of a mission any more. */
 export const hasEnded = (mission: Allowed): boolean => mission.allowed_actions.length === 0;

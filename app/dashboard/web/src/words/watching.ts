@@ -17,6 +17,7 @@ export const WATCHING = {
   "cards.goesFor": { en: "goes for {pursuing}", pt: "vai atrás de {pursuing}" },
   "cards.flown": { en: "{flownM} flown", pt: "{flownM} percorridos" },
   "cards.sIdle": { en: "{idleS} s idle", pt: "{idleS} s parado" },
+  "cards.noWaypointYet": { en: "No waypoint yet", pt: "Ainda sem ponto" },
   "cards.waypointAtDepth": {
     en: "Waypoint {step} at {depthM} depth, {status}",
     pt: "Ponto {step} a {depthM} de profundidade, {status}",

@@ -14,6 +14,7 @@ import {
   failsafeTone,
   failsafeWords,
   hasEnded,
+  hasStarted,
   isSaid,
   isThere,
   PHASE_WORDS,
@@ -40,6 +41,7 @@ import { cardsFolded, cardsWidth, shownFolded } from "../chart/layout";
 import { Button, flips } from "../parts/Controls";
 import { Grip } from "../parts/Grip";
 import { WaypointShape } from "../parts/marks";
+import { Steady } from "../parts/Steady";
 import { CrosslinesCard } from "./CrosslinesCard";
 import { SearchCard } from "./SearchCard";
 import { SwathCard } from "./SwathCard";
@@ -104,6 +106,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
   const sign = live.value ? { calm: "◌", good: "●", warning: "▲", alarm: "✕" }[state.tone] : "?";
   const away = v.kind === "sim" && v.link === "unknown";
   const ended = mission.value !== null && hasEnded(mission.value);
+  const started = mission.value !== null && hasStarted(mission.value);
   const byEndurance = v.battery_pct === null && v.energy_left_pct !== null;
   return (
     <article
@@ -113,70 +116,65 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
       data-link={v.link}
       aria-label={say("cards.vehicle", { v: v.name })}
     >
-      <header>
-        <h2>{v.name}</h2>
-        <span class={`tone ${state.tone}`} data-testid={`state-${v.name}`}>
-          <span aria-hidden="true">{sign}</span> {state.words}
-        </span>
-      </header>
-      <dl class="big">
-        <div>
-          <dt>{say("fleet.depth")}</dt>
-          <dd data-testid={`depth-${v.name}`}>{metres(v.depth_m)}</dd>
-        </div>
-        <div>
-          <dt>{say("charts.altitude")}</dt>
-          <dd>{metres(v.altitude_m)}</dd>
-        </div>
-        <div class={v.battery ?? ""}>
-          <dt>{byEndurance ? say("asked.energy") : say("charts.battery")}</dt>
-          <dd data-testid={`energy-${v.name}`}>
-            {byEndurance ? percent(v.energy_left_pct) : batteryWords(v)}
-          </dd>
-        </div>
-        <div class={vehicle.stale && !away ? "late" : ""}>
-          <dt>{say("fleet.heard")}</dt>
-          <dd>{age(vehicle.age_s)}</dd>
-        </div>
-      </dl>
-      {v.active && !ended ? <Range of={v} /> : null}
-      <Reasons vehicle={vehicle} tone={state.tone} />
-      <p class="small">
-        {[
-          v.kind === "imc"
-            ? `IMC${v.imc_id === null ? "" : ` 0x${v.imc_id.toString(16).padStart(4, "0")}`}`
-            : v.kind,
-          v.address,
-          v.speed_mps === null ? null : speed(v.speed_mps),
-          ...sonarWords(v, mission.value?.spec.vehicles),
-          ...localizationWords(v),
-          v.pursuing === null ? null : say("cards.goesFor", { pursuing: v.pursuing }),
-        ]
-          .filter((part) => part !== null)
-          .map((part) => part?.replaceAll(" ", "\u00a0"))
-          .join(" · ")}
-      </p>
-      {v.phase !== null && mission.value && mission.value.progress.elapsed_s > 0 ? (
-        <p class="small" data-testid={`flown-${v.name}`}>
-          {[
-            ...(v.active && !ended && !v.waiting_circle ? [capital(PHASE_WORDS[v.phase])] : []),
-            say("cards.flown", { flownM: distance(v.flown_m) }),
-            say("cards.sIdle", { idleS: Math.round(v.idle_s) }),
-          ].join(" · ")}
-        </p>
-      ) : null}
-      {vehicle.waypoint && v.active ? (
-        <p class="small waypoint-line">
-          <WaypointShape status={vehicle.waypoint.status} colour={vehicle.colour} />
-          {say("cards.waypointAtDepth", {
-            step: vehicle.waypoint.step,
-            depthM: metres(vehicle.waypoint.depth_m),
-            status: WAYPOINT_WORDS[vehicle.waypoint.status],
-          })}
-        </p>
-      ) : null}
-      <OrderLine of={v} />
+      <Steady>
+        <header>
+          <h2>{v.name}</h2>
+          <span class={`tone ${state.tone}`} data-testid={`state-${v.name}`}>
+            <span aria-hidden="true">{sign}</span> {state.words}
+          </span>
+        </header>
+        <dl class="big">
+          <div>
+            <dt>{say("fleet.depth")}</dt>
+            <dd data-testid={`depth-${v.name}`}>{metres(v.depth_m)}</dd>
+          </div>
+          <div>
+            <dt>{say("charts.altitude")}</dt>
+            <dd>{metres(v.altitude_m)}</dd>
+          </div>
+          <div class={v.battery ?? ""}>
+            <dt>{byEndurance ? say("asked.energy") : say("charts.battery")}</dt>
+            <dd data-testid={`energy-${v.name}`}>
+              {byEndurance ? percent(v.energy_left_pct) : batteryWords(v)}
+            </dd>
+          </div>
+          <div class={vehicle.stale && !away ? "late" : ""}>
+            <dt>{say("fleet.heard")}</dt>
+            <dd>{age(vehicle.age_s)}</dd>
+          </div>
+        </dl>
+      </Steady>
       {v.active ? <Orders of={v} ended={ended} /> : null}
+      <Reasons vehicle={vehicle} tone={state.tone} />
+      <OrderLine of={v} />
+      <Steady key={`${v.active} ${ended}`}>
+        {v.active && !ended ? <Range of={v} /> : null}
+        <p class="small">
+          {[
+            v.kind === "imc"
+              ? `IMC${v.imc_id === null ? "" : ` 0x${v.imc_id.toString(16).padStart(4, "0")}`}`
+              : v.kind,
+            v.address,
+            v.speed_mps === null ? null : speed(v.speed_mps),
+            ...sonarWords(v, mission.value?.spec.vehicles),
+            ...localizationWords(v),
+            v.pursuing === null ? null : say("cards.goesFor", { pursuing: v.pursuing }),
+          ]
+            .filter((part) => part !== null)
+            .map((part) => part?.replaceAll(" ", "\u00a0"))
+            .join(" · ")}
+        </p>
+        {v.phase !== null && started ? (
+          <p class="small" data-testid={`flown-${v.name}`}>
+            {[
+              ...(v.active && !ended && !v.waiting_circle ? [capital(PHASE_WORDS[v.phase])] : []),
+              say("cards.flown", { flownM: distance(v.flown_m) }),
+              say("cards.sIdle", { idleS: Math.round(v.idle_s) }),
+            ].join(" · ")}
+          </p>
+        ) : null}
+        {v.active && started ? <WaypointLine vehicle={vehicle} /> : null}
+      </Steady>
       {v.active ? null : (
         <p class="small left-at" data-testid={`left-${v.name}`}>
           {say("cards.leftItIsShownWhereIt", {
@@ -209,6 +207,21 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </div>
       ) : null}
     </article>
+  );
+}
+
+/** Where it goes; there as soon as it may be told one, so that nothing moves when it is. */
+function WaypointLine({ vehicle: { waypoint, colour } }: { vehicle: Vehicle }) {
+  if (!waypoint) return <p class="small">{say("cards.noWaypointYet")}</p>;
+  return (
+    <p class="small waypoint-line">
+      <WaypointShape status={waypoint.status} colour={colour} />
+      {say("cards.waypointAtDepth", {
+        step: waypoint.step,
+        depthM: metres(waypoint.depth_m),
+        status: WAYPOINT_WORDS[waypoint.status],
+      })}
+    </p>
   );
 }
 

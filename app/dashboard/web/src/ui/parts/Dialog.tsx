@@ -5,7 +5,7 @@
 
 import "./Dialog.css";
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { say } from "../../words/say";
 import { Button, Trouble } from "./Controls";
 
@@ -53,7 +53,8 @@ export function Dialog({
   const close = useRef(onClose);
   close.current = onClose;
 
-  useEffect(() => {
+  // With what is drawn: the focus that goes back later is taken from where somebody types by then.
+  useLayoutEffect(() => {
     const element = dialog.current;
     if (!open || !element) return;
     const me = {};
