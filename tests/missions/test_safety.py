@@ -14,7 +14,7 @@ from shapely.geometry import LineString, Point, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.problem import Proposal, Situation
+from app.exploration.core.problem import Belief, Proposal, Situation
 from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
 from app.missions.safety import free_space, tide_and_bottom, travel_depth, waypoint_check
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
@@ -243,6 +243,74 @@ def test_no_wall_keeps_a_vehicle_where_its_last_leg_ended(depth_m: FloatArray, c
     assert decision.legs[0].target_m[2] <= max(room_m, 0.0) + 1e-9
 
 
+def with_shoal(east_m: float, north_m: float, radius_m: float, depth_m: float = 0.6) -> Belief:
+    """A floor of nine metres with a shoal on it."""
+    known = belief_of()
+    away = np.hypot(*(known.xy_m - [east_m, north_m]).T)
+    return replace(known, depth_m=np.where(away < radius_m, depth_m, 9.0), sd_m=np.full(len(away), 0.05))
+
+
+@pytest.mark.parametrize("moving", [True, False], ids=["gets a leg", "gets none now"])
+def test_who_is_over_ground_too_shoal_leaves_it_at_the_surface_and_keeps_nobody_else_from_its_leg(moving: bool) -> None:
+    """Every leg off it began over the same ground, which none may lead over: it stayed, and others with it."""
+    places = [replace(place("a", 30, 30), moving=moving), place("b", 8, 50)]
+    wishes = [[34.0, 30.0, 2.0], [16.0, 50.0, 2.0]]
+    decision, planner, spec = decide_for(places, wishes, with_shoal(30, 30, 11.0))
+    legs = {leg.vehicle: leg for leg in decision.legs}
+    np.testing.assert_allclose(legs["b"].target_m[:2], [16.0, 50.0])
+    [asked] = planner.asked
+    assert asked.vehicles == ("a", "b"), "it keeps its share of the plan"
+    assert asked.moves.tolist() == [False, True]
+    if not moving:
+        assert "a" not in legs
+        return
+    assert legs["a"].refusal == ""
+    assert legs["a"].target_m[2] == 0.0
+    end = legs["a"].target_m[:2]
+    assert np.hypot(*(end - 30.0)) > 11.0
+    assert Polygon(spec.local_area()).covers(Point(end))
+    assert decision.notes == [
+        "a: the bottom is 0.6 m below the surface there, and 1 m are needed; it leaves for deeper ground at the surface"
+    ]
+
+
+def test_the_way_off_a_shoal_is_over_ground_that_is_no_shoaler_and_off_zones() -> None:
+    known = with_shoal(30, 30, 11.0)
+    dry = (known.xy_m[:, 0] > 30.0) & (known.depth_m < 1.0)
+    bank = rectangle(24, 42, 60, 46)
+    decision, *_, spec = decide_for(
+        [place("a", 30, 38)],
+        [[30.0, 38.0, 0.0]],
+        replace(known, depth_m=np.where(dry, 0.1, known.depth_m)),
+        keep_out=[bank],
+    )
+    [leg] = decision.legs
+    way = LineString([(30.0, 38.0), tuple(leg.target_m[:2])])
+    assert way.distance(Polygon(spec.to_local(spec.keep_out[0]))) > 1.0
+    middle = np.array(way.interpolate(0.5, normalized=True).coords[0])
+    assert middle[0] < 30.0
+
+
+def test_who_is_afloat_is_not_sent_over_ground_that_is_drier_than_where_it_is() -> None:
+    known = with_shoal(30, 30, 13.0, -0.2)
+    here = np.hypot(*(known.xy_m - 30.0).T) < 4.0
+    ring = replace(known, depth_m=np.where(here, 0.3, known.depth_m))
+    decision, *_ = decide_for([place("a", 30, 30)], [], ring)
+    [leg] = decision.legs
+    assert "every way off leads over dry ground or is barred" in leg.refusal
+    # Where the map has it all dry there is water all the same.
+    flat, *_ = decide_for([place("a", 30, 30)], [[30.0, 30.0, 0.0]], with_shoal(30, 30, 13.0, -0.2))
+    [leg] = flat.legs
+    assert leg.refusal == ""
+
+
+def test_planners_are_told_of_the_bottom_below_the_surface_as_it_is_now() -> None:
+    """They planned over ground that low water had made too shoal, and vehicles held there."""
+    for level_m, depth_m in ((-3.0, 6.0), (2.0, 9.0)):
+        _, planner, _ = decide_for([place("a", 10, 10)], [[16.0, 10.0, 2.0]], water_level_m=level_m)
+        np.testing.assert_allclose(planner.asked[0].belief.depth_m, depth_m)
+
+
 def test_a_proposal_of_nan_holds_and_is_told() -> None:
     decision, _, _ = decide_for([place("a", 10, 10)], [[math.nan, 12.0, 2.0]])
     np.testing.assert_allclose(decision.legs[0].target_m, [10, 10, 2.0])
@@ -298,7 +366,7 @@ def test_a_vehicle_behind_a_zone_that_bars_every_straight_way_in_comes_round_it(
         )
         (leg,) = decision.legs
         assert leg.refusal == ""
-        assert leg.comes_in
+        assert leg.unplanned
         assert leg.target_m[2] == 0.0
         zone, area = Polygon(spec.to_local(spec.keep_out[0])), Polygon(spec.local_area())
         legs.append(LineString([at, leg.target_m[:2]]))
@@ -344,7 +412,7 @@ def test_a_vehicle_beyond_a_zone_close_to_the_border_is_not_planned_for_from_the
     decision, planner, spec = decide_for([place("a", -9, 30)], [], keep_out=[quay], limits={"keep_out_margin_m": 1.0})
     assert planner.asked == []
     (leg,) = decision.legs
-    assert leg.comes_in
+    assert leg.unplanned
     zone = Polygon(spec.to_local(spec.keep_out[0]))
     assert LineString([(-9.0, 30.0), tuple(leg.target_m[:2])]).distance(zone) > 0.9
 

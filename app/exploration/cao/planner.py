@@ -142,6 +142,10 @@ class CaoPlanner(PlannerBase):
         """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`; in surveys only."""
         return isinstance(self._model, SurveyRegressors) and self._model.skip_line(vehicle, begin_m, here_m)
 
+    def leave_out(self, vehicle: str, count: int, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.leave_out`; in surveys only."""
+        return isinstance(self._model, SurveyRegressors) and self._model.leave_out(vehicle, count, here_m)
+
     def ways_ahead_m(self) -> dict[str, FloatArray]:
         """See :meth:`app.exploration.planner.base.PlannerBase.ways_ahead_m`; in surveys only."""
         return self._model.ways_ahead_m() if isinstance(self._model, SurveyRegressors) else {}

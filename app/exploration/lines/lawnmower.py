@@ -187,6 +187,13 @@ class LawnmowerPlanner(PlannerBase):
         self._routes[vehicle] = rest
         return True
 
+    def leave_out(self, vehicle: str, count: int, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.leave_out`."""
+        if vehicle not in self._routes:
+            return False
+        self._routes[vehicle] = self._routes[vehicle][count:]
+        return True
+
     def ways_ahead_m(self) -> dict[str, FloatArray]:
         """See :meth:`app.exploration.planner.base.PlannerBase.ways_ahead_m`."""
         return dict(self._routes)

@@ -146,6 +146,18 @@ class PlannerBase(ABC):
         """
         return False
 
+    def leave_out(self, vehicle: str, count: int, here_m: FloatArray) -> bool:
+        """Leave out the next via points of a vehicle's plan; returns False where it has no such plan.
+
+        Parameters
+        ----------
+        count
+            How many of what :meth:`ways_ahead_m` tells of it.
+        here_m : (2,)
+            Where the vehicle is.
+        """
+        return False
+
     def ways_ahead_m(self) -> dict[str, FloatArray]:
         """Return where vehicles go after what was proposed last, as planned now, (k, 2) by name.
 

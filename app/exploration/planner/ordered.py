@@ -15,6 +15,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import SAME_M, FreeSpace
+from app.exploration.core.shoals import OpenGround
 from app.exploration.core.snapshot_codec import pack, unpack
 from app.exploration.planner.base import PlannerBase, at_depth
 
@@ -32,7 +33,7 @@ MOST_LOST = 6
 """So often legs of an order are given up before the order is."""
 
 NO_ORDER = 0
-"""In place of an order's number, of a way round what barred a vehicle's legs."""
+"""In place of an order's number, of a way round what barred a vehicle's legs, or round a shoal."""
 
 
 @dataclass
@@ -224,6 +225,9 @@ class OrderedPlanner:
     def propose(self, situation: Situation, rng: np.random.Generator) -> Proposal:
         """Return a configuration that obeys ``situation.constraints``."""
         moves = situation.moves
+        belief = situation.belief
+        bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m) if belief.on_floor else Bottom.unknown()
+        self._lead_round_shoals(situation, bottom)
         led = [
             i for i, name in enumerate(situation.vehicles) if moves[i] and self._has_way(name, situation.positions[i])
         ]
@@ -236,12 +240,30 @@ class OrderedPlanner:
             return self.planner.propose(situation, rng)
         proposal = self.planner.propose(replace(situation, moving=planned), rng)
         positions = np.array(proposal.positions, dtype=np.float64)
-        belief = situation.belief
-        bottom = Bottom.from_landmarks(belief.xy_m, belief.depth_m) if belief.on_floor else Bottom.unknown()
         for i in led:
             self._since[situation.vehicles[i]] = 0
             positions[i] = self._leg(situation, i, positions, bottom)
         return replace(proposal, positions=positions, done=proposal.done - {situation.vehicles[i] for i in led})
+
+    def _lead_round_shoals(self, situation: Situation, bottom: Bottom) -> None:
+        """Lead vehicles round shoals within a step on their planned ways: they would stand before these."""
+        constraints, belief = situation.constraints, situation.belief
+        ground, ahead = OpenGround(bottom, constraints), self.planner.ways_ahead_m()
+        for name, place_m, goes in zip(situation.vehicles, situation.positions[:, :2], situation.moves, strict=True):
+            if not goes or name in self.ways:
+                continue
+            vias_m = ahead.get(name, np.zeros((0, 2)))
+            found = ground.way_round(place_m, vias_m, constraints.max_step_m)
+            if found is not None and found.passed == len(vias_m):
+                # Its whole rest is left out where that is sure, not where few soundings make all ground look shoal.
+                least = Bottom.from_landmarks(belief.xy_m, belief.depth_m + belief.sd_m)
+                sure = OpenGround(least, constraints).way_round(place_m, vias_m, constraints.max_step_m)
+                found = found if sure is not None and sure.passed == len(vias_m) else None
+            if found is None or not self.planner.leave_out(name, found.passed, place_m):
+                continue
+            if len(found.corners_m):
+                self.ways[name] = OrderedWay(NO_ORDER, found.corners_m)
+                self._since[name] = 0
 
     def _has_way(self, vehicle: str, place_m: FloatArray) -> bool:
         way = self.ways.get(vehicle)

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+from shapely import Polygon
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
@@ -17,7 +18,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, planned_way_m
+from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, from_outside, planned_way_m
 from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
@@ -281,7 +282,7 @@ class OwnLegs:
             gets_it = end_m is not None and np.array_equal(end_m, leg.target_m)
             led_to = self._dispatch.dropped.get(leg.vehicle, [])
             is_led_round = any(np.array_equal(end, leg.target_m[:2]) for end in led_to)
-            if not leg.comes_in and not leg.refusal and not gets_it and not is_led_round:
+            if not leg.unplanned and not leg.refusal and not gets_it and not is_led_round:
                 yield leg
 
     async def _commit(
@@ -404,9 +405,10 @@ class OwnLegs:
 
     def _ways_aside(self, start: FloatArray, planned: Leg, bottom: Bottom) -> FloatArray:
         """Return where a vehicle may go in place of the end of its leg, (k, 3); who comes in comes in elsewhere."""
-        if not planned.comes_in:
+        if not planned.unplanned:
             return ways_aside(start, planned.target_m, self._constraints.for_plans, bottom)
-        entries = free_space.ways_in(self._constraints, start[:2], INSET_M)
+        outside = from_outside(start[:2], Polygon(self._constraints.area), self._spec)
+        entries = free_space.ways_in(self._constraints, start[:2], INSET_M) if outside else []
         return np.array([np.append(entry, planned.target_m[2]) for entry in entries]).reshape(-1, 3)
 
     def _place(self, member: Member, *, moving: bool) -> Place:

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
 from app.estimation import SingleBeam
+from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Situation
 from app.exploration.core.routes import FreeSpace
+from app.exploration.core.shoals import OpenGround
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planner.ordered import OrderedPlanner
 from app.exploration.planners import create_planner
@@ -283,3 +285,43 @@ def test_a_line_that_is_left_goes_on_where_it_was_left(name: str) -> None:
     assert max(way.distance(Point(place[0, :2])) for place in places[6:]) < 1.0
     left = LineString([place[0, :2] for place in places[6:]])
     assert way.buffer(1.0).covers(left)
+
+
+@pytest.mark.parametrize("name", ["lawnmower", "cao"])
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=6, deadline=None)
+def test_planned_ways_go_round_shoals_and_nobody_stands_before_one(name: str, seed: int) -> None:
+    """Legs over them are not allowed: a vehicle stood before one for as many legs as it had left."""
+    rng = np.random.default_rng(seed)
+    constraints = Constraints(SQUARE, max_step_m=12.0, max_depth_m=20.0, min_altitude_m=1.0)
+    belief = make_belief()
+    depth_m = np.full(len(belief.xy_m), 8.0)
+    for x, y, radius_m in zip(*rng.uniform(20.0, 80.0, (2, 3)), rng.uniform(5.0, 14.0, 3), strict=True):
+        depth_m[np.hypot(*(belief.xy_m - [x, y]).T) < radius_m] = 0.5
+    bottom = Bottom.from_landmarks(belief.xy_m, depth_m)
+    start = np.array([[4.0, 4.0, 1.0]])
+    situation = make_situation(
+        vehicles=("a",),
+        positions=start,
+        belief=replace(belief, depth_m=depth_m),
+        constraints=constraints,
+    )
+    planner, place, stood = planner_of(name), start, 0
+    ground = OpenGround(bottom, constraints)
+    for step in range(1, 50):
+        here = replace(situation, step=step, positions=place, soundings_en_m=place[:, :2])
+        memory = planner.snapshot()
+        found = planner.propose(here, np.random.default_rng([seed, step]))
+        again = planner_of(name)
+        again.restore(memory)
+        np.testing.assert_array_equal(
+            again.propose(here, np.random.default_rng([seed, step])).positions, found.positions
+        )
+        assert not constraints.violations(here.vehicles, place, found.positions, bottom)
+        if "a" in found.done:
+            break
+        moved_m = float(np.hypot(*(found.positions - place)[0, :2]))
+        stood = stood + 1 if moved_m < 0.5 else 0
+        assert stood < 3, f"it stands at {place[0]}"
+        assert not ground.is_shoal(found.positions[:, :2]).any()
+        place = np.array(found.positions)

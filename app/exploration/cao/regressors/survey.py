@@ -290,15 +290,18 @@ class SurveyRegressors:
 
     def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
         """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
-        followed, other = (self._plan, self._backbone) if self._free else (self._backbone, self._plan)
-        route = followed.get(vehicle, np.zeros((0, 2)))
+        route = self.ways_ahead_m().get(vehicle, np.zeros((0, 2)))
         rest = after_line(begin_m, here_m, route)
-        if rest is None:
+        return rest is not None and self.leave_out(vehicle, len(route) - len(rest), here_m)
+
+    def leave_out(self, vehicle: str, count: int, here_m: FloatArray) -> bool:
+        """See :meth:`app.exploration.planner.base.PlannerBase.leave_out`."""
+        followed, other = (self._plan, self._backbone) if self._free else (self._backbone, self._plan)
+        if vehicle not in followed or vehicle not in other:
             return False
-        skipped = route[: len(route) - len(rest)]
-        followed[vehicle] = rest
+        skipped, followed[vehicle] = np.split(followed[vehicle], [count])
         beside = other[vehicle]
-        while len(beside) and np.hypot(*(skipped - beside[0]).T).min() <= SAME_M:
+        while len(beside) and np.hypot(*(skipped - beside[0]).T).min(initial=np.inf) <= SAME_M:
             beside = beside[1:]
         other[vehicle] = beside
         self._coarse[vehicle] = max(0, self._coarse.get(vehicle, 0) - len(skipped))

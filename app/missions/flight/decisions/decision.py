@@ -18,12 +18,13 @@ from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.errands import due_to_rise
 from app.exploration.core.moving_targets import Localization, Targets
 from app.exploration.core.problem import Belief, Planner, Situation
+from app.exploration.core.shoals import OpenGround
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions.flight.decisions.zone_clearance import clear_of_zones, room_around
-from app.missions.safety import free_space, travel_depth, waypoint_check
-from app.missions.safety.tide_and_bottom import BottomNow
+from app.missions.safety import free_space, shoals, travel_depth, waypoint_check
+from app.missions.safety.tide_and_bottom import BottomNow, below_surface_m
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.surface_policy import SurfacePolicy
@@ -49,6 +50,9 @@ RISE_AT = 0.9
 
 RISE_OF_STEP = 0.9
 """Part of a step that a vehicle rises at most, so that a deep one comes up in several steps."""
+
+POND = 2.0
+"""Who is cut off by shoals on less ground than a square of so many steps leaves it: little can be flown there."""
 
 INSET_M = 1.0
 """Vehicles that come from outside are sent to a point this far inside the border."""
@@ -115,8 +119,9 @@ class Leg:
     refusal: str = ""
     surfacing: bool = False
     """Whether it comes up, or stays up, for a fix."""
-    comes_in: bool = False
-    """Whether it leads into the area from far outside: that takes nothing of the way that is to be flown there."""
+    unplanned: bool = False
+    """Whether it leads to where a vehicle can be planned for, into the area from far outside or off a shoal: that
+    takes nothing of the way that is to be flown."""
 
 
 @dataclass(frozen=True)
@@ -283,11 +288,16 @@ def decide(
     """
     where = {place.vehicle: place.en_m for place in places}
     team, legs, notes = _planned_for(places, spec, constraints, knowledge.search is not None)
-    if not team:
-        return Decision(legs, None, {}, planner.snapshot(), notes, origin_m=where)
-
     belief = knowledge.belief
+    # Planners go by what the water leaves them now.
+    knowledge = replace(knowledge, belief=belief_below_surface(belief, knowledge.water_level_m))
     floor = BottomNow.of(belief.xy_m, belief.depth_m, belief.sd_m, knowledge.water_level_m)
+    if knowledge.search is None:
+        team, off, said = _sent_off_shoals(team, spec, constraints, floor)
+        legs, notes = [*legs, *off], [*notes, *said]
+    if not team:
+        return Decision(legs, None, {}, planner.snapshot(), notes, bottom=floor.cautious, origin_m=where)
+
     origin = np.array([[*p.en_m, p.travel_depth_m(p.en_m, p.en_m, floor.cautious, constraints)] for p in team])
     up, fixes = surfacing(team, spec.surface_policy)
     for i, place in enumerate(team):
@@ -339,6 +349,14 @@ def decide(
     )
 
 
+def belief_below_surface(belief: Belief, water_level_m: float) -> Belief:
+    """Return a map whose depths are told from the surface as it is now, as vehicles count theirs."""
+    depth_m = below_surface_m(belief.depth_m, water_level_m)
+    sounded_m = belief.sounded_m.copy()
+    sounded_m[:, 2] = below_surface_m(sounded_m[:, 2], water_level_m)
+    return replace(belief, depth_m=depth_m, sounded_m=sounded_m)
+
+
 def _planned_for(
     places: list[Place], spec: MissionSpec, constraints: Constraints, site_unknown: bool
 ) -> tuple[list[Place], list[Leg], list[str]]:
@@ -380,6 +398,39 @@ def _planned_for(
             # Nobody may stay where a limit is broken: who gets no leg there would keep all others from theirs.
             team.append(replace(place, en_m=begins if place.moving else clear_of_zones(constraints, begins)))
     return team, legs, notes
+
+
+def _sent_off_shoals(
+    team: list[Place], spec: MissionSpec, constraints: Constraints, floor: BottomNow
+) -> tuple[list[Place], list[Leg], list[str]]:
+    """Return the vehicles as they are planned for, the legs of those that shoals cut off, and what is to be said.
+
+    A planner finds no way off a shoal: each begins over ground that it may not go over. It plans for the others as if
+    who is there had left already; who finds no way is not planned for, and would keep all others from their legs.
+    """
+    ground = OpenGround(floor.likely, constraints)
+    planned: list[Place] = []
+    legs: list[Leg] = []
+    notes: list[str] = []
+    for place in team:
+        if place.keeps_depth or not ground.is_cut_off(place.en_m, (POND * constraints.max_step_m) ** 2):
+            planned.append(place)
+            continue
+        others = [p.en_m for p in team if p is not place] + [leg.target_m[:2] for leg in legs]
+        goal = shoals.way_off(place.en_m, ground, floor.likely, constraints, others, arrival_room_m(spec))
+        if goal is not None:
+            planned.append(replace(place, en_m=goal, moving=False))
+        if not place.moving:
+            continue
+        depth_m, least_m = float(floor.likely.at(place.en_m)), constraints.min_altitude_m
+        where = f"the bottom is {depth_m:.1f} m below the surface there, and {least_m:g} m are needed"
+        if depth_m >= least_m:
+            where = "shoals cut it off there"
+        refusal = "" if goal is not None else f"{where}; every way off leads over dry ground or is barred"
+        end_m = place.en_m if goal is None else goal
+        legs.append(Leg(place.vehicle, np.append(end_m, 0.0), refusal, unplanned=True))
+        notes.append(f"{place.vehicle}: {refusal or f'{where}; it leaves for deeper ground at the surface'}")
+    return planned, legs, notes
 
 
 def from_outside(place_m: FloatArray, area: Polygon, spec: MissionSpec) -> bool:
@@ -489,7 +540,7 @@ def _come_in(place: Place, constraints: Constraints, taken: list[FloatArray], ro
     if goal is None:
         return Leg(place.vehicle, np.append(place.en_m, 0.0), "a keep-out zone or a vehicle bars every way in")
     # The bottom on the way is unknown: it comes at the surface.
-    return Leg(place.vehicle, np.append(goal, 0.0), comes_in=True)
+    return Leg(place.vehicle, np.append(goal, 0.0), unplanned=True)
 
 
 def _within_step(origin: FloatArray, target: FloatArray, max_step_m: float) -> FloatArray:

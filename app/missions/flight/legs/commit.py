@@ -115,7 +115,7 @@ class LegCommit:
                 now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
             if member is None or member is not now_of_name or member.left_at is not None:
                 continue
-            if not leg.comes_in:
+            if not leg.unplanned:
                 begin_m = starts_m[row.vehicle]
                 if not member.ahead and member.target_m is not None and member.status is WaypointStatus.REACHED:
                     # It was there a little before the end of its last leg, all of which is counted already.
