@@ -17,14 +17,15 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.errands import due_to_rise
 from app.exploration.core.moving_targets import Localization, Targets
+from app.exploration.core.open_ground import OpenGround
 from app.exploration.core.problem import Belief, Planner, Situation
-from app.exploration.core.shoals import OpenGround
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.exploration.site_search import SearchTask
 from app.missions.flight.decisions.zone_clearance import clear_of_zones, room_around
-from app.missions.safety import free_space, shoals, travel_depth, waypoint_check
+from app.missions.safety import free_space, travel_depth, waypoint_check
 from app.missions.safety.tide_and_bottom import BottomNow, below_surface_m
+from app.missions.safety.way_off_shoals import way_off
 from app.missions.search.course import hold_before_hazards
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.surface_policy import SurfacePolicy
@@ -417,7 +418,7 @@ def _sent_off_shoals(
             planned.append(place)
             continue
         others = [p.en_m for p in team if p is not place] + [leg.target_m[:2] for leg in legs]
-        goal = shoals.way_off(place.en_m, ground, floor.likely, constraints, others, arrival_room_m(spec))
+        goal = way_off(place.en_m, ground, floor.likely, constraints, others, arrival_room_m(spec))
         if goal is not None:
             planned.append(replace(place, en_m=goal, moving=False))
         if not place.moving:

@@ -11,7 +11,7 @@ from shapely import LineString, Point
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.shoals import OpenGround
+from app.exploration.core.open_ground import OpenGround
 
 SIDE_M, CELL_M, STEP_M = 80.0, 2.0, 20.0
 AREA = np.array([[0.0, 0.0], [SIDE_M, 0.0], [SIDE_M, SIDE_M], [0.0, SIDE_M]])

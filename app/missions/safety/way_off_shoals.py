@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
-from app.exploration.core.shoals import OpenGround
+from app.exploration.core.open_ground import OpenGround
 from app.missions.safety import free_space
 
 WAYS = 400
