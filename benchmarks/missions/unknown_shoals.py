@@ -1,4 +1,4 @@
-"""Surveys over shoals that nobody knew of: ``python -m benchmarks.missions.unknown_shoals [--floors 10]``.
+"""Surveys over shoals that nobody knew of: ``python -m benchmarks.missions.unknown_shoals [--floors 12]``.
 
 Each floor is drawn by its number: an area of 60 to 160 m, 3 to 12 m deep, with one to five round shoals of 4 to 14 m of
 radius that rise to 0.3 to 0.8 m below the surface with slopes of 0.1 to 1; every third one rises to a shore along its
@@ -144,7 +144,7 @@ def longest_stay(way: list[tuple[float, float]]) -> int:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Fly and print."""
     parser = make_parser(__doc__, FLIGHT)
-    parser.add_argument("--floors", type=int, default=10)
+    parser.add_argument("--floors", type=int, default=12)
     parser.add_argument("--first", type=int, default=0, help="number of the first")
     options = parser.parse_args(arguments)
     logs.configure("error", "json")
