@@ -198,3 +198,32 @@ def test_panels_keep_the_size_that_they_were_given_and_the_map_keeps_clear_of_th
             or label["y"] + label["height"] <= box["y"]
         )
         assert apart, cover
+
+
+COUNTED = """
+    () => {
+      window.drawn = 0;
+      const clear = CanvasRenderingContext2D.prototype.clearRect;
+      CanvasRenderingContext2D.prototype.clearRect = function (...where) {
+        window.drawn += 1;
+        return clear.apply(this, where);
+      };
+    }
+"""
+"""Counts how often a sheet of the map is drawn."""
+
+
+def test_the_map_is_not_drawn_again_while_nothing_moves(page: Page, service: Service) -> None:
+    messages: list[object] = []
+    page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: messages.append(frame)))
+    show(page, service.create(name="At rest"))
+
+    def until_more(count: int) -> None:
+        wanted = len(messages) + count
+        while len(messages) < wanted:
+            page.wait_for_timeout(50)
+
+    until_more(15)
+    page.evaluate(COUNTED)
+    until_more(15)
+    assert page.evaluate("window.drawn") <= 2

@@ -10,6 +10,7 @@ import type { LngLat, PolygonGeometry } from "../../api/types";
 import { say } from "../../words/say";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "../geo";
 import { type Harbour, harbours } from "../harbours";
+import { isSame } from "../isSame";
 import type { PlaceMark, Route, Spot, Track } from "../marks/marks";
 import type { ShipMark } from "../marks/ships";
 import { type Site, sitePicture } from "../marks/site";
@@ -426,9 +427,11 @@ export class Chart {
 
   setPins(pins: readonly Pin[]): void {
     const gone = new Set(this.#pins.keys());
+    let moved = false;
     for (const pin of pins) {
       gone.delete(pin.key);
       let marker = this.#pins.get(pin.key);
+      moved ||= !marker || !isSame(marker.getLngLat().toArray(), pin.at);
       if (!marker) {
         const element = document.createElement("div");
         element.style.zIndex = String(pin.layerIndex);
@@ -442,7 +445,9 @@ export class Chart {
       const words = element.querySelector<HTMLElement>(".mark-label");
       if (words) {
         const { offsetWidth: width, offsetHeight: height } = words;
-        this.#labels.set(pin.key, { width, height, reach: element.offsetWidth / 2 });
+        const label = { width, height, reach: element.offsetWidth / 2 };
+        moved ||= !isSame(this.#labels.get(pin.key), label);
+        this.#labels.set(pin.key, label);
       }
     }
     for (const key of gone) {
@@ -450,7 +455,7 @@ export class Chart {
       this.#pins.delete(key);
       this.#labels.delete(key);
     }
-    this.#sheets.refresh();
+    if (moved || gone.size > 0) this.#sheets.refresh();
   }
 
   #lay(content: Partial<StillContent>): void {
@@ -459,6 +464,10 @@ export class Chart {
   }
 
   #show(content: Partial<LivelyContent>): void {
+    // Messages bring all of it several times a second, whether anything moved or not.
+    const before = this.#lively;
+    const names = Object.keys(content) as (keyof LivelyContent)[];
+    if (names.every((name) => isSame(content[name], before[name]))) return;
     this.#lively = { ...this.#lively, ...content };
     this.#sheets.refresh();
   }

@@ -3,6 +3,7 @@
 import { computed, effect, signal } from "@preact/signals";
 import type { Padding } from "../../map/canvas/chart";
 import type { Box } from "../../map/canvas/labels";
+import { isSame } from "../../map/isSame";
 import { kept } from "../../persistentSignal";
 import { describing, drawing, mission, now, panelOpen, picking, stripHeight, tab } from "../../state/store";
 
@@ -86,14 +87,14 @@ export function watchRoom(root: HTMLElement): () => void {
           ]
         : [];
     });
-    if (JSON.stringify(boxes) !== JSON.stringify(covers.peek())) covers.value = boxes;
+    if (!isSame(boxes, covers.peek())) covers.value = boxes;
     const legend = root.querySelector(".legend")?.getBoundingClientRect();
     const upper = legend && legend.top - map.top < UPPER * map.height;
     const reach = {
       top: legend && upper ? Math.round(legend.bottom - map.top) : 0,
       bottom: legend && !upper ? Math.round(map.bottom - legend.top) : 0,
     };
-    if (JSON.stringify(reach) !== JSON.stringify(legendReach.peek())) legendReach.value = reach;
+    if (!isSame(reach, legendReach.peek())) legendReach.value = reach;
   };
   const soon = () => {
     if (frame === 0) frame = requestAnimationFrame(measure);
