@@ -66,24 +66,31 @@ class OpenGround:
     def is_cut_off(self, place_m: FloatArray, least_m2: float) -> bool:
         """Return whether a place (2,) is over a shoal, or in a part of the open ground that is smaller than that.
 
-        Nobody is cut off in the largest part, nor where no ground is open.
+        Nobody is cut off in the largest part, nor where no ground is open. What lies behind zones does not count.
         """
-        if not self._shoal.any() or not self.main.any():
+        if not self._shoal.any():
             return False
-        part = int(self._at(self._parts, place_m[None])[0])
+        largest = self.largest_part(place_m)
+        if not largest.any():
+            return False
         if bool(self.is_shoal(place_m)):
             return True
+        part = int(self._at(self._parts, place_m[None])[0])
         size_m2 = float(np.count_nonzero(self._parts == part)) * self._bottom.cell_m**2
-        return part > 0 and part != self._main_part and size_m2 < least_m2
+        return part > 0 and not bool(largest[self._parts == part].any()) and size_m2 < least_m2
+
+    def largest_part(self, place_m: FloatArray) -> BoolArray:
+        """Return which cells are in the largest part of the open ground on a place's side of zones, (rows, cols)."""
+        side = int(self._at(self._sides, place_m[None])[0])
+        parts = self._parts if side == 0 else np.where(self._sides == side, self._parts, 0)
+        sizes = np.bincount(parts.ravel(), minlength=2)[1:]
+        return np.asarray((parts == int(np.argmax(sizes)) + 1) & (parts > 0), dtype=np.bool_)
 
     @cached_property
-    def main(self) -> BoolArray:
-        """Which cells are in the largest part of the open ground, (rows, cols)."""
-        return np.asarray((self._parts == self._main_part) & (self._parts > 0), dtype=np.bool_)
-
-    @cached_property
-    def _main_part(self) -> int:
-        return int(np.argmax(np.bincount(self._parts.ravel(), minlength=2)[1:])) + 1
+    def _sides(self) -> IntArray:
+        """Which cells ways join where there are no shoals, from 1 on; 0: nobody may be there, (rows, cols)."""
+        sides, _ = label(self._free)
+        return np.asarray(sides, dtype=np.int64)
 
     @cached_property
     def _parts(self) -> IntArray:

@@ -32,9 +32,9 @@ def way_off(
 ) -> FloatArray | None:
     """Return where a vehicle that shoals cut off goes at the surface, (2,); None where there is no way.
 
-    It goes to the largest part of the open ground: to where that is known to be deep enough, or else to where nobody
-    knows it. Of the ways there it takes one whose shoalest place is as deep as any, or deep enough, and of those the
-    shortest. None leads over ground that is dry, and shoaler than where the vehicle is.
+    It goes to the largest part of the open ground on its side of zones: to where that is known to be deep enough, or
+    else to where nobody knows it. Of the ways there it takes one whose shoalest place is as deep as any, or deep
+    enough, and of those the shortest. None leads over ground that is dry, and shoaler than where the vehicle is.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def way_off(
     room_m
         How far from zones the way leads, where the vehicle is not nearer already.
     """
-    free = inside_area(constraints.for_plans, ground.centres_m) & ground.main.ravel()
+    free = inside_area(constraints.for_plans, ground.centres_m) & ground.largest_part(place_m).ravel()
     for other in taken:
         free &= np.hypot(*(ground.centres_m - other[:2]).T) >= constraints.min_separation_m
     known = np.isfinite(bottom.depth_m)

@@ -120,3 +120,11 @@ def test_who_is_on_a_shoal_or_in_a_pond_is_cut_off(place: tuple[float, float], l
 
 def test_where_everything_is_too_shoal_nobody_is_cut_off() -> None:
     assert not OpenGround(floor(depth_m=0.4), LIMITS).is_cut_off(np.array([40.0, 40.0]), 100.0)
+
+
+def test_who_is_behind_a_zone_is_not_cut_off_by_shoals() -> None:
+    wall = np.array([[20.0, -1.0], [24.0, -1.0], [24.0, 81.0], [20.0, 81.0]])
+    ground = OpenGround(floor((60.0, 40.0, 9.0)), Constraints(AREA, (wall,), max_step_m=STEP_M, min_altitude_m=1.0))
+    assert not ground.is_cut_off(np.array([10.0, 40.0]), 1e6)
+    assert not ground.largest_part(np.array([10.0, 40.0]))[:, 13:].any()
+    assert not ground.largest_part(np.array([40.0, 10.0]))[:, :10].any()
