@@ -18,7 +18,7 @@ from app.exploration.core.problem import Belief, Proposal, Situation
 from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
 from app.missions.safety import free_space, tide_and_bottom, travel_depth, waypoint_check
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
-from tests.support.missions.specs import make_spec, rectangle
+from tests.support.missions.specs import lon_lat, make_spec, rectangle
 
 AREA = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]])
 KEEP_OUT = np.array([[20.0, 20.0], [30.0, 20.0], [30.0, 30.0], [20.0, 30.0]])
@@ -295,13 +295,50 @@ def test_who_is_afloat_is_not_sent_over_ground_that_is_drier_than_where_it_is() 
     known = with_shoal(30, 30, 13.0, -0.2)
     here = np.hypot(*(known.xy_m - 30.0).T) < 4.0
     ring = replace(known, depth_m=np.where(here, 0.3, known.depth_m))
-    decision, *_ = decide_for([place("a", 30, 30)], [], ring)
+    decision, *_ = decide_for([place("a", 30, 30)], [[0.0] * 3], ring)
     [leg] = decision.legs
     assert "every way off leads over dry ground or is barred" in leg.refusal
     # Where the map has it all dry there is water all the same.
     flat, *_ = decide_for([place("a", 30, 30)], [[30.0, 30.0, 0.0]], with_shoal(30, 30, 13.0, -0.2))
     [leg] = flat.legs
     assert leg.refusal == ""
+
+
+@pytest.mark.parametrize("at", [(27.0, 32.0), (26.0, 33.0), (28.0, 34.0), (24.0, 33.0), (27.0, 36.0)])
+def test_the_way_off_a_shoal_does_not_lead_across_a_notch_of_the_area(at: tuple[float, float]) -> None:
+    """It was given, refused as it was to begin, and given again at once."""
+    area = [(0, 0), (60, 0), (60, 60), (31, 60), (31, 31), (29, 31), (29, 60), (0, 60)]
+    decision, *_, spec = decide_for(
+        [place("a", *at)],
+        [[*at, 0.0]],
+        with_shoal(22, 40, 14.0),
+        area={"type": "Polygon", "coordinates": [[list(lon_lat(*corner)) for corner in [*area, area[0]]]]},
+    )
+    [leg] = decision.legs
+    assert leg.refusal == ""
+    assert Polygon(spec.local_area()).buffer(1e-3).covers(LineString([at, tuple(leg.target_m[:2])]))
+
+
+def test_the_way_off_a_shoal_keeps_off_other_vehicles_and_leads_wherever_there_is_water() -> None:
+    west = with_shoal(30, 30, 13.0)
+    dry = (west.xy_m[:, 0] < 30.0) & (west.depth_m < 1.0)
+    known = replace(west, depth_m=np.where(dry, -0.5, west.depth_m))
+    others = [place("b", 40.0, 31.0)]
+    decision, *_ = decide_for([place("a", 33, 30), *others], [[0.0, 0.0, 0.0], [40.0, 31.0, 2.0]], known)
+    leg = next(leg for leg in decision.legs if leg.vehicle == "a")
+    assert leg.refusal == ""
+    way = LineString([(33.0, 30.0), tuple(leg.target_m[:2])])
+    assert way.distance(Point(40.0, 31.0)) >= 5.0 - 1e-6
+
+
+def test_who_finds_no_way_off_a_shoal_keeps_its_lines() -> None:
+    known = with_shoal(30, 30, 13.0, -0.2)
+    here = np.hypot(*(known.xy_m - 30.0).T) < 4.0
+    ring_m = replace(known, depth_m=np.where(here, 0.3, known.depth_m))
+    decision, planner, _ = decide_for([place("a", 30, 30), place("b", 8, 50)], [[0.0] * 3, [16.0, 50.0, 2.0]], ring_m)
+    [asked] = planner.asked
+    assert asked.vehicles == ("a", "b")
+    assert {leg.vehicle: bool(leg.refusal) for leg in decision.legs} == {"a": True, "b": False}
 
 
 def test_planners_are_told_of_the_bottom_below_the_surface_as_it_is_now() -> None:

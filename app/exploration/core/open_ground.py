@@ -21,6 +21,9 @@ BESIDE_M = 20.0
 LEAST_M = 5.0
 """A shorter leg up to a shoal is left out."""
 
+SMALL = 0.1
+"""A part of the open ground is small that is smaller than this share of the largest."""
+
 NEAREST = 40
 """So many cells about a vehicle that is beside a shoal are looked at, from which it may set out."""
 
@@ -37,7 +40,8 @@ class WayRound(NamedTuple):
     Attributes
     ----------
     corners_m : (k, 2)
-        The last one is on the plan; none where the rest of the plan is over shoals, or behind them.
+        As planned up to the shoal, then round it; the last one is on the plan. Where the rest of the plan is over
+        shoals, or behind them, only those up to the shoal, if any.
     passed : int
         So many of the plan's via points are left out.
     """
@@ -66,24 +70,38 @@ class OpenGround:
     def is_cut_off(self, place_m: FloatArray, least_m2: float) -> bool:
         """Return whether a place (2,) is over a shoal, or in a part of the open ground that is smaller than that.
 
-        Nobody is cut off in the largest part, nor where no ground is open.
+        Nobody is cut off in a part that is not much smaller than the largest, nor where no ground is open. What lies
+        behind zones does not count.
         """
-        if not self._shoal.any() or not self.main.any():
+        if not self._shoal.any():
             return False
-        part = int(self._at(self._parts, place_m[None])[0])
+        largest = self.largest_part(place_m)
+        if not largest.any():
+            return False
         if bool(self.is_shoal(place_m)):
             return True
-        size_m2 = float(np.count_nonzero(self._parts == part)) * self._bottom.cell_m**2
-        return part > 0 and part != self._main_part and size_m2 < least_m2
+        part = int(self._at(self._parts, place_m[None])[0])
+        cells = np.count_nonzero(self._parts == part)
+        small = cells * self._bottom.cell_m**2 < least_m2 and cells < SMALL * np.count_nonzero(largest)
+        return part > 0 and bool(small)
+
+    def largest_part(self, place_m: FloatArray) -> BoolArray:
+        """Return which cells are in the largest part of the open ground on a place's side of zones, (rows, cols)."""
+        side = int(self._at(self._sides, place_m[None])[0])
+        parts = self._parts if side == 0 else np.where(self._sides == side, self._parts, 0)
+        sizes = np.bincount(parts.ravel(), minlength=2)[1:]
+        return np.asarray((parts == int(np.argmax(sizes)) + 1) & (parts > 0), dtype=np.bool_)
+
+    def nearest_m(self, place_m: FloatArray) -> FloatArray:
+        """Return the middle of the nearest cell of the largest part of the open ground, (2,)."""
+        cells = self.centres_m[self.largest_part(place_m).ravel()]
+        return np.asarray(cells[np.argmin(np.hypot(*(cells - place_m).T))])
 
     @cached_property
-    def main(self) -> BoolArray:
-        """Which cells are in the largest part of the open ground, (rows, cols)."""
-        return np.asarray((self._parts == self._main_part) & (self._parts > 0), dtype=np.bool_)
-
-    @cached_property
-    def _main_part(self) -> int:
-        return int(np.argmax(np.bincount(self._parts.ravel(), minlength=2)[1:])) + 1
+    def _sides(self) -> IntArray:
+        """Which cells ways join where there are no shoals, from 1 on; 0: nobody may be there, (rows, cols)."""
+        sides, _ = label(self._free)
+        return np.asarray(sides, dtype=np.int64)
 
     @cached_property
     def _parts(self) -> IntArray:
@@ -96,9 +114,10 @@ class OpenGround:
         return np.asarray(self._bottom.at(en_m) < self._least_m, dtype=np.bool_)
 
     def way_round(self, here_m: FloatArray, ahead_m: FloatArray, step_m: float) -> WayRound | None:
-        """Return the way of a vehicle round the next shoal on its plan; None where none is within a step.
+        """Return the way of a vehicle round the next shoal on its plan; None where none is near, or where none leads.
 
-        It goes up to the shoal first, and takes the plan up again where that is open for half a step, or to its end.
+        Near is what is within a step. It goes up to the shoal as planned, and takes the plan up again where that is
+        open for half a step, or to its end.
 
         Parameters
         ----------
@@ -124,7 +143,7 @@ class OpenGround:
         open_m = self._open_for(shoal, along_m)
         reached = (goals >= 0) & np.isfinite(np.where(goals >= 0, away_m[goals], np.inf)) & (open_m >= 0.5 * step_m)
         ends = np.flatnonzero(reached[first:]) + first
-        upto = [places[last]] if last else []
+        upto = [*ahead_m[: of[last]], places[last]] if last else []
         if not len(ends):
             return WayRound(np.array(upto).reshape(-1, 2), len(ahead_m))
         instead_m = along_m[ends] - along_m[last]

@@ -38,7 +38,7 @@ NO_ORDER = 0
 
 @dataclass
 class OrderedWay:
-    """What is left of a vehicle's ordered way: corners (k, 2), and those (j, 2) to which legs were decided.
+    """What is left of a vehicle's ordered way, or way round: corners (k, 2), and those (j, 2) that it was given.
 
     ``tries`` are legs in a row that led nowhere, ``lost`` is how often legs were given up.
     """
@@ -90,7 +90,7 @@ class OrderedPlanner:
         self.taken: dict[str, int] = {}
         self.refused: dict[str, tuple[int, str]] = {}
         self._since: dict[str, int] = {}
-        """How many legs the planner has decided for vehicles since their last ordered one, or they left a line."""
+        """How many legs the planner has decided for vehicles since their last one on a way, or they left a line."""
         self._spaces: list[tuple[Constraints, FreeSpace]] = []
         """Of plans' limits and of checks'."""
 
@@ -157,11 +157,13 @@ class OrderedPlanner:
         if not len(led):
             return
         # A way round is forgotten at its end.
-        way = self.ways.setdefault(vehicle, OrderedWay(NO_ORDER, np.zeros((0, 2)), passed_m=led))
+        way = self.ways.setdefault(vehicle, OrderedWay(NO_ORDER, np.zeros((0, 2))))
         kept = len(way.passed_m)
         while kept and np.hypot(*(led - way.passed_m[kept - 1]).T).min() <= NEAR_M:
             kept -= 1
-        way.corners_m = np.vstack([way.passed_m[kept:], way.corners_m])
+        # Planned legs before a way round may be among them.
+        again = led if way.order == NO_ORDER else way.passed_m[kept:]
+        way.corners_m = np.vstack([again, way.corners_m])
         way.passed_m = way.passed_m[:kept]
 
     def leave(self, vehicle: str, place_m: FloatArray, ends_m: FloatArray) -> None:
@@ -169,7 +171,7 @@ class OrderedPlanner:
 
         Whoever goes on with the line does so from there: the vehicle itself when it comes back, or another one.
         """
-        if self.is_ordered(vehicle) or self._since.get(vehicle) == 0:
+        if self.is_ordered(vehicle) or (self._since.get(vehicle) == 0 and vehicle not in self.ways):
             return  # its line waits where it left that before
         self.put_back(vehicle, ends_m)
         self._leave_way_round(vehicle)

@@ -176,7 +176,7 @@ def fly(
     swarm = Swarm(spec, members, starts_m, so_far.first_step)
     apart = planner.decides_apart and np.isinf(constraints.com_range_m)
     if apart:
-        constraints = limits_of_decisions(constraints, planner)
+        constraints = limits_of_decisions(constraints, planner.planner)
 
     def sound(i: int, poses: FloatArray) -> None:
         apart_m = spacing_m or max(spec.speed_of(members[i].spec) / SOUNDINGS_HZ, terrain.cell_m / SOUNDINGS_A_CELL)

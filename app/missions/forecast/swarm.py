@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray
-from app.exploration.planner.base import PlannerBase
+from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m
 from app.missions.flight.legs.commit import STILL_M
 from app.missions.flight.own_legs import HARDLY_BEGUN, least_way_m
@@ -250,14 +250,14 @@ def circle_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:
     return max(stated_m or spec.speed_of(vehicle) / VehicleLimits().turn_rate_radps, LEAST_RADIUS_M)
 
 
-def planner_of(spec: MissionSpec, so_far: SoFar) -> PlannerBase:
+def planner_of(spec: MissionSpec, so_far: SoFar) -> OrderedPlanner:
     """Return a mission's planner with what it had in mind, as far as it can read that."""
-    planner = make_planner(spec)
+    planner = OrderedPlanner(make_planner(spec))
     if so_far.memory:
         try:
             planner.restore(so_far.memory)
         except ValueError:
-            return make_planner(spec)
+            return OrderedPlanner(make_planner(spec))
     return planner
 
 

@@ -104,7 +104,7 @@ class SwathFlight:
         self.builder.build()
         self._cell_m = cell_m
         self._planner = planner_of(spec, so_far)
-        self._constraints = limits_of_decisions(make_constraints(spec), self._planner)
+        self._constraints = limits_of_decisions(make_constraints(spec), self._planner.planner)
         self.swarm = Swarm(spec, members, starts_m, so_far.first_step)
         self._crafts = [
             self._craft(member, start) for member, start in zip(members, np.asarray(starts_m, dtype=float), strict=True)

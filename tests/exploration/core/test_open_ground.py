@@ -86,6 +86,16 @@ def test_who_comes_to_a_shoal_on_its_line_flies_up_to_it_and_takes_the_line_up_b
     assert 48.0 < again[1] < 54.0
 
 
+def test_who_comes_to_a_shoal_flies_its_corners_before_it_as_planned() -> None:
+    """The corner was cut, over ground that nobody had looked at."""
+    plan = np.array([[20.0, 30.0], [50.0, 30.0], [50.0, 76.0]])
+    found = OpenGround(floor((50.0, 52.0, 5.0)), LIMITS).way_round(np.array([20.0, 26.0]), plan, 70.0)
+    assert found is not None
+    np.testing.assert_array_equal(found.corners_m[:2], plan[:2])
+    assert found.corners_m[2][0] == 50.0
+    assert found.passed == 2
+
+
 def test_where_the_rest_of_the_plan_is_over_shoals_it_is_left_out() -> None:
     bottom = floor((70.0, 40.0, 9.0), (70.0, 15.0, 30.0))
     found = OpenGround(bottom, LIMITS).way_round(np.array([70.0, 56.0]), LINES[7:], STEP_M)
@@ -105,11 +115,12 @@ def test_a_shoal_farther_than_a_step_or_beside_the_plan_is_none_yet() -> None:
     [
         ((40.0, 40.0), 400.0, True),
         ((40.0, 40.0), 50.0, False),
+        ((40.0, 40.0), 1e6, True),
         ((40.0, 48.0), 50.0, True),
         ((70.0, 70.0), 1e6, False),
         ((-5.0, 40.0), 1e6, False),
     ],
-    ids=["in a pond", "in a lagoon", "on a shoal", "in the largest part", "outside"],
+    ids=["in a pond", "in a lagoon", "in one beside the sea", "on a shoal", "in the largest part", "outside"],
 )
 def test_who_is_on_a_shoal_or_in_a_pond_is_cut_off(place: tuple[float, float], least_m2: float, cut_off: bool) -> None:
     ring = floor((40.0, 40.0, 12.0))
@@ -120,3 +131,17 @@ def test_who_is_on_a_shoal_or_in_a_pond_is_cut_off(place: tuple[float, float], l
 
 def test_where_everything_is_too_shoal_nobody_is_cut_off() -> None:
     assert not OpenGround(floor(depth_m=0.4), LIMITS).is_cut_off(np.array([40.0, 40.0]), 100.0)
+
+
+def test_who_is_behind_a_zone_is_not_cut_off_by_shoals() -> None:
+    wall = np.array([[20.0, -1.0], [24.0, -1.0], [24.0, 81.0], [20.0, 81.0]])
+    ground = OpenGround(floor((60.0, 40.0, 9.0)), Constraints(AREA, (wall,), max_step_m=STEP_M, min_altitude_m=1.0))
+    assert not ground.is_cut_off(np.array([10.0, 40.0]), 1e6)
+    assert not ground.largest_part(np.array([10.0, 40.0]))[:, 13:].any()
+    assert not ground.largest_part(np.array([40.0, 10.0]))[:, :10].any()
+
+
+def test_a_part_that_is_not_much_smaller_than_the_largest_is_surveyed_to_its_end() -> None:
+    ridge = floor()
+    ridge.depth_m[:, 14:16] = 0.5
+    assert not OpenGround(ridge, LIMITS).is_cut_off(np.array([10.0, 40.0]), 1e6)

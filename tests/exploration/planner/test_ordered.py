@@ -325,3 +325,50 @@ def test_planned_ways_go_round_shoals_and_nobody_stands_before_one(name: str, se
         assert stood < 3, f"it stands at {place[0]}"
         assert not ground.is_shoal(found.positions[:, :2]).any()
         place = np.array(found.positions)
+
+
+def shoal_ahead() -> tuple[OrderedPlanner, Situation]:
+    """A lawnmower with one vehicle, and a shoal on the line that it is on."""
+    belief = make_belief()
+    constraints = Constraints(SQUARE, max_step_m=12.0, max_depth_m=20.0, min_altitude_m=1.0)
+    situation = make_situation(
+        vehicles=("a",), positions=np.array([[4.0, 4.0, 1.0]]), belief=belief, constraints=constraints
+    )
+    planner = planner_of("lawnmower")
+    places = fly(planner, situation, 2)
+    along = places[-1][0, :2] - places[-2][0, :2]
+    middle = places[-1][0, :2] + 22.0 * along / np.hypot(*along)
+    depth_m = np.where(np.hypot(*(belief.xy_m - middle).T) < 7.0, 0.5, 9.0)
+    return planner, replace(situation, positions=places[-1], belief=replace(belief, depth_m=depth_m))
+
+
+def begun(planner: OrderedPlanner, situation: Situation) -> tuple[list[np.ndarray], np.ndarray]:
+    """Fly until a way round the shoal has begun; the places, and what was planned before that."""
+    places = [np.array(situation.positions)]
+    for step in range(3, 12):
+        rest = planner.planner.ways_ahead_m()["a"]
+        here = replace(situation, step=step, positions=places[-1])
+        places.append(np.array(planner.propose(here, np.random.default_rng(step)).positions))
+        if "a" in planner.ways:
+            return places, rest
+    pytest.fail("no way leads round")
+
+
+def test_who_leaves_on_a_way_round_a_shoal_leaves_the_rest_of_its_line_to_whoever_goes_on() -> None:
+    planner, situation = shoal_ahead()
+    places, rest = begun(planner, situation)
+    way = planner.ways["a"].corners_m
+    planner.leave("a", places[-2][0, :2], places[-1][:, :2])
+    assert "a" not in planner.ways
+    ahead = planner.planner.ways_ahead_m()["a"]
+    np.testing.assert_allclose(ahead[0], places[-2][0, :2])
+    np.testing.assert_allclose(ahead[-1], rest[-1])
+    assert LineString(ahead).buffer(1e-6).covers(Point(way[-1])), "it is taken up behind the shoal"
+
+
+def test_planned_legs_before_a_way_round_that_were_not_given_are_flown_all_the_same() -> None:
+    planner, situation = shoal_ahead()
+    places, _ = begun(planner, situation)
+    ends = np.array([place[0, :2] for place in places[1:]])
+    planner.put_back("a", ends)
+    np.testing.assert_allclose(planner.ways["a"].corners_m[: len(ends)], ends)

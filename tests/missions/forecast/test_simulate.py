@@ -10,12 +10,13 @@ import pytest
 
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import Position, VehicleReport
+from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.own_legs import least_way_m
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
 from app.missions.forecast.simulate import Forecast, fly, fly_over, forecast
-from app.missions.forecast.swarm import Flown, SoFar, Swarm
+from app.missions.forecast.swarm import Flown, SoFar, Swarm, planner_of
 from app.missions.maps.builder import MapBuilder
 from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
@@ -24,6 +25,7 @@ from app.missions.states import MissionState
 from app.missions.team import CommittedLeg, Member, Team
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
+from tests.support.exploration.situations import make_situation
 from tests.support.missions.harbour import act, sim_spec, until_state
 from tests.support.missions.specs import lon_lat, make_spec
 from tests.support.waiting import until
@@ -295,3 +297,18 @@ def test_one_in_ten_figures_like_those_of_eleven_floors_lies_below_their_range_a
     came = rng.normal(size=4000)
     assert np.mean([r.low > x for r, x in zip(ranges, came, strict=True)]) == pytest.approx(0.1, abs=0.02)
     assert np.mean([r.high < x for r, x in zip(ranges, came, strict=True)]) == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_forecast_goes_on_with_the_plan_of_a_mission_that_had_an_order() -> None:
+    """Memory with an order in it was none to it, and it laid the whole survey anew."""
+    spec = make_spec(60.0, planner={"name": "lawnmower"})
+    planner = planner_of(spec, SoFar())
+    at = np.array([[2.0, 2.0, 1.0], [12.0, 2.0, 1.0]])
+    situation = make_situation(positions=at, constraints=make_constraints(spec))
+    planner.propose(situation, np.random.default_rng(0))
+    rest = planner.planner.ways_ahead_m()
+    planner.lead("a", 1, np.array([[30.0, 30.0]]), np.zeros((0, 2)), None)
+    again = planner_of(spec, SoFar(2, memory=planner.snapshot()))
+    assert "a" in again.ways
+    for name, way in rest.items():
+        np.testing.assert_array_equal(again.planner.ways_ahead_m()[name], way)

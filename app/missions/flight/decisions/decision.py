@@ -121,8 +121,8 @@ class Leg:
     surfacing: bool = False
     """Whether it comes up, or stays up, for a fix."""
     unplanned: bool = False
-    """Whether it leads to where a vehicle can be planned for, into the area from far outside or off a shoal: that
-    takes nothing of the way that is to be flown."""
+    """Whether it leads to where a vehicle can be planned for, into the area from far outside or off a shoal: where
+    ways are counted it takes nothing of the one that is to be flown."""
 
 
 @dataclass(frozen=True)
@@ -407,7 +407,7 @@ def _sent_off_shoals(
     """Return the vehicles as they are planned for, the legs of those that shoals cut off, and what is to be said.
 
     A planner finds no way off a shoal: each begins over ground that it may not go over. It plans for the others as if
-    who is there had left already; who finds no way is not planned for, and would keep all others from their legs.
+    who is there had left already, for that one would keep all of them from their legs.
     """
     ground = OpenGround(floor.likely, constraints)
     planned: list[Place] = []
@@ -417,10 +417,12 @@ def _sent_off_shoals(
         if place.keeps_depth or not ground.is_cut_off(place.en_m, (POND * constraints.max_step_m) ** 2):
             planned.append(place)
             continue
-        others = [p.en_m for p in team if p is not place] + [leg.target_m[:2] for leg in legs]
+        others = (
+            [p.en_m for p in team if p is not place] + [p.en_m for p in planned] + [leg.target_m[:2] for leg in legs]
+        )
         goal = way_off(place.en_m, ground, floor.likely, constraints, others, arrival_room_m(spec))
-        if goal is not None:
-            planned.append(replace(place, en_m=goal, moving=False))
+        # Its lines stay its own.
+        planned.append(replace(place, en_m=ground.nearest_m(place.en_m) if goal is None else goal, moving=False))
         if not place.moving:
             continue
         depth_m, least_m = float(floor.likely.at(place.en_m)), constraints.min_altitude_m
