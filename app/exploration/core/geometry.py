@@ -101,10 +101,13 @@ def _apart(polygon: FloatArray, ax: float, ay: float, bx: float, by: float) -> b
 
 
 @njit(cache=True, nogil=True)
-def _deep_between_crossings(polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> bool:
-    """Whether the segment a-b, parted by the edges that it crosses, has a piece deeper inside than ``tolerance``.
+def _far_between_crossings(
+    polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float, side: float
+) -> bool:
+    """Whether the segment a-b, parted by the edges that it crosses, has a piece farther in or out than ``tolerance``.
 
-    Who is on the boundary by all but a rounding error crosses it where it leaves, and is inside of nothing.
+    ``side``: -1 for inside, 1 for outside. Who is on the boundary by all but a rounding error crosses it where it
+    leaves, and is on neither.
     """
     n = polygon.shape[0]
     at = np.empty(n + 2)
@@ -120,7 +123,7 @@ def _deep_between_crossings(polygon: FloatArray, ax: float, ay: float, bx: float
     found = np.sort(at[:count])
     for k in range(1, count):
         t = 0.5 * (found[k - 1] + found[k])
-        if signed_distance(polygon, ax + t * (bx - ax), ay + t * (by - ay)) < -tolerance:
+        if side * signed_distance(polygon, ax + t * (bx - ax), ay + t * (by - ay)) > tolerance:
             return True
     return False
 
@@ -130,7 +133,7 @@ def enters(polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tole
     """Whether the segment a-b runs through the polygon's inside, deeper than ``tolerance``."""
     if _apart(polygon, ax, ay, bx, by):
         return False
-    if crosses_boundary(polygon, ax, ay, bx, by) and _deep_between_crossings(polygon, ax, ay, bx, by, tolerance):
+    if crosses_boundary(polygon, ax, ay, bx, by) and _far_between_crossings(polygon, ax, ay, bx, by, tolerance, -1.0):
         return True
     # A segment through two vertices, or with an end on the boundary, crosses no edge properly: look at its middle.
     for k in range(1, 8):
@@ -143,6 +146,9 @@ def enters(polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tole
 @njit(cache=True, nogil=True)
 def leaves(polygon: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> bool:
     """Whether the segment a-b, whose ends lie in the polygon, runs outside it by more than ``tolerance``."""
+    if crosses_boundary(polygon, ax, ay, bx, by) and _far_between_crossings(polygon, ax, ay, bx, by, tolerance, 1.0):
+        return True
+    # As above.
     for k in range(1, 8):
         t = k / 8.0
         if signed_distance(polygon, ax + t * (bx - ax), ay + t * (by - ay)) > tolerance:

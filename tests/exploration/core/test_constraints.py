@@ -42,6 +42,31 @@ def test_area_and_keep_out_agree_with_shapely(start: Any, end: Any) -> None:
     assert constraints.feasible(origin, target)[0] == expected
 
 
+part = st.floats(0.02, 0.98)
+
+
+@given(
+    notch=st.tuples(st.floats(5.0, 90.0), st.floats(20.0, 80.0), st.floats(0.05, 2.0)),
+    west_of_it=st.tuples(part, st.floats(0.0, 1.0)),
+    east_of_it=st.tuples(part, st.floats(0.0, 1.0)),
+)
+@settings(max_examples=200, deadline=None)
+def test_no_leg_crosses_a_notch_of_the_area_however_narrow_it_is(
+    notch: tuple[float, float, float], west_of_it: tuple[float, float], east_of_it: tuple[float, float]
+) -> None:
+    """Legs were looked at in seven places, and crossed what lay between these."""
+    south, west, width = notch
+    east = west + width
+    corners = [(0, 0), (100, 0), (100, 100), (east, 100), (east, south), (west, south), (west, 100), (0, 100)]
+    start = np.array([west_of_it[0] * west, 99.0 * west_of_it[1] + 0.5, 1.0])
+    end = np.array([east + east_of_it[0] * (100.0 - east), 99.0 * east_of_it[1] + 0.5, 1.0])
+    leg, area = LineString([start[:2], end[:2]]), Polygon(corners)
+    if (leg.difference(area).length > 0.0) != (leg.difference(area.buffer(0.01)).length > 0.0):
+        return  # it grazes a corner
+    constraints = Constraints(np.array(corners, dtype=float), max_step_m=1000.0)
+    assert constraints.feasible(start[None], end[None, None])[0] == area.covers(leg)
+
+
 @pytest.mark.parametrize(
     ("target", "limit"),
     [
