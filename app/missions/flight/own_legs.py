@@ -18,7 +18,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, from_outside, planned_way_m
+from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, planned_way_m
 from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
@@ -407,8 +407,8 @@ class OwnLegs:
         """Return where a vehicle may go in place of the end of its leg, (k, 3); who comes in comes in elsewhere."""
         if not planned.unplanned:
             return ways_aside(start, planned.target_m, self._constraints.for_plans, bottom)
-        outside = from_outside(start[:2], Polygon(self._constraints.area), self._spec)
-        entries = free_space.ways_in(self._constraints, start[:2], INSET_M) if outside else []
+        outside_m = free_space.distance_outside_m(Polygon(self._constraints.area), start[:2])
+        entries = free_space.ways_in(self._constraints, start[:2], INSET_M) if outside_m > 0.0 else []
         return np.array([np.append(entry, planned.target_m[2]) for entry in entries]).reshape(-1, 3)
 
     def _place(self, member: Member, *, moving: bool) -> Place:

@@ -66,7 +66,8 @@ async def test_vehicles_go_over_into_the_next_block_clear_of_zones_and_of_each_o
 
             await until(ready, "the vehicles are ready")
             first = await service.create(block(sea, names, WEST))
-            second = await service.create(block(sea, names, EAST, after=first.id, steps=6))
+            # Who goes aside to let the other one pass spends steps before it is there.
+            second = await service.create(block(sea, names, EAST, after=first.id, steps=9))
             await act(service, first.id, "start")
             await until_state(service, first.id, MissionState.FINISHED)
             view = await until_state(service, second.id, MissionState.FINISHED)
