@@ -43,7 +43,7 @@ STAY_M = 12.0
 LOOK_S = 1.0
 TIME_SCALE = 10.0
 SHORE = 3
-"""Every so manieth floor has a shore."""
+"""One floor in so many has a shore."""
 
 
 @dataclass(frozen=True)
