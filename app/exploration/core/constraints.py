@@ -40,6 +40,9 @@ class Limit(IntEnum):
 # Compiled functions index with plain numbers.
 AREA, AREA_LEG, KEEP_OUT, KEEP_OUT_LEG, STEP, MIN_DEPTH, MAX_DEPTH, ALTITUDE, COM_RANGE, SEPARATION = map(int, Limit)
 
+WHERE = (Limit.AREA, Limit.AREA_LEG, Limit.KEEP_OUT, Limit.KEEP_OUT_LEG)
+"""The limits of where a leg leads, however deep and long it is."""
+
 
 class Region(NamedTuple):
     """Where vehicles may be, for compiled functions.

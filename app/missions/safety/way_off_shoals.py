@@ -3,22 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
-from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry import LineString, Point
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.constraints import TOLERANCE_M, Constraints, Limit, inside_area
+from app.exploration.core.constraints import TOLERANCE_M, WHERE, Constraints, inside_area
 from app.exploration.core.open_ground import OpenGround
 from app.missions.safety import free_space
 
 SECTORS, OF_SECTOR = 72, 6
 """Of the places that are deep enough the nearest are looked at, so many in each of so many directions."""
-
-WHERE = (Limit.AREA, Limit.AREA_LEG, Limit.KEEP_OUT, Limit.KEEP_OUT_LEG)
-"""What a way is held to here as it is when it is begun."""
-
-BORDER_M = 1e-3
-"""Who is so little outside the area is at its border."""
 
 OWN = 1.0
 """Ground within so many cells of where a vehicle is does not tell its ways apart."""
@@ -87,7 +81,7 @@ def _best(
     taken: Sequence[FloatArray],
     room_m: float,
 ) -> FloatArray | None:
-    """Return the end (2,) of the best way that leaves nothing out of account; the nearest ends come first."""
+    """Return the end (2,) of the best way to one of the ends (n, 2), the nearest first; None where all are barred."""
     here_m = float(np.fmin(bottom.at(place_m), np.inf))
     ways: list[tuple[float, FloatArray]] = []
     for end in ends_m:
@@ -122,9 +116,6 @@ def _is_free(
     if free_space.barred(constraints, place_m, end_m, room_m):
         return False
     way = LineString([place_m, end_m])
-    # Narrow notches lie between the places of a leg that limits look at.
-    if not Polygon(constraints.area).buffer(BORDER_M).covers(way):
-        return False
     apart_m = [min(constraints.min_separation_m, float(np.hypot(*(other[:2] - place_m)))) for other in taken]
     return all(
         way.distance(Point(other[:2])) >= least_m - TOLERANCE_M for other, least_m in zip(taken, apart_m, strict=True)

@@ -1,7 +1,6 @@
 """Surveys over areas with shoals that nobody knew of, and over which vehicles cannot go."""
 
 import asyncio
-import math
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from app.missions.fleet.links import sim
 from app.missions.service import MissionService
 from app.missions.states import MissionState
+from benchmarks.missions.unknown_shoals import longest_stay
 from simulator.floors.terrain import Terrain
 from tests.support.missions.harbour import act, sim_spec, until_state
 
@@ -57,16 +57,6 @@ async def test_a_survey_goes_round_shoals_and_maps_the_ground_between_them(
         await asyncio.sleep(1.0 / service.settings.time_scale)
     await until_state(service, mission, MissionState.FINISHED)
     for name, way in places.items():
-        assert longest_stay_s(way) < 90, name
+        assert longest_stay(way) < 90, name
     await live.build_map()
     assert (live.progress().coverage_pct or 0.0) > 60.0
-
-
-def longest_stay_s(way: list[tuple[float, float]]) -> int:
-    """Return for how long a vehicle, seen each second, stayed within 12 m of a place."""
-    longest = begin = 0
-    for at, place in enumerate(way):
-        while math.dist(way[begin], place) > 12.0:
-            begin += 1
-        longest = max(longest, at - begin)
-    return longest

@@ -10,7 +10,7 @@ from sqlalchemy.orm import make_transient
 
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
-from app.exploration.core.constraints import Constraints, Limit
+from app.exploration.core.constraints import WHERE, Constraints, Limit
 from app.exploration.motion.turning import disc, turned_over
 from app.missions import metrics
 from app.missions.clock import now
@@ -41,9 +41,6 @@ NO_LEG = 0
 
 STILL_M = 0.5
 """Who goes no farther holds its place, which takes as much of its way as the longest leg: it flies circles there."""
-
-WHERE = (Limit.AREA, Limit.AREA_LEG, Limit.KEEP_OUT, Limit.KEEP_OUT_LEG)
-"""What a leg is held to once more when it is begun: its vehicle may be elsewhere than the leg was decided from."""
 
 UNIT_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
 """About a circle of radius 1: what lies apart from the square lies apart from the circle."""
@@ -197,6 +194,7 @@ class LegCommit:
         home_m = home_of(member.spec, member.slot, live.spec, live.team.specs)
         if member.withdrawal is not None and home_m is not None:
             constraints = homeward_ground(constraints, home_m)
+        # It may be elsewhere than the leg was decided from.
         # The corner of a way in round a zone may lie farther outside than its vehicle does.
         area = Polygon(constraints.area)
         goes_round = all(free_space.distance_outside_m(area, place_m[0, :2]) > 0.0 for place_m in (here, there))
