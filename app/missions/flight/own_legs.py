@@ -404,12 +404,18 @@ class OwnLegs:
         return None
 
     def _ways_aside(self, start: FloatArray, planned: Leg, bottom: Bottom) -> FloatArray:
-        """Return where a vehicle may go in place of the end of its leg, (k, 3); who comes in comes in elsewhere."""
+        """Return where a vehicle may go in place of the end of its leg, (k, 3).
+
+        Who comes in comes in elsewhere, or goes beside where it is: zones may bar all ways in but one.
+        """
         if not planned.unplanned:
             return ways_aside(start, planned.target_m, self._constraints.for_plans, bottom)
-        outside_m = free_space.distance_outside_m(Polygon(self._constraints.area), start[:2])
-        entries = free_space.ways_in(self._constraints, start[:2], INSET_M) if outside_m > 0.0 else []
-        return np.array([np.append(entry, planned.target_m[2]) for entry in entries]).reshape(-1, 3)
+        if free_space.distance_outside_m(Polygon(self._constraints.area), start[:2]) == 0.0:
+            return np.zeros((0, 3))
+        beside = free_space.ways_beside(self._constraints, start[:2], self._spec.limits.max_step_m)
+        beside = beside[np.argsort(np.hypot(*(beside - planned.target_m[:2]).T), kind="stable")]
+        ends = [*free_space.ways_in(self._constraints, start[:2], INSET_M), *beside]
+        return np.array([np.append(end, planned.target_m[2]) for end in ends]).reshape(-1, 3)
 
     def _place(self, member: Member, *, moving: bool) -> Place:
         left_m = planned_way_m(self._spec, member.way_left_m(self._spec)) if self._wants_legs(member) else 0.0

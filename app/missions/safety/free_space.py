@@ -35,6 +35,8 @@ NEARER = 0.9
 CLEAR, NARROW = 0.9, 0.4
 """Parts of the room beside a zone with which a way is clear of it, and with which a straight way is still better than
 one round it: who is a little beside where its way was to begin would cross the zone otherwise."""
+BESIDE, BESIDE_PARTS = 16, (1.0, 0.5)
+"""In so many directions, and so many parts of its reach away, a vehicle may go aside."""
 ROUND_TO = 40
 """Of the places where a vehicle may come in, about so many are looked at for a way round zones."""
 
@@ -153,6 +155,27 @@ def ways_in(constraints: Constraints, place: FloatArray, inset_m: float) -> list
     Parameters as in :func:`way_in`.
     """
     return [entry for entry in _entries(constraints, place, inset_m) if not barred(constraints, place, entry)]
+
+
+def ways_beside(constraints: Constraints, place: FloatArray, reach_m: float) -> FloatArray:
+    """Return where else a vehicle outside the area may go straight to, (n, 2), at most ``reach_m`` away.
+
+    In all directions that lead no farther from the area, and clear of keep-out zones.
+
+    Parameters
+    ----------
+    place : (2,)
+        Where the vehicle is.
+    """
+    area = Polygon(constraints.area)
+    course = np.arange(0.0, 2 * np.pi, 2 * np.pi / BESIDE)
+    unit = np.column_stack([np.sin(course), np.cos(course)])
+    ends = np.concatenate([place + part * reach_m * unit for part in BESIDE_PARTS])
+    outside_m = shapely.distance(area, shapely.points(ends))
+    zones = shapely.union_all([Polygon(zone) for zone in constraints.keep_out])
+    near = ends[(outside_m <= distance_outside_m(area, place) + LEAST_LEG_M) & ~shapely.contains_xy(zones, ends)]
+    free = [end for end in near if not barred(constraints, place, end, LEAD_CLEARANCE_M)]
+    return np.array(free).reshape(-1, 2)
 
 
 def barred(constraints: Constraints, place: FloatArray, goal: FloatArray, room_m: float = 0.0) -> bool:

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.missions.flight.decisions.separation import ways_aside
-from app.missions.safety.free_space import ways_in
+from app.missions.safety.free_space import ways_beside, ways_in
 
 AREA = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0]])
 ZONE = np.array([[40.0, 40.0], [60.0, 40.0], [60.0, 60.0], [40.0, 60.0]])
@@ -49,3 +51,18 @@ def test_who_comes_from_far_outside_may_come_in_anywhere_that_no_zone_bars() -> 
     assert not any(Polygon(zone).intersects(LineString([place, entry])) for entry in entries)
     away_m = [float(np.hypot(*(entry - place))) for entry in entries]
     assert away_m == sorted(away_m)
+
+
+@given(st.floats(62.0, 110.0), st.floats(-10.0, 110.0), st.floats(5.0, 30.0))
+def test_who_waits_outside_may_go_beside_where_it_is_no_farther_outside_and_off_zones(
+    east_m: float, north_m: float, reach_m: float
+) -> None:
+    area, zone = np.array([[0.0, 0.0], [25.0, 0.0], [25.0, 90.0], [0.0, 90.0]]), Polygon(ZONE)
+    limits, place = Constraints(area, keep_out=(ZONE,)), np.array([east_m, north_m])
+    ways = ways_beside(limits, place, reach_m)
+    assert len(ways) >= 2, "one of two that stand beside each other gets away"
+    outside_m = Polygon(area).distance(Point(place))
+    for way in ways:
+        assert np.hypot(*(way - place)) <= reach_m + 1e-9
+        assert Polygon(area).distance(Point(way)) <= outside_m + 0.5
+        assert not zone.intersects(LineString([place, way]))
