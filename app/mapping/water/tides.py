@@ -10,15 +10,30 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 
 MAX_LEVEL_M = 20.0
 MAX_GAP_S = 24.0 * 3600.0
-"""Where the sea has one tide a day its extremes are half a day apart; a larger gap is a hole in the table."""
+"""Where the sea has one tide a day its extremes are half a day apart; a larger gap is a hole in any table."""
 
 OBSERVED_GAP_S = 2.0 * 3600.0
 """Entries that are no farther apart are levels of a gauge in a table whose entries are not all extremes. Where most are
 so, a larger gap is a time in which the gauge told nothing."""
+
+MISSING = 2.5
+"""Times that two extremes usually are apart, between which at least one pair of extremes is missing."""
+
+UNEVEN = 1.5
+"""Where an entry is no extreme, the time on one of its sides that is so much longer than on the other is the one in
+which an extreme is missing."""
+
+SMALL = 0.5
+"""Part of the usual rise or fall: what is less in so long a time leads from one high water to the next, or from one low
+water."""
+
+FLAWS, FLAWED = 4, 0.15
+"""A table in which more entries than these, a number and a share, are no extremes is none of extremes at all: only what
+lies between entries that are close together is told."""
 
 MAX_LINES = 200_000
 _LINE = re.compile(
@@ -62,7 +77,9 @@ class TideTable:
 
         A half cosine leads from one extreme to the next; observed levels are joined by cubics whose slopes at an entry
         are those of the parabola through it and its neighbours. Nothing is said before the first entry, after the
-        last, and in a hole of more than ``MAX_GAP_S``, or of more than ``OBSERVED_GAP_S`` among a gauge's levels.
+        last, and in a hole: a time of more than ``OBSERVED_GAP_S`` among a gauge's levels, and among extremes one of
+        more than ``MAX_GAP_S``, one of more than ``MISSING`` of their usual times, and one in which a low water is
+        missing between two high waters, or a high water between two low ones.
         """
         times = np.asarray(time_s, float)
         after = np.clip(np.searchsorted(self.times_s, times, side="right"), 1, len(self.times_s) - 1)
@@ -70,23 +87,46 @@ class TideTable:
         low, high = self.levels_m[after - 1], self.levels_m[after]
         phase = np.pi * (times - begin) / (end - begin)
         level = 0.5 * (low + high) + 0.5 * (low - high) * np.cos(phase)
-        if not self._of_extremes:
+        if not self._is_extreme.all():
             level = np.where(end - begin <= OBSERVED_GAP_S, self._cubic(times), level)
         known = (times >= self.times_s[0]) & (times <= self.times_s[-1])
-        known &= (end - begin <= self._longest_gap_s) | (times == begin) | (times == end)
+        known &= ~self._holes[after - 1] | (times == begin) | (times == end)
         return np.where(known, level, np.nan)
 
-    @cached_property
-    def _of_extremes(self) -> bool:
-        """Whether levels rise and fall in turn, as from high water to low water."""
-        rise = np.diff(self.levels_m)
-        return bool(np.all(rise[:-1] * rise[1:] < 0.0))
+    def hole_between(self, begin_s: float, end_s: float) -> str:
+        """Return when the first hole of the table between two times begins and ends, for an operator; '' for none."""
+        meets = self._holes & (self.times_s[1:] > begin_s) & (self.times_s[:-1] < end_s)
+        if not meets.any():
+            return ""
+        at = int(np.argmax(meets))
+        return f"{_minute(float(self.times_s[at]))} to {_minute(float(self.times_s[at + 1]))}"
 
     @cached_property
-    def _longest_gap_s(self) -> float:
-        """How far two entries may be apart between which there is a level."""
-        of_gauge = not self._of_extremes and float(np.median(np.diff(self.times_s))) <= OBSERVED_GAP_S
-        return OBSERVED_GAP_S if of_gauge else MAX_GAP_S
+    def _is_extreme(self) -> BoolArray:
+        """Which entries are high or low waters, (n,): levels rise on the one side and fall on the other."""
+        rise = np.diff(self.levels_m)
+        return np.concatenate([[True], rise[:-1] * rise[1:] < 0.0, [True]])
+
+    @cached_property
+    def _holes(self) -> BoolArray:
+        """Which times from one entry to the next, (n - 1,), the table tells nothing of."""
+        gap_s = np.diff(self.times_s)
+        usual_s = float(np.median(gap_s))
+        if usual_s <= OBSERVED_GAP_S:
+            return np.asarray(gap_s > (MAX_GAP_S if self._is_extreme.all() else OBSERVED_GAP_S))
+        rise_m = np.abs(np.diff(self.levels_m))
+        if not rise_m.any():
+            return np.asarray(gap_s > MAX_GAP_S)
+        holes = gap_s > min(MAX_GAP_S, MISSING * usual_s)
+        holes |= (gap_s > UNEVEN * usual_s) & (rise_m < SMALL * np.median(rise_m))
+        # A half cosine is level at both ends: what leads past an entry that is no extreme is none.
+        before_s, after_s = gap_s[:-1], gap_s[1:]
+        none = ~self._is_extreme[1:-1]
+        if none.sum() > max(FLAWS, FLAWED * len(none)):
+            return np.asarray(holes | (gap_s > OBSERVED_GAP_S))
+        holes[:-1] |= none & (before_s > OBSERVED_GAP_S) & (UNEVEN * before_s > after_s)
+        holes[1:] |= none & (after_s > OBSERVED_GAP_S) & (UNEVEN * after_s > before_s)
+        return np.asarray(holes)
 
     @cached_property
     def _cubic(self) -> CubicHermiteSpline:

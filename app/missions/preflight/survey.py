@@ -315,6 +315,8 @@ def _water_level(live: LiveMission) -> Iterator[CheckView]:
     begin = now().timestamp()
     end = begin + expected_s(live)
     why_now, why_then = table.why_not(begin), table.why_not(end)
+    if not why_then and (hole := table.hole_between(begin, end)):
+        why_then = f"the tide table {table.name!r} tells nothing from {hole}"
     yield CheckView(
         id="tide",
         title="Tide",

@@ -92,6 +92,44 @@ def test_while_a_gauge_told_nothing_there_is_no_level() -> None:
     assert np.isfinite(table.levels_at(begin.timestamp() + 3600.0 * np.array([19.5, 20.0, 26.0, 26.5]))).all()
 
 
+@given(st.sets(st.integers(1, 30), min_size=1, max_size=2), st.floats(0.2, 4.0), st.floats(0.0, 0.4))
+def test_what_a_table_without_some_of_its_extremes_still_tells_is_right(
+    missing: set[int], range_m: float, uneven: float
+) -> None:
+    """From one high water to the next, over a missing low water, levels were a whole tide off."""
+    begin = datetime(2026, 1, 1, tzinfo=UTC)
+    hours = 6.21 * np.arange(32) + 0.3 * np.sin(np.arange(32))
+    levels = 2.0 + 0.5 * range_m * (-1.0) ** np.arange(32) * (1.0 + uneven * np.sin(0.9 * np.arange(32)))
+    lines = [f"{begin + timedelta(hours=h):%Y/%m/%d %H:%M:%S} {z:.3f}" for h, z in zip(hours, levels, strict=True)]
+    whole = parse_tid("\n".join(lines))
+    table = parse_tid("\n".join(line for i, line in enumerate(lines) if i not in missing))
+    times = np.arange(whole.times_s[0], whole.times_s[-1], 600.0)
+    told = table.levels_at(times)
+    known = np.isfinite(told)
+    np.testing.assert_allclose(told[known], whole.levels_at(times)[known], atol=0.01)
+    # What is beside a missing extreme is untold, and no more than one time from an extreme to the next besides.
+    assert known.sum() >= len(times) - 6.6 * 6 * (3 * len(missing) + 1)
+    for i in missing:
+        assert "hole" in table.why_not(whole.times_s[i])
+        assert table.hole_between(whole.times_s[i] - 60.0, whole.times_s[i] + 60.0)
+    assert not whole.hole_between(whole.times_s[0], whole.times_s[-1])
+
+
+@pytest.mark.parametrize("every_h", [2.5, 3.0, 4.0, 5.0])
+def test_levels_too_far_apart_to_tell_the_tide_are_not_taken_for_extremes(every_h: float) -> None:
+    begin, hours = datetime(2026, 1, 1, tzinfo=UTC), np.arange(0.0, 240.0, every_h)
+
+    def level(hour: np.ndarray) -> np.ndarray:
+        return 2.0 * np.cos(2 * np.pi * hour / 12.42)
+
+    entries = zip(hours, level(hours), strict=True)
+    table = parse_tid("\n".join(f"{begin + timedelta(hours=h):%Y/%m/%d %H:%M:%S} {z:.3f}" for h, z in entries))
+    between = np.arange(0.0, hours[-1], 0.1)
+    off = table.levels_at(begin.timestamp() + 3600.0 * between) - level(between)
+    assert np.isnan(off).mean() > 0.5
+    assert table.hole_between(table.times_s[0], table.times_s[-1])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
