@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.mapping.slope import gradient, scatter_m
 from app.mapping.types import BathymetricMap, Grid
 
 OVERLAP = 0.1
@@ -98,7 +99,8 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
     """Return the map of cells so many times as large, from the same corner; without soundings they have no depth.
 
     Where the map has the precision of its cells, this is the very map that its soundings make in the larger ones, but
-    for the slopes on which places are uncertain: they remain those of the smaller cells. What a cell's soundings share
+    for the slopes on which places are uncertain: they remain those of the smaller cells, and where few soundings lie in
+    a larger one its own slope counts, too. What a cell's soundings share
     is not averaged out; where the map does not tell it apart, as one that an earlier version stored, that is all but
     the precision. Without precision the cells' errors belong together: their depths and deviations are averaged.
     """
@@ -126,7 +128,11 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
         spread = np.maximum(beside - alike, 0.0) * bathymetry.count
         apart = bathymetry.depth_m - _finer(depth, times, fine)
         shared = np.sqrt(mean(alike))
-        deviation = np.sqrt(1.0 / total + mean(spread + apart**2) / np.maximum(count, 1) + shared**2)
+        alone, single = np.sqrt(1.0 / total), np.sqrt(mean(spread + apart**2))
+        if times > 1:
+            cell_m = grid.cell_m * times
+            single = scatter_m(single, gradient(depth, cell_m, alone), cell_m)
+        deviation = np.sqrt(alone**2 + single**2 / np.maximum(count, 1) + shared**2)
     area = np.isfinite(bathymetry.roughness)
     with np.errstate(invalid="ignore"):
         roughness = _total(np.nan_to_num(bathymetry.roughness), times) / _total(area, times)
