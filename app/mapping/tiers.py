@@ -147,9 +147,17 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
         correlation_length_m=max(bathymetry.correlation_length_m, 5.0 * cell_m),
         model=bathymetry.model,
         precision=None if precision is None else np.where(found, total, 0.0),
-        horizontal_sd_m=None if horizontal is None else np.sqrt(mean(horizontal**2)),
+        horizontal_sd_m=None if horizontal is None else np.sqrt(_mean_of_known(horizontal**2, weight, times)),
         shared_sd_m=shared,
     )
+
+
+def _mean_of_known(layer: FloatArray, weight: FloatArray, times: int) -> FloatArray:
+    """Return weighted means over squares of so many cells a side, of those that are known; NaN where none is."""
+    known = np.isfinite(layer)
+    total = _total(np.where(known, weight, 0.0), times)
+    sums = _total(np.where(known, weight * layer, 0.0), times)
+    return np.asarray(np.divide(sums, total, out=np.full(total.shape, np.nan), where=total > 0.0))
 
 
 def _sounded(bathymetry: BathymetricMap) -> BoolArray:

@@ -154,6 +154,20 @@ def test_uncertain_places_on_a_slope_are_as_uncertain_in_larger_cells(times: int
     np.testing.assert_allclose(made.horizontal_sd_m, direct.horizontal_sd_m)
 
 
+def test_places_that_are_not_known_do_not_count_in_larger_cells() -> None:
+    rng = np.random.default_rng(0)
+    east, north = rng.uniform(0.0, 32.0, (2, 5_000))
+    same = np.ones(len(east))
+    aside = np.where((east < 8.0) | (rng.random(len(east)) < 0.3), np.nan, rng.uniform(0.5, 2.0, len(east)))
+    soundings = np.column_stack([east, north, 10.0 * same, 0.05 * same, 0.1 * same, aside])
+    grid, mask = Grid(0.0, 0.0, 1.0, 32, 32), np.ones((32, 32), dtype=bool)
+    made = coarsened(mapped(grid, mask, soundings), 4).horizontal_sd_m
+    assert made is not None
+    assert np.isnan(made[:, :2]).all()
+    assert (made[:, 2:] > 0.5).all()
+    assert (made[:, 2:] < 2.0).all()
+
+
 def test_what_an_earlier_version_stored_is_not_averaged_at_all() -> None:
     rng = np.random.default_rng(0)
     east, north = rng.uniform(0.0, 32.0, (2, 20_000))

@@ -40,7 +40,7 @@ def gridded_map(density: DensityGrid) -> BathymetricMap | None:
     aside = density.horizontal_sd_m
     away, nearest = distance_transform_edt(~sounded, return_indices=True)
     at = tuple(nearest)
-    shared = np.hypot(density.shared_sd_m[at], aside[at] * slope[at])
+    shared = np.hypot(density.shared_sd_m[at], np.nan_to_num(aside[at]) * slope[at])
     sd = np.hypot(sd[at], shared)
     depth = _inside(np.where(between, filled, depth[at]), mask)
     steeper = np.where(between, 0.0, slope[at])
@@ -62,7 +62,7 @@ def gridded_map(density: DensityGrid) -> BathymetricMap | None:
         model=MODEL,
         bound_sd_m=_inside(bound, mask),
         precision=np.where(mask, density.precision, 0.0),
-        horizontal_sd_m=np.where(sounded & mask, aside, np.nan) if np.nanmax(aside) > 0.0 else None,
+        horizontal_sd_m=np.where(sounded & mask, aside, np.nan) if np.isfinite(aside).any() else None,
         shared_sd_m=np.where(sounded & mask, shared, np.nan),
     )
 

@@ -115,6 +115,22 @@ def test_without_a_word_on_places_nothing_is_said_of_them() -> None:
     assert made(swept(MASK)).horizontal_sd_m is None
 
 
+def test_soundings_whose_place_is_uncertain_by_nobody_knows_what_make_no_place_better() -> None:
+    density = DensityGrid(GRID, MASK)
+    east, north = (axis.ravel() for axis in np.meshgrid(GRID.east_m, GRID.north_m))
+    same = np.ones(len(east))
+    swath, single = east < 20.0, east > 10.0
+    none = np.where(east < 5.0, np.nan, 1.5)
+    density.add(*(axis[swath] for axis in (east, north, 10.0 * same, 0.2 * same, 0.1 * same, none)))
+    density.add(*(axis[single] for axis in (east, north, 10.0 * same, 0.01 * same)))
+    horizontal = made(density.copy()).horizontal_sd_m
+    assert horizontal is not None
+    assert np.isnan(horizontal[:, :5]).all(), "of a sonar that does not know where it is"
+    assert np.allclose(horizontal[:, 5:20], 1.5), "with single beams in the cell as without"
+    assert np.isnan(horizontal[:, 20:]).all(), "single beams do not tell"
+    assert np.isfinite(made(density).sd_m).all()
+
+
 def sounded_rows(every: int, east: float, north: float, seed: int = 0) -> BathymetricMap:
     """A floor that falls to the east and the north, of which every so-manyth row was sounded eight times."""
     rng = np.random.default_rng(seed)
