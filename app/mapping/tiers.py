@@ -24,11 +24,14 @@ class Tier:
         Its cells; those without a sounding, and those that hold no depth of the tier, have no depth.
     from_m, to_m
         The depths that the tier is for; the former begins within the tier of half its cell.
+    least_depth_m : (rows, cols)
+        The least depth of the smallest sounded cells in each; NaN where it has no depth.
     """
 
     map: BathymetricMap
     from_m: float
     to_m: float
+    least_depth_m: FloatArray
 
 
 def doublings(depth_m: FloatArray, cell_m: float, cell_of_depth: float) -> IntArray:
@@ -91,7 +94,9 @@ def tiers(bathymetry: BathymetricMap, cell_of_depth: float) -> list[Tier]:
         asked = sounded & (depth >= from_m) & (doublings(depth, cell_m, cell_of_depth) <= number)
         coarse = coarsened(bathymetry, times)
         model = f"{bathymetry.model}; cells of {cell_m * times:g} m for depths to {to_m:g} m"
-        made.append(Tier(_only(replace(coarse, model=model), _any(asked, times)), from_m, to_m))
+        cells = _any(asked, times)
+        least = np.where(cells, _least(depth, times), np.nan)
+        made.append(Tier(_only(replace(coarse, model=model), cells), from_m, to_m, least))
     return made
 
 
@@ -188,6 +193,13 @@ def _total(layer: FloatArray | IntArray | BoolArray, times: int) -> FloatArray:
     rows, cols = layer.shape
     padded = np.pad(layer.astype(float), ((0, -rows % times), (0, -cols % times)))
     return np.asarray(padded.reshape(-1, times, padded.shape[1] // times, times).sum(axis=(1, 3)))
+
+
+def _least(layer: FloatArray, times: int) -> FloatArray:
+    """Return the least value in each square of so many cells a side; NaN where none is known."""
+    rows, cols = layer.shape
+    padded = np.pad(layer, ((0, -rows % times), (0, -cols % times)), constant_values=np.nan)
+    return np.asarray(np.fmin.reduce(padded.reshape(-1, times, padded.shape[1] // times, times), axis=(1, 3)))
 
 
 def _finer(layer: FloatArray, times: int, like: BoolArray) -> FloatArray:

@@ -206,3 +206,18 @@ def test_every_sounded_place_is_in_the_tier_of_its_depth_and_tiers_overlap() -> 
 def test_a_map_without_soundings_has_no_tiers() -> None:
     bathymetry, _ = swept(Grid(0.0, 0.0, 1.0, 10, 10), np.ones((10, 10), dtype=bool))
     assert tiers(replace(bathymetry, sounded=np.zeros_like(bathymetry.sounded)), SHARE) == []
+
+
+@given(seed=st.integers(0, 2**32 - 1), number=st.integers(1, 400))
+def test_larger_cells_keep_the_least_depth_of_the_smallest(seed: int, number: int) -> None:
+    rng = np.random.default_rng(seed)
+    east, north = rng.uniform(0.0, 33.0, number), rng.uniform(0.0, 21.0, number)
+    soundings = np.column_stack([east, north, rng.uniform(5.0, 150.0, number), np.full(number, 0.1)])
+    bathymetry = mapped(Grid(0.0, 0.0, 1.0, 21, 33), np.ones((21, 33), dtype=bool), soundings)
+    for tier in tiers(bathymetry, SHARE):
+        times = round(tier.map.grid.cell_m)
+        assert (np.isfinite(tier.least_depth_m) == tier.map.sounded).all()
+        for row, col in np.argwhere(tier.map.sounded):
+            here = (slice(row * times, (row + 1) * times), slice(col * times, (col + 1) * times))
+            expected = bathymetry.depth_m[here][bathymetry.sounded[here]].min()
+            assert tier.least_depth_m[row, col] == expected <= tier.map.depth_m[row, col] + 1e-9
