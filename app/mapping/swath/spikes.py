@@ -22,6 +22,9 @@ SAME_OF_FAR = 0.5
 NEXT_BEAMS = 1.5
 """And when they point no farther aside than so many beams lie apart."""
 
+ECHO_OF_DEPTH = 0.5
+"""Farther below the bottom than this share of the height lie double echoes, which stay ping after ping, too."""
+
 _AT_ONCE = 4096
 """Doubted beams that are looked at together: it limits memory."""
 
@@ -51,8 +54,9 @@ def spikes(pings: Pings) -> BoolArray:
         slope, height = _line(across, down, known, k, i)
         off, far = down[k, i] - height, _far(height)
         wrong = np.abs(off) > far
-        k, i, slope, off, far = k[wrong], i[wrong], slope[wrong], off[wrong], far[wrong]
-        found[k, i] = ~_met_again((aside, across, below), k, i, slope, SAME_OF_FAR * far)
+        echo = (off > ECHO_OF_DEPTH * height)[wrong]
+        k, i, slope, far = k[wrong], i[wrong], slope[wrong], far[wrong]
+        found[k, i] = echo | ~_met_again((aside, across, below), k, i, slope, SAME_OF_FAR * far)
     return found
 
 

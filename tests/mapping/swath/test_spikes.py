@@ -159,6 +159,15 @@ def test_fish_that_ping_after_ping_meets_elsewhere_are_spikes() -> None:
     assert found[fish].mean() > 0.97
 
 
+def test_double_echoes_are_spikes_though_they_stay() -> None:
+    down = np.full((20, 121), 15.0)
+    down[:, 59:62] = 30.0
+    down[:, 20:22] = 18.0
+    found = spikes(pings(down))
+    assert found[:, 59:62].all()
+    assert found.sum() == 60, "a hole stays"
+
+
 def test_at_the_ends_the_ping_that_is_there_tells() -> None:
     down = np.full((2, 121), 15.0)
     down[:, 70:72] = 10.0
