@@ -16,7 +16,7 @@ LEAST_BEAMS = 5
 FAR_M, FAR_OF_DEPTH = 0.6, 0.12
 """A beam is a spike when it is farther from the bottom than the larger of these: metres, and share of the height."""
 
-SAME_OF_FAR = 0.5
+SAME_OF_FAR = 0.25
 """Beams of the ping before or after agree with one when they are no farther from it than this share of that."""
 
 NEXT_BEAMS = 1.5
