@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.mapping.slope import gradient, scatter_m
 from app.mapping.types import BathymetricMap, Grid
 
 OVERLAP = 0.1
@@ -23,11 +24,14 @@ class Tier:
         Its cells; those without a sounding, and those that hold no depth of the tier, have no depth.
     from_m, to_m
         The depths that the tier is for; the former begins within the tier of half its cell.
+    least_depth_m : (rows, cols)
+        The least depth of the smallest sounded cells in each; NaN where it has no depth.
     """
 
     map: BathymetricMap
     from_m: float
     to_m: float
+    least_depth_m: FloatArray
 
 
 def doublings(depth_m: FloatArray, cell_m: float, cell_of_depth: float) -> IntArray:
@@ -90,7 +94,9 @@ def tiers(bathymetry: BathymetricMap, cell_of_depth: float) -> list[Tier]:
         asked = sounded & (depth >= from_m) & (doublings(depth, cell_m, cell_of_depth) <= number)
         coarse = coarsened(bathymetry, times)
         model = f"{bathymetry.model}; cells of {cell_m * times:g} m for depths to {to_m:g} m"
-        made.append(Tier(_only(replace(coarse, model=model), _any(asked, times)), from_m, to_m))
+        cells = _any(asked, times)
+        least = np.where(cells, _least(depth, times), np.nan)
+        made.append(Tier(_only(replace(coarse, model=model), cells), from_m, to_m, least))
     return made
 
 
@@ -98,7 +104,8 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
     """Return the map of cells so many times as large, from the same corner; without soundings they have no depth.
 
     Where the map has the precision of its cells, this is the very map that its soundings make in the larger ones, but
-    for the slopes on which places are uncertain: they remain those of the smaller cells. What a cell's soundings share
+    for the slopes on which places are uncertain: they remain those of the smaller cells, and where few soundings lie in
+    a larger one its own slope counts, too. What a cell's soundings share
     is not averaged out; where the map does not tell it apart, as one that an earlier version stored, that is all but
     the precision. Without precision the cells' errors belong together: their depths and deviations are averaged.
     """
@@ -126,7 +133,11 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
         spread = np.maximum(beside - alike, 0.0) * bathymetry.count
         apart = bathymetry.depth_m - _finer(depth, times, fine)
         shared = np.sqrt(mean(alike))
-        deviation = np.sqrt(1.0 / total + mean(spread + apart**2) / np.maximum(count, 1) + shared**2)
+        alone, single = np.sqrt(1.0 / total), np.sqrt(mean(spread + apart**2))
+        if times > 1:
+            cell_m = grid.cell_m * times
+            single = scatter_m(single, gradient(depth, cell_m, alone), cell_m)
+        deviation = np.sqrt(alone**2 + single**2 / np.maximum(count, 1) + shared**2)
     area = np.isfinite(bathymetry.roughness)
     with np.errstate(invalid="ignore"):
         roughness = _total(np.nan_to_num(bathymetry.roughness), times) / _total(area, times)
@@ -141,9 +152,17 @@ def coarsened(bathymetry: BathymetricMap, times: int) -> BathymetricMap:
         correlation_length_m=max(bathymetry.correlation_length_m, 5.0 * cell_m),
         model=bathymetry.model,
         precision=None if precision is None else np.where(found, total, 0.0),
-        horizontal_sd_m=None if horizontal is None else np.sqrt(mean(horizontal**2)),
+        horizontal_sd_m=None if horizontal is None else np.sqrt(_mean_of_known(horizontal**2, weight, times)),
         shared_sd_m=shared,
     )
+
+
+def _mean_of_known(layer: FloatArray, weight: FloatArray, times: int) -> FloatArray:
+    """Return weighted means over squares of so many cells a side, of those that are known; NaN where none is."""
+    known = np.isfinite(layer)
+    total = _total(np.where(known, weight, 0.0), times)
+    sums = _total(np.where(known, weight * layer, 0.0), times)
+    return np.asarray(np.divide(sums, total, out=np.full(total.shape, np.nan), where=total > 0.0))
 
 
 def _sounded(bathymetry: BathymetricMap) -> BoolArray:
@@ -174,6 +193,13 @@ def _total(layer: FloatArray | IntArray | BoolArray, times: int) -> FloatArray:
     rows, cols = layer.shape
     padded = np.pad(layer.astype(float), ((0, -rows % times), (0, -cols % times)))
     return np.asarray(padded.reshape(-1, times, padded.shape[1] // times, times).sum(axis=(1, 3)))
+
+
+def _least(layer: FloatArray, times: int) -> FloatArray:
+    """Return the least value in each square of so many cells a side; NaN where none is known."""
+    rows, cols = layer.shape
+    padded = np.pad(layer, ((0, -rows % times), (0, -cols % times)), constant_values=np.nan)
+    return np.asarray(np.fmin.reduce(padded.reshape(-1, times, padded.shape[1] // times, times), axis=(1, 3)))
 
 
 def _finer(layer: FloatArray, times: int, like: BoolArray) -> FloatArray:

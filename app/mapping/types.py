@@ -109,7 +109,8 @@ class BathymetricMap:
         Sum of the soundings' inverse variances, whose mean weighted by them is the depth; None where the map is no such
         mean.
     horizontal_sd_m
-        Of each horizontal coordinate of a cell's soundings, NaN without any. None: it is not known.
+        Of each horizontal coordinate of a cell's soundings, as far as it is known of them, NaN where of none. None: it
+        is known nowhere.
     shared_sd_m
         The part of ``sd_m`` that a cell's soundings share, so that more of them do not average it out: NaN without any.
         None: it is not known apart.

@@ -1,6 +1,9 @@
 """Cells by depth: each tier is what the soundings would make in its cells, where its depths are."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -29,6 +32,17 @@ def swept(grid: Grid, mask: np.ndarray, seed: int = 0, number: int = 4000) -> tu
     return mapped(grid, mask, soundings), soundings
 
 
+@contextmanager
+def level() -> Iterator[None]:
+    """Without what slopes add to deviations: they are told by the cells of each size themselves."""
+
+    def nowhere(depth_m: FloatArray, cell_m: float, sd_m: FloatArray | None = None) -> FloatArray:
+        return np.zeros_like(depth_m)
+
+    with patch("app.mapping.tiers.gradient", nowhere), patch("app.mapping.swath.gridded.gradient", nowhere):
+        yield
+
+
 def mapped(grid: Grid, mask: np.ndarray, soundings: FloatArray) -> BathymetricMap:
     """The map of soundings (n, 4), or (n, 5) with what they share, or (n, 6) with the deviation of their places."""
     density = DensityGrid(grid, mask)
@@ -47,6 +61,7 @@ def test_cells_are_doubled_until_the_depth_is_served(depth: float, number: int) 
 
 
 @pytest.mark.parametrize("times", [1, 2, 4, 8])
+@level()
 def test_larger_cells_hold_what_their_soundings_make(times: int) -> None:
     mask = np.ones((37, 50), dtype=bool)
     bathymetry, soundings = swept(Grid(-3.0, 8.0, 0.5, 37, 50), mask)
@@ -85,6 +100,7 @@ def slow_sd_m(soundings: FloatArray, times: int, rows: int, cols: int) -> FloatA
     times=st.sampled_from([1, 2, 3, 4, 8, 32]),
     shared_m=st.floats(0.0, 1.0),
 )
+@level()
 def test_what_a_cell_s_soundings_share_is_as_large_in_larger_cells(
     seed: int, number: int, times: int, shared_m: float
 ) -> None:
@@ -97,6 +113,27 @@ def test_what_a_cell_s_soundings_share_is_as_large_in_larger_cells(
     direct = mapped(made.grid, np.ones((rows, cols), dtype=bool), soundings)
     np.testing.assert_allclose(made.sd_m, np.where(direct.sounded, direct.sd_m, np.nan), rtol=1e-6)
     np.testing.assert_allclose(made.sd_m, slow_sd_m(soundings, times, rows, cols), rtol=1e-6)
+
+
+@pytest.mark.parametrize("each", [1, 2, 4, 20])
+@pytest.mark.parametrize("times", [1, 2, 5])
+def test_of_few_soundings_on_a_slope_intervals_hold_wherever_they_lie(each: int, times: int) -> None:
+    """So many soundings in each cell of 5 m, of a map with cells a so-manyth as large."""
+    rng = np.random.default_rng(each)
+    corner = np.repeat(np.indices((40, 40)).reshape(2, -1).T * 5.0, each, axis=0)
+    north, east = (corner + rng.uniform(0.0, 5.0, corner.shape)).T
+    same = np.ones(len(east))
+    depth = 10.0 + 0.3 * north + 0.05 * rng.standard_normal(len(east))
+    side = 40 * times
+    fine = mapped(
+        Grid(0.0, 0.0, 5.0 / times, side, side),
+        np.ones((side, side), dtype=bool),
+        np.column_stack([east, north, depth, 0.05 * same]),
+    )
+    made = coarsened(fine, times)
+    error = made.depth_m - (10.0 + 0.3 * made.grid.north_m[:, None])
+    assert (np.abs(error) <= 1.96 * made.sd_m).mean() > 0.93
+    assert np.median(made.sd_m) < 1.1 * np.hypot(0.3 * 5.0 / np.sqrt(12.0), 0.05) * np.sqrt(2.0 / (1 + each))
 
 
 @pytest.mark.parametrize("times", [2, 4, 8])
@@ -115,6 +152,20 @@ def test_uncertain_places_on_a_slope_are_as_uncertain_in_larger_cells(times: int
     assert made.horizontal_sd_m is not None
     assert direct.horizontal_sd_m is not None
     np.testing.assert_allclose(made.horizontal_sd_m, direct.horizontal_sd_m)
+
+
+def test_places_that_are_not_known_do_not_count_in_larger_cells() -> None:
+    rng = np.random.default_rng(0)
+    east, north = rng.uniform(0.0, 32.0, (2, 5_000))
+    same = np.ones(len(east))
+    aside = np.where((east < 8.0) | (rng.random(len(east)) < 0.3), np.nan, rng.uniform(0.5, 2.0, len(east)))
+    soundings = np.column_stack([east, north, 10.0 * same, 0.05 * same, 0.1 * same, aside])
+    grid, mask = Grid(0.0, 0.0, 1.0, 32, 32), np.ones((32, 32), dtype=bool)
+    made = coarsened(mapped(grid, mask, soundings), 4).horizontal_sd_m
+    assert made is not None
+    assert np.isnan(made[:, :2]).all()
+    assert (made[:, 2:] > 0.5).all()
+    assert (made[:, 2:] < 2.0).all()
 
 
 def test_what_an_earlier_version_stored_is_not_averaged_at_all() -> None:
@@ -155,3 +206,18 @@ def test_every_sounded_place_is_in_the_tier_of_its_depth_and_tiers_overlap() -> 
 def test_a_map_without_soundings_has_no_tiers() -> None:
     bathymetry, _ = swept(Grid(0.0, 0.0, 1.0, 10, 10), np.ones((10, 10), dtype=bool))
     assert tiers(replace(bathymetry, sounded=np.zeros_like(bathymetry.sounded)), SHARE) == []
+
+
+@given(seed=st.integers(0, 2**32 - 1), number=st.integers(1, 400))
+def test_larger_cells_keep_the_least_depth_of_the_smallest(seed: int, number: int) -> None:
+    rng = np.random.default_rng(seed)
+    east, north = rng.uniform(0.0, 33.0, number), rng.uniform(0.0, 21.0, number)
+    soundings = np.column_stack([east, north, rng.uniform(5.0, 150.0, number), np.full(number, 0.1)])
+    bathymetry = mapped(Grid(0.0, 0.0, 1.0, 21, 33), np.ones((21, 33), dtype=bool), soundings)
+    for tier in tiers(bathymetry, SHARE):
+        times = round(tier.map.grid.cell_m)
+        assert (np.isfinite(tier.least_depth_m) == tier.map.sounded).all()
+        for row, col in np.argwhere(tier.map.sounded):
+            here = (slice(row * times, (row + 1) * times), slice(col * times, (col + 1) * times))
+            expected = bathymetry.depth_m[here][bathymetry.sounded[here]].min()
+            assert tier.least_depth_m[row, col] == expected <= tier.map.depth_m[row, col] + 1e-9

@@ -29,8 +29,8 @@ def bag(
     """Return a BAG with elevation (positive up: minus the depth), its standard deviation and numbers of soundings.
 
     The deviation includes ``common_sd_m``, that of what all soundings share. Cells without a sounding have their
-    predicted depths: the metadata tell how many. The vertical datum stands there, too; the library would call it
-    unknown. Raises OSError where the file cannot be written whole.
+    predicted depths: the metadata tell how many. The vertical datum stands there, too, as the system of heights above
+    it; the library would call it unknown. Raises OSError where the file cannot be written whole.
     """
     count = np.where(np.isfinite(bathymetry.depth_m), bathymetry.count, 0).astype("<u4")
     layers = [
@@ -73,7 +73,7 @@ def _write(
         crs=CRS.from_wkt(frame.crs.to_wkt("WKT1_GDAL")),
         transform=north_up_transform(bathymetry),
         nodata=NODATA,
-        VAR_VERT_WKT=vertical_datum.crs.to_wkt("WKT1_GDAL"),
+        VAR_VERT_WKT=vertical_datum.heights.to_wkt("WKT1_GDAL"),
         VAR_ABSTRACT=f"{title}. Elevations are minus the depth below {vertical_datum.statement}. "
         f"Uncertainty is {CHARTED_SD}. {predicted} {bathymetry.model}",
         VAR_INDIVIDUAL_NAME="bathyfleet",

@@ -24,7 +24,11 @@ def north_up_transform(bathymetry: BathymetricMap) -> Affine:
 def geotiff(
     bathymetry: BathymetricMap, layers: Sequence[Layer], frame: LocalFrame, *, vertical_datum: VerticalDatum
 ) -> bytes:
-    """Return a COG with one band per layer, north up, in the local frame with the vertical datum as its third axis."""
+    """Return a COG with one band per layer, north up, in the local frame with the vertical datum as its third axis.
+
+    Its overviews hold values of single cells, so that none stands there that the map does not have: classes stay
+    classes, and nothing is shoaler or surer than the map. They leave cells out: the least depth is told by the map.
+    """
     grid = bathymetry.grid
     with MemoryFile() as memory:
         with memory.open(
@@ -38,6 +42,7 @@ def geotiff(
             nodata=NODATA,
             compress="DEFLATE",
             predictor="YES",
+            overview_resampling="NEAREST",
         ) as file:
             for number, layer in enumerate(layers, start=1):
                 # Ground that was missed has no depth, and a density all the same.

@@ -27,7 +27,7 @@ class DensityGrid:
         self._total = np.zeros(shape)
         self._squares = np.zeros(shape)
         self._shared = np.zeros(shape)
-        self._aside = np.zeros(shape)
+        self._aside, self._placed = np.zeros(shape), np.zeros(shape)
 
     def add(
         self,
@@ -47,7 +47,7 @@ class DensityGrid:
         shared_sd_m
             As far as the soundings of a cell share it; None: not at all.
         horizontal_sd_m
-            Of each horizontal coordinate; None: they are exact.
+            Of each horizontal coordinate; None, or NaN: it is not known.
         """
         cols = np.floor((east_m - self.grid.west_m) / self.grid.cell_m)
         rows = np.floor((north_m - self.grid.south_m) / self.grid.cell_m)
@@ -65,9 +65,13 @@ class DensityGrid:
         self._weight[part] += np.bincount(flat, weight, size).reshape(shape)
         self._total[part] += np.bincount(flat, weight * depth, size).reshape(shape)
         self._squares[part] += np.bincount(flat, weight * depth**2, size).reshape(shape)
-        for kept, deviation in ((self._shared, shared_sd_m), (self._aside, horizontal_sd_m)):
-            if deviation is not None:
-                kept[part] += np.bincount(flat, weight * deviation[inside] ** 2, size).reshape(shape)
+        if shared_sd_m is not None:
+            self._shared[part] += np.bincount(flat, weight * shared_sd_m[inside] ** 2, size).reshape(shape)
+        if horizontal_sd_m is not None:
+            square = horizontal_sd_m[inside] ** 2
+            known = np.isfinite(square)
+            self._placed[part] += np.bincount(flat, weight * known, size).reshape(shape)
+            self._aside[part] += np.bincount(flat, np.where(known, weight * square, 0.0), size).reshape(shape)
         return np.asarray(inside)
 
     def copy(self) -> "DensityGrid":
@@ -75,7 +79,7 @@ class DensityGrid:
         other = DensityGrid.__new__(DensityGrid)
         other.grid, other.mask = self.grid, self.mask
         other.count = self.count.copy()
-        for name in ("_weight", "_total", "_squares", "_shared", "_aside"):
+        for name in ("_weight", "_total", "_squares", "_shared", "_aside", "_placed"):
             setattr(other, name, getattr(self, name).copy())
         return other
 
@@ -112,16 +116,15 @@ class DensityGrid:
     @property
     def shared_sd_m(self) -> FloatArray:
         """Standard deviation of the depth that a cell's soundings share; NaN without any."""
-        return self._rms(self._shared)
+        return _rms(self._shared, self._weight)
 
     @property
     def horizontal_sd_m(self) -> FloatArray:
-        """Standard deviation of each horizontal coordinate of a cell's soundings; NaN without any."""
-        return self._rms(self._aside)
+        """Standard deviation of each horizontal coordinate of those soundings of a cell of which it is known.
 
-    def _rms(self, total: FloatArray) -> FloatArray:
-        unknown = np.full(total.shape, np.nan)
-        return np.asarray(np.sqrt(np.divide(total, self._weight, out=unknown, where=self._weight > 0.0)))
+        NaN without any.
+        """
+        return _rms(self._aside, self._placed)
 
     def ensonified_pct(self) -> float:
         """Return the share of the area's cells that have a sounding."""
@@ -130,3 +133,8 @@ class DensityGrid:
     def dense_pct(self, least: int = LEAST_SOUNDINGS) -> float:
         """Return the share of the area's cells that have at least so many soundings."""
         return float(100.0 * (self.mask & (self.count >= least)).sum() / max(int(self.mask.sum()), 1))
+
+
+def _rms(total: FloatArray, weight: FloatArray) -> FloatArray:
+    unknown = np.full(total.shape, np.nan)
+    return np.asarray(np.sqrt(np.divide(total, weight, out=unknown, where=weight > 0.0)))

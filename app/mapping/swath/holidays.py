@@ -55,6 +55,17 @@ def missed(ensonified: BoolArray, mask: BoolArray, side: int, *, in_a_row: bool 
     return np.asarray(binary_opening(empty, np.ones((side, side), dtype=bool)))
 
 
+def gaps(ensonified: BoolArray, mask: BoolArray, side: int) -> BoolArray:
+    """Return which cells of the area, (rows, cols), lie in pieces without a sounding that are as large as a holiday.
+
+    However narrow: a strip of single cells is one, too, of as many as the smallest holiday has, ``side`` squared.
+    """
+    number, _ = label(mask & ~ensonified, np.ones((3, 3)))
+    large = np.bincount(number.ravel()) >= side**2
+    large[0] = False
+    return np.asarray(large[number])
+
+
 def holidays(ensonified: BoolArray, mask: BoolArray, grid: Grid, side: int, *, in_a_row: bool = False) -> list[Holiday]:
     """Return the holidays of a survey, largest first; cells belong together that touch, at corners too."""
     return pieces(missed(ensonified, mask, side, in_a_row=in_a_row), grid)

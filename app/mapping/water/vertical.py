@@ -30,6 +30,21 @@ class VerticalDatum:
         return pyproj.CRS.from_epsg(self.epsg)
 
     @property
+    def heights(self) -> pyproj.CRS:
+        """The vertical coordinate reference system of heights above the same datum, positive up."""
+        made = self.crs.to_json_dict()
+        made["name"] = made["name"].strip().removesuffix("depth") + "height"
+        if self.crs.datum is not None:  # what is none is an ensemble of several realizations
+            made["datum"] = self.crs.datum.to_json_dict()
+        (axis,) = made["coordinate_system"]["axis"]
+        axis |= {"name": "Gravity-related height", "abbreviation": "H", "direction": "up"}
+        for of_depths in ("id", "scope", "area", "bbox", "usages"):
+            made.pop(of_depths, None)
+        found = pyproj.CRS.from_json_dict(made)
+        registered = found.to_epsg()
+        return found if registered is None else pyproj.CRS.from_epsg(registered)
+
+    @property
     def s100(self) -> int | None:
         """Its number in the IHO's register for S-100; None where that has none for it."""
         return S100_DATUMS.get(self.epsg)

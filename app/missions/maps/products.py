@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 from shapely.geometry import Polygon, mapping
 
-from app.mapping.layers import LayerSource, file_layers
+from app.mapping.layers import Layer, LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
 from app.mapping.products.crossovers import crossovers_csv
@@ -50,6 +50,8 @@ MAP, SOUNDINGS, ACCEPTED, RAW, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS
 
 
 NOT_SOUNDED = ("no cell of the map was sounded", "wait for soundings inside of the area")
+
+LEAST_DEPTH = "least depth below the vertical datum of the smallest cells in each, positive down"
 
 ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 """The same content is the same archive."""
@@ -246,7 +248,7 @@ def _tiers(material: Material, options: ProductOptions) -> bytes:
     with zipfile.ZipFile(archive, "w") as file:
         for tier in tiers(material.snapshot.built.map, _cell_of_depth(material)):
             source = LayerSource(tier.map, options.order, facts.common_sd_m, shoal_depth_m=facts.spec.shoal_depth_m)
-            layers = file_layers(source)
+            layers = [*file_layers(source), Layer("least_depth", LEAST_DEPTH, "metre", tier.least_depth_m)]
             content = geotiff(tier.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
             name = zipfile.ZipInfo(f"{slug(facts.spec.name)}-{tier.map.grid.cell_m:g}m.tif", ZIP_EPOCH)
             file.writestr(name, content)

@@ -85,6 +85,27 @@ def test_geotiff_holds_all_layers_north_up(bathymetry: BathymetricMap) -> None:
         np.testing.assert_allclose(file.read(7, masked=True).compressed(), 0.5, rtol=1e-5)
 
 
+def test_overviews_of_a_geotiff_hold_nothing_that_the_map_does_not() -> None:
+    rng = np.random.default_rng(0)
+    grid = Grid(0.0, 0.0, 1.0, 1100, 600)
+    count = rng.poisson(2.0, (1100, 600))
+    depth = np.where((rng.random(count.shape) < 0.01), 5.0, 20.0 + 0.01 * grid.east_m)
+    depth[:200, :300] = np.nan
+    sd = np.where(count > 0, 0.1, 0.7)
+    made = BathymetricMap(grid, depth, sd, count, count > 0, np.ones_like(depth), 8.0, MODEL)
+    layers = file_layers(LayerSource(made, Order.SPECIAL))
+    with MemoryFile(geotiff(made, layers, FRAME, vertical_datum=LAT)) as memory:
+        with memory.open() as file:
+            levels = len(file.overviews(1))
+            whole = {name: file.read(number) for number, name in enumerate(file.descriptions, start=1)}
+        assert levels >= 2
+        for level in range(levels):
+            with memory.open(overview_level=level) as file:
+                assert file.shape[0] == 1100 // 2 ** (level + 1)
+                for number, (name, values) in enumerate(whole.items(), start=1):
+                    assert np.isin(file.read(number), values).all(), name
+
+
 def test_geotiff_shows_what_a_swath_survey_missed(bathymetry: BathymetricMap) -> None:
     missed = bathymetry.count == 0
     swept = replace(bathymetry, model=MODEL, depth_m=np.where(missed, np.nan, bathymetry.depth_m))

@@ -63,7 +63,11 @@ def in_tiers(content: bytes) -> np.ndarray:
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         (name,) = archive.namelist()
         assert name.endswith("-2m.tif")
-        return in_geotiff(archive.read(name))
+        content = archive.read(name)
+    with MemoryFile(content) as memory, memory.open() as file:
+        assert file.descriptions[-1] == "least_depth"
+        np.testing.assert_allclose(file.read(file.count, masked=True).compressed(), 30.0)
+    return in_geotiff(content)
 
 
 def in_netcdf(content: bytes) -> np.ndarray:

@@ -110,8 +110,11 @@ def holidays(w: Writer) -> list[Block]:
         return []
     t = w.t
     found = w.answers.at("holidays.features")
+    ensonified_pct = w.answers.at("mission.progress.ensonified_pct")
+    whole = ensonified_pct is not None and ensonified_pct >= 100.0
+    beside = [] if whole else [Paragraph(t("holidays_beside"))]
     if not found:
-        return [Paragraph(t("holidays_none"))]
+        return [Paragraph(t("holidays_none")), *beside]
     rows: list[list[Text]] = []
     for index in range(min(len(found), MOST_HOLIDAYS)):
         own = f"holidays.features.{index}.properties"
@@ -125,4 +128,4 @@ def holidays(w: Writer) -> list[Block]:
         )
     columns = [t(f"column_{name}") for name in ("number", "area", "latitude", "longitude")]
     left_off = w.left_off(len(rows), len(found), "holidays.geojson")
-    return [Table(columns, rows, numbers=(0, 1, 2, 3), caption=t("caption_holidays"), left_off=left_off)]
+    return [Table(columns, rows, numbers=(0, 1, 2, 3), caption=t("caption_holidays"), left_off=left_off), *beside]
