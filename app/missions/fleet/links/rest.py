@@ -23,6 +23,8 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.visiting import VisitedLink, Visitor
+from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, Step, distance_m, reach_m
+from imc_bridge.telemetry.soundings import StateSample
 
 EARTH_RADIUS_M = 6_371_000.0
 
@@ -40,18 +42,27 @@ class _Poller(Visitor):
 
 
 class RestFleetLink(VisitedLink):
-    """The fleet interface for vehicles that poll."""
+    """The fleet interface for vehicles that poll.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
 
     kind = "rest"
     capabilities = LinkCapabilities(stays_put=True)
 
-    def __init__(self, *, lost_after_s: float = 30.0) -> None:
+    def __init__(self, time_scale: float = 1.0, *, lost_after_s: float = 30.0) -> None:
         super().__init__(lost_after_s)
+        self._time_scale = time_scale
         self._pollers: dict[str, _Poller] = {}
+        self._places: dict[str, PlausiblePlace] = {}
+        """Where vehicles can be, by where they were."""
 
     @property
     def polled_vehicles(self) -> Self:
-        """The link itself: ``heard``, ``has_waypoint`` and ``told_to_stop`` are called as requests come in."""
+        """The link itself, which is called as requests come in."""
         return self
 
     async def start(self, sink: EventSink) -> None:
@@ -121,6 +132,29 @@ class RestFleetLink(VisitedLink):
             return StopReceipt(vehicle, acknowledged=False, detail="has not polled since; it is told at its next poll")
         return StopReceipt(vehicle, acknowledged=True, detail="told at its poll")
 
+    def doubt(self, report: VehicleReport) -> str:
+        """Return why a vehicle cannot be where it says, by where it was; '' where it can.
+
+        Asked once of every position, in the order of their times. One far away is believed when others agree.
+        """
+        places = self._places.setdefault(report.vehicle, PlausiblePlace())
+        sample = self._sample(report)
+        if places.take(sample) is not Step.DOUBTFUL or (last := places.last) is None:
+            return ""
+        self._touch(report.vehicle)
+        passed_s = abs(sample.time_s - last.time_s) / self._time_scale
+        away_m, most_m = distance_m(last, sample), reach_m(last, sample)
+        return (
+            f"lat_deg, lon_deg, depth_m: {away_m:.0f} m from where it was {passed_s:.1f} s before; at most {most_m:.0f} m "
+            f"can be; believed once {CONFIRMATIONS} positions in a row agree"
+        )
+
+    def _sample(self, report: VehicleReport) -> StateSample:
+        place = report.position
+        lat_rad, lon_rad = math.radians(place.lat_deg), math.radians(place.lon_deg)
+        # Clocks that keep to the wall's tell little of how far one comes that lives faster.
+        return StateSample(self._time_scale * report.time_s, lat_rad, lon_rad, place.depth_m, 0.0, 0.0, 0.0)
+
     def heard(self, report: VehicleReport) -> None:
         """Take a position that a vehicle posted, unless a newer one is known: it may post what it kept under water.
 
@@ -131,6 +165,8 @@ class RestFleetLink(VisitedLink):
         older_s = 0.0 if poller.report is None else poller.report.time_s - report.time_s
         if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
+        if older_s > 0.0:
+            self._places.pop(report.vehicle, None)
         poller.report, poller.newest_heard_s = report, now_s
         self._sink(report)
         self._check_arrival(poller)
