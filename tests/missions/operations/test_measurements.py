@@ -2,9 +2,11 @@
 
 import asyncio
 import math
+from collections.abc import AsyncIterator
 
 import pytest
 
+from app.missions import clock
 from app.missions.fleet.interface import Position
 from app.missions.live.mission import LiveMission
 from app.missions.operations.measurements import measure
@@ -12,7 +14,7 @@ from app.missions.soundings.measurement import Measurement
 from app.missions.views.measurements.soundings import BatchVerdict, Verdict
 from app.storage.database import Database
 from app.storage.queries.soundings import counts
-from tests.support.missions.harbour import Harbour, Rover, sim_spec
+from tests.support.missions.harbour import CLOCK_S, Harbour, Rover, sim_spec
 from tests.support.missions.measured import measured
 from tests.support.missions.specs import make_spec
 
@@ -67,10 +69,11 @@ async def test_altitude_is_how_far_the_bottom_is_below_a_vehicle_however_its_bea
 
 
 @pytest.fixture
-async def mission(harbour: Harbour) -> LiveMission:
+async def mission(harbour: Harbour) -> AsyncIterator[LiveMission]:
     """One polling vehicle, whose clock is the wall's."""
     service = await harbour.reopen(time_scale=1.0)
-    return await service.get((await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))).id)
+    with clock.told_by(lambda: CLOCK_S + 60.0):
+        yield await service.get((await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))).id)
 
 
 async def place_after(live: LiveMission, *items: Measurement) -> tuple[Position, list[tuple[Verdict, str]]]:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
+from app.missions.clock import now
 from app.missions.fleet.interface import (
     EventSink,
     LinkCapabilities,
@@ -31,12 +32,25 @@ EARTH_RADIUS_M = 6_371_000.0
 KEPT_S = 86_400.0
 """For how long vehicles may keep positions before they post them, at the most: older ones tell of another clock."""
 
+AHEAD_S = 5.0
+"""A time that is farther ahead than this of our clock, and of what has passed by its own, is not a vehicle's."""
+
 
 @dataclass
 class _Poller(Visitor):
     heard_s: float = 0.0
-    newest_heard_s: float = -math.inf
-    """When its newest position came, the event loop's time."""
+    newest_s: float = -math.inf
+    """The newest time by its clock: what is older was kept until now."""
+    newest_heard_s: float = 0.0
+    """When that came, the event loop's time."""
+    ahead_since_s: float | None = None
+    """Since when its times have been too far ahead, the event loop's time; None: they are not."""
+
+    def latest_s(self, now_s: float, time_scale: float) -> float:
+        """Return the latest time that its clock can tell, at the event loop's time ``now_s``."""
+        own_s = self.newest_s + time_scale * (now_s - self.newest_heard_s)
+        return max(own_s, now().timestamp()) + AHEAD_S
+
     stopping: bool = False
     told: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -145,29 +159,42 @@ class RestFleetLink(VisitedLink):
         passed_s = abs(sample.time_s - last.time_s) / self._time_scale
         away_m, most_m = distance_m(last, sample), reach_m(last, sample)
         return (
-            f"lat_deg, lon_deg, depth_m: {away_m:.0f} m from where it was {passed_s:.1f} s before; at most {most_m:.0f} m "
-            f"can be; believed once {CONFIRMATIONS} positions in a row agree"
+            f"lat_deg, lon_deg, depth_m: {away_m:.0f} m from where it was {passed_s:.1f} s before; "
+            f"at most {most_m:.0f} m can be; believed once {CONFIRMATIONS} positions in a row agree"
         )
 
     def _sample(self, report: VehicleReport) -> StateSample:
-        place = report.position
+        place, time_s = report.position, report.time_s
         lat_rad, lon_rad = math.radians(place.lat_deg), math.radians(place.lon_deg)
+        poller = self._pollers.get(report.vehicle)
+        if poller is not None and math.isfinite(poller.newest_s):
+            # Nobody comes farther by a time that is ahead.
+            time_s = min(time_s, poller.latest_s(asyncio.get_running_loop().time(), self._time_scale))
         # Clocks that keep to the wall's tell little of how far one comes that lives faster.
-        return StateSample(self._time_scale * report.time_s, lat_rad, lon_rad, place.depth_m, 0.0, 0.0, 0.0)
+        return StateSample(self._time_scale * time_s, lat_rad, lon_rad, place.depth_m, 0.0, 0.0, 0.0)
 
     def heard(self, report: VehicleReport) -> None:
         """Take a position that a vehicle posted, unless a newer one is known: it may post what it kept under water.
 
         One whose clock was set back is believed after ``lost_after_s``, and at once where that was by a day or more.
+        What comes after a time that is ahead is not older for that, unless times have been ahead for as long.
         """
         poller = self._touch(report.vehicle)
         now_s = asyncio.get_running_loop().time()
-        older_s = 0.0 if poller.report is None else poller.report.time_s - report.time_s
+        older_s = poller.newest_s - report.time_s
         if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
-        if older_s > 0.0:
+        is_ahead = report.time_s > poller.latest_s(now_s, self._time_scale)
+        if is_ahead or older_s > 0.0:
+            # Its clock was set: nothing tells how far it can have come.
             self._places.pop(report.vehicle, None)
-        poller.report, poller.newest_heard_s = report, now_s
+        if not is_ahead:
+            poller.ahead_since_s = None
+        elif poller.ahead_since_s is None:
+            poller.ahead_since_s = now_s
+        if poller.ahead_since_s is None or now_s - poller.ahead_since_s >= self._lost_after_s:
+            poller.newest_s, poller.newest_heard_s = report.time_s, now_s
+        poller.report = report
         self._sink(report)
         self._check_arrival(poller)
 
