@@ -159,9 +159,7 @@ class VehicleReports:
         """Add what a vehicle has flown since its last report, if that can have been."""
         flown = member.flown
         way_left_m = member.way_left_m(spec)
-        # Legs of a way home are none of the survey's.
-        surveys = member.withdrawal is None or member.withdrawal.response is Response.HOLD
-        flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if surveys else 0.0)
+        flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if member.flies_survey else 0.0)
         before = None if member.report is None else local_place(self._frame, member.report.position)
         if before is None:
             return
@@ -229,11 +227,15 @@ class VehicleReports:
         member.reason = event.reason
         if event.status is WaypointStatus.REACHED:
             member.misses = 0
+            if member.flies_survey:
+                member.flown.reach_leg()
             took_s = asyncio.get_running_loop().time() - member.leg_began_s
             before_s = took_s if self.leg_s is None else self.leg_s
             self.leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
         elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
             member.misses += 1
+            if member.flies_survey:
+                member.flown.miss_leg()
         self._journal.waypoint(event)
         self._waypoints.take(event)
 
