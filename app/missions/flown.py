@@ -8,6 +8,9 @@ from typing import Any
 
 from app.exploration.motion.on_leg import Place, along_leg
 
+FASTEST_MPS = 10.0
+"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
+
 
 class Phase(StrEnum):
     """What a vehicle is at."""
@@ -73,6 +76,11 @@ class Flown:
     def recall(cls, stored: dict[str, Any] | None) -> "Flown":
         """Return what was stored; nothing flown where nothing was."""
         return cls(**(stored or {}))
+
+
+def is_flown(away_m: float, passed_s: float) -> bool:
+    """Tell whether a vehicle flew from one position to the next, or only its position was corrected."""
+    return passed_s > 0.0 and away_m <= FASTEST_MPS * passed_s
 
 
 def efficiency_pct(team: Iterable[Flown]) -> float | None:

@@ -22,7 +22,7 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.flown import Phase
+from app.missions.flown import Phase, is_flown
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.header import MissionHeader
 from app.missions.live.journals.journal import Journal
@@ -38,8 +38,6 @@ from app.missions.views.mission import Level
 
 LONGEST_GAP_S = 60.0
 """What a vehicle flew in a longer silence is not known."""
-FASTEST_MPS = 10.0
-"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
 SURFACE_M = 0.7
 """Who is not deeper can receive satellites."""
 LONGEST_SILENCE_S = 6 * 3600.0
@@ -163,7 +161,7 @@ class VehicleReports:
         before = None if member.report is None else local_place(self._frame, member.report.position)
         if before is None:
             return
-        if not 0.0 < passed_s <= LONGEST_GAP_S or math.dist(before, place) > FASTEST_MPS * passed_s:
+        if passed_s > LONGEST_GAP_S or not is_flown(math.dist(before, place), passed_s):
             return
         leg = None
         if member.ordered and member.leg_start_m is not None and member.target_m is not None:
