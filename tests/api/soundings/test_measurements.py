@@ -191,8 +191,18 @@ def _sounding(position: dict[str, float], clock: float) -> dict[str, Any]:
 async def test_nothing_newer_is_204_without_a_body(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
     path = f"/missions/{mission['id']}"
     await client.post(f"{path}/start")
-    answer = await client.get(f"{path}/vehicles/rover/waypoint", params={"after_step": 1000, "timeout_s": 0})
+    answer = await client.get(f"{path}/vehicles/rover/waypoint", params={"timeout_s": 0})
     assert (answer.status_code, answer.content) == (204, b"")
+
+
+async def test_who_says_that_it_has_a_waypoint_of_a_step_to_come_is_refused(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    path = f"/missions/{mission['id']}"
+    await client.post(f"{path}/start")
+    answer = await client.get(f"{path}/vehicles/rover/waypoint", params={"after_step": 1000, "timeout_s": 0})
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "after_step")
+    assert "it was given none yet" in answer.text
 
 
 async def test_a_stopping_service_ends_the_wait(
@@ -200,9 +210,7 @@ async def test_a_stopping_service_ends_the_wait(
 ) -> None:
     path = f"/missions/{mission['id']}"
     await client.post(f"{path}/start")
-    waiting = asyncio.create_task(
-        client.get(f"{path}/vehicles/rover/waypoint", params={"after_step": 1000, "timeout_s": 60})
-    )
+    waiting = asyncio.create_task(client.get(f"{path}/vehicles/rover/waypoint", params={"timeout_s": 60}))
     metrics = server.url + "/health"
     while True:  # until the wait has begun: the server answers a later request only after it accepted the earlier one
         await client.get(metrics)
