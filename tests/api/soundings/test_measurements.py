@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import httpx
+import pytest
 from sqlalchemy import select
 
 from app.api.accounts.tokens import Role, TokenStore
@@ -70,6 +71,23 @@ async def test_a_batch_of_another_shape_is_refused_whole(client: httpx.AsyncClie
     too_many = await client.post(path, json={"items": [None] * 10_001})
     assert too_many.json()["errors"][0]["expected"] == "at most 10000 entries"
     assert (await client.get(f"/missions/{mission['id']}")).json()["progress"]["soundings"] == 0
+
+
+@pytest.mark.parametrize("text", ["\\u0000", "\\ud800"])
+@pytest.mark.parametrize("item", ["a@", {"vehicle": "a@", "target": "@"}, {"@": 1}, {"x": [["@"]]}])
+async def test_text_that_cannot_be_stored_spoils_no_other_item(
+    client: httpx.AsyncClient, mission: dict[str, Any], text: str, item: Any
+) -> None:
+    path = f"/missions/{mission['id']}/measurements"
+    body = json.dumps({"items": [*soundings(1), item, *soundings(1)]}).replace("@", text)
+    headers = {"Content-Type": "application/json"}
+    answer = await client.post(path, content=body, headers=headers)
+    assert answer.status_code == 200, answer.text
+    assert [item["verdict"] for item in answer.json()["items"]] == ["accepted", "rejected", "duplicate"]
+    assert "NUL character or a lone surrogate; expected valid Unicode text" in answer.json()["items"][1]["reason"]
+    for whole in ({"@": [], "items": soundings(1)}, {"items": {"0": "@"}}, {"items": "@"}, ["@"]):
+        answer = await client.post(path, content=json.dumps(whole).replace("@", text), headers=headers)
+        assert answer.status_code == 422, answer.text
 
 
 async def test_a_batch_with_only_unreadable_items_is_answered(
