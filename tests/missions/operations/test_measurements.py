@@ -10,6 +10,7 @@ from app.missions import clock
 from app.missions.fleet.interface import Position
 from app.missions.live.mission import LiveMission
 from app.missions.operations.measurements import measure
+from app.missions.preflight.survey import preflight
 from app.missions.soundings.measurement import Measurement
 from app.missions.views.measurements.soundings import BatchVerdict, Verdict
 from app.storage.database import Database
@@ -135,3 +136,11 @@ async def test_ranges_to_targets_from_where_no_vehicle_can_be_are_refused(harbou
     item = Rover(service, live.id, "a").item(range_m=None, depth_m=1e9, target="t", target_range_m=20.0)
     answer = await measure(live, [item])
     assert [verdict.reason for verdict in answer.items] == ["depth_m: 1e+09 is not between -2 and 11100"]
+
+
+async def test_the_checklist_calls_what_a_vehicle_posted_no_import(harbour: Harbour) -> None:
+    service = harbour.service
+    live = await service.get((await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))).id)
+    await measure(live, [Rover(service, live.id, "a").item()])
+    messages = [check.message for check in preflight(live).checks if check.id == "bottom"]
+    assert messages == ["there are soundings; their map is being made"]
