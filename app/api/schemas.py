@@ -16,7 +16,7 @@ from pydantic import (
     WrapValidator,
 )
 
-from app.api.http.json_text import Bounds
+from app.api.http.json_text import Bounds, Unreadable
 from app.api.http.problems import MAX_ERRORS, SUGGESTION, FieldProblem, field_problem
 from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
@@ -93,6 +93,8 @@ Item = TypeVar("Item", Measurement, Scan)
 
 def _item(kind: type[Item], value: object) -> Item | str:
     """Return the item, or in words why ``value`` is none: of the first faults, whatever their number."""
+    if isinstance(value, Unreadable):
+        return str(value)
     if excess := _excess(value, kind):
         return excess
     try:
@@ -159,6 +161,8 @@ class MeasurementBatch(BaseModel):
 
     json_bounds: ClassVar = Bounds(values=800_000, texts=250_000)
 
+    judges_items: ClassVar = True
+
     items: Annotated[list[BatchItem], WrapValidator(_each_item)] = Field(min_length=1, max_length=MAX_BATCH)
 
 
@@ -187,6 +191,8 @@ class ScanBatch(BaseModel):
     )
 
     json_bounds: ClassVar = Bounds(values=3_000_000, texts=20_000)
+
+    judges_items: ClassVar = True
 
     items: Annotated[list[BatchScan], WrapValidator(_each_item)] = Field(min_length=1, max_length=MAX_SCANS)
 

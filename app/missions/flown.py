@@ -8,6 +8,9 @@ from typing import Any
 
 from app.exploration.motion.on_leg import Place, along_leg
 
+FASTEST_MPS = 10.0
+"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
+
 
 class Phase(StrEnum):
     """What a vehicle is at."""
@@ -36,6 +39,11 @@ class Flown:
     """Vehicle time in which it surveyed, seconds: without the way there and home, and without fixes at the surface."""
     used_s: float = 0.0
     """Energy used, in seconds at its usual speed."""
+    legs_reached: int = 0
+    """Legs of the survey to whose end it came."""
+    legs_missed: int = 0
+    missed_last: int = 0
+    """How many of its last legs in a row it missed."""
     left_m: float | None = None
     """What it may fly yet, metres; None where that is not known."""
     phase: Phase = Phase.STOPPED
@@ -47,16 +55,32 @@ class Flown:
         if leg is not None and along_leg(start, end, leg):
             self.on_plan_m += length_m
 
+    def reach_leg(self) -> None:
+        """Count a leg to whose end it came."""
+        self.legs_reached += 1
+        self.missed_last = 0
+
+    def miss_leg(self) -> None:
+        """Count a leg that it did not get to the end of."""
+        self.legs_missed += 1
+        self.missed_last += 1
+
     def remember(self) -> dict[str, float]:
         """Return what is stored, so that a restart goes on counting."""
         kept = asdict(self)
         names = ("flown_m", "on_plan_m", "idle_s", "survey_s", "used_s", "left_m")
-        return {name: round(kept[name], 2) for name in names if kept[name] is not None}
+        counts = {name: kept[name] for name in ("legs_reached", "legs_missed", "missed_last")}
+        return {name: round(kept[name], 2) for name in names if kept[name] is not None} | counts
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Flown":
         """Return what was stored; nothing flown where nothing was."""
         return cls(**(stored or {}))
+
+
+def is_flown(away_m: float, passed_s: float) -> bool:
+    """Tell whether a vehicle flew from one position to the next, or only its position was corrected."""
+    return passed_s > 0.0 and away_m <= FASTEST_MPS * passed_s
 
 
 def efficiency_pct(team: Iterable[Flown]) -> float | None:

@@ -101,7 +101,10 @@ class MissionService:
         self.settings = settings
         self._database = database
         self._at_once = AtOnce(database)
-        links: list[FleetLink] = [RestFleetLink(), SimFleetLink(settings.simulation, settings.time_scale)]
+        links: list[FleetLink] = [
+            RestFleetLink(settings.time_scale),
+            SimFleetLink(settings.simulation, settings.time_scale),
+        ]
         self._examine: Examine = switched_off
         if settings.imc.enabled:
             from app.missions.fleet.links.imc import make_imc_link

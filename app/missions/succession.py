@@ -13,6 +13,7 @@ import structlog
 
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.missions.errors import ConflictError, InvalidRequestError, MissionError, MissionNotFoundError
+from app.missions.flight.own_legs import NOT_WAITED_FOR
 from app.missions.live.mission import LiveMission
 from app.missions.preflight.survey import preflight
 from app.missions.spec.mission import MissionSpec
@@ -167,4 +168,11 @@ def _unfit(live: LiveMission, before: LiveMission) -> str:
         # At the end everybody is called home, with its part done; who has done it goes before.
         if earlier.withdrawal is not None and not earlier.withdrawal.done:
             return f"{member.name} did not fly {before.spec.name!r} to its end: {earlier.withdrawal.why}"
+        flown = earlier.flown
+        if not flown.legs_reached:
+            return f"{member.name} flew no leg of {before.spec.name!r}"
+        # The first leg may have led to where it was.
+        if flown.missed_last >= min(NOT_WAITED_FOR, flown.legs_reached):
+            words = f"it missed its last {flown.missed_last} of {flown.legs_missed + flown.legs_reached} legs"
+            return f"{member.name} did not fly {before.spec.name!r} to its end: {words}"
     return ""

@@ -1,7 +1,7 @@
 """The vehicles of one mission as its flight sees them."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from itertools import pairwise
@@ -247,6 +247,11 @@ class Member:
         return self.present and self.withdrawal is None
 
     @property
+    def flies_survey(self) -> bool:
+        """Whether its legs are the survey's: those of a way home are none."""
+        return self.withdrawal is None or self.withdrawal.response is Response.HOLD
+
+    @property
     def is_home(self) -> bool:
         """Whether it came home."""
         return self.withdrawal is not None and self.withdrawal.over and self.withdrawal.response is Response.RETURN
@@ -406,6 +411,15 @@ class Team:
             return False
         called = [m.withdrawal for m in self.members.values() if m.withdrawal is not None]
         return any(one.response is Response.RETURN and not one.done for one in called)
+
+    def missed_words(self, besides: Collection[str] = ()) -> str:
+        """Return who missed legs, as words after a reason; '' where nobody did. ``besides``: who was named before."""
+        missed = [
+            f"{m.name} missed {m.flown.legs_missed} of its {m.flown.legs_missed + m.flown.legs_reached} legs"
+            for m in self.members.values()
+            if m.flown.legs_missed and m.name not in besides
+        ]
+        return f", {'' if besides else 'but '}{', '.join(missed)}" if missed else ""
 
     @property
     def held(self) -> list[Member]:

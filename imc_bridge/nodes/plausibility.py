@@ -34,6 +34,11 @@ class PlausiblePlace:
         self._last: StateSample | None = None
         self._odd: list[StateSample] = []
 
+    @property
+    def last(self) -> StateSample | None:
+        """The newest position that was believed; None before there is any."""
+        return self._last
+
     def take(self, sample: StateSample) -> Step:
         """Say whether the vehicle can be there."""
         if self._last is None or _within_reach(self._last, sample):
@@ -56,8 +61,18 @@ class PlausiblePlace:
         self._odd.clear()
 
 
-def _within_reach(before: StateSample, after: StateSample) -> bool:
+def distance_m(before: StateSample, after: StateSample) -> float:
+    """Return how far two positions are from each other, depth included."""
     north = (after.lat_rad - before.lat_rad) * EARTH_M
     east = math.remainder(after.lon_rad - before.lon_rad, math.tau) * EARTH_M * math.cos(before.lat_rad)
     down = after.depth_m - before.depth_m
-    return math.hypot(north, east, down) <= ALLOWANCE_M + FASTEST_MPS * abs(after.time_s - before.time_s)
+    return math.hypot(north, east, down)
+
+
+def reach_m(before: StateSample, after: StateSample) -> float:
+    """Return how far a vehicle can have come between two positions, by their times."""
+    return ALLOWANCE_M + FASTEST_MPS * abs(after.time_s - before.time_s)
+
+
+def _within_reach(before: StateSample, after: StateSample) -> bool:
+    return distance_m(before, after) <= reach_m(before, after)

@@ -13,6 +13,14 @@ def test_a_vehicle_begins_stopped_with_nothing_flown() -> None:
     assert begun.phase is Phase.STOPPED
 
 
+def test_legs_that_were_missed_are_counted_also_over_a_restart() -> None:
+    flown = Flown()
+    for reached in (True, False, True, False, False):
+        (flown.reach_leg if reached else flown.miss_leg)()
+    for counted in (flown, Flown.recall(flown.remember())):
+        assert (counted.legs_reached, counted.legs_missed, counted.missed_last) == (2, 3, 2)
+
+
 @pytest.mark.parametrize(
     ("start", "end", "on_plan"),
     [

@@ -1,5 +1,6 @@
 """Missions that follow others, flown by the whole service."""
 
+from collections.abc import Collection
 from contextlib import suppress
 from typing import Any
 
@@ -10,6 +11,7 @@ from app.missions.alarm_kinds import AlarmKind
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
+from app.missions.operations.polling import waypoint
 from app.missions.preflight.survey import preflight
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
@@ -159,6 +161,60 @@ async def test_a_vehicle_that_went_home_on_the_way_keeps_the_next_mission_from_b
     assert live.withdraw(next(m for m in live.team if m.name == "b"), "return", "its energy is low")  # type: ignore[arg-type]
     await until_said(service, east, "b did not fly 'West' to its end: its energy is low")
     assert await state_of(service, east) is S.READY
+
+
+ROVERS = [{"name": "a", "kind": "rest"}]
+
+
+async def asks(service: MissionService, mission_id: str, flies: Collection[int]) -> None:
+    """Be a vehicle that asks until it is told to stop, and flies only some of its legs."""
+    live, rover, after = await service.get(mission_id), Rover(service, mission_id, "a"), None
+    with suppress(ConflictError):
+        while True:
+            found = await waypoint(live, "a", after_step=after, timeout_s=1.0)
+            if found is not None:
+                after = found.step
+            if found is not None and found.step in flies:
+                await rover.post(lat_deg=found.lat_deg, lon_deg=found.lon_deg)
+
+
+@pytest.mark.usefixtures("simulated_time")
+@pytest.mark.parametrize(
+    ("steps", "flies", "words"),
+    [
+        (4, [1, 3, 4], "running by service: 'West' was flown to its end"),
+        (4, [1, 2, 3], "running by service: 'West' was flown to its end"),
+        (4, [1], "does not begin by itself: a did not fly 'West' to its end: it missed its last 3 of 4 legs"),
+        (3, [1], "does not begin by itself: a did not fly 'West' to its end: it missed its last 2 of 3 legs"),
+    ],
+)
+async def test_a_vehicle_that_missed_its_last_legs_keeps_the_next_mission_from_beginning_by_itself(
+    service: MissionService, steps: int, flies: list[int], words: str
+) -> None:
+    west, east = await two_blocks(service, steps=steps, step_deadline_s=20.0, vehicles=ROVERS)
+    await Rover(service, west, "a").post()
+    await act(service, west, "start")
+    await asks(service, west, flies)
+    ended = await until_state(service, west, S.FINISHED)
+    assert ended.reason == f"every step is done, but a missed {steps - len(flies)} of its {steps} legs"
+    await until_said(service, east, words)
+    assert await state_of(service, east) is (S.RUNNING if "running" in words else S.READY)
+
+
+@pytest.mark.usefixtures("simulated_time")
+async def test_legs_that_were_missed_before_a_restart_keep_the_next_mission_from_beginning(harbour: Harbour) -> None:
+    west, east = await two_blocks(harbour.service, steps=4, step_deadline_s=20.0, vehicles=ROVERS)
+    await Rover(harbour.service, west, "a").post()
+    await act(harbour.service, west, "start")
+    member = (await harbour.service.get(west)).team.named("a")
+    await until(lambda: member.flown.legs_missed > 1, "it missed two legs")
+    service = await harbour.reopen()
+    await Rover(service, west, "a").post()
+    await asks(service, west, [])
+    ended = await until_state(service, west, S.FINISHED)
+    assert ended.reason == "every step is done, but a missed 4 of its 4 legs"
+    await until_said(service, east, "does not begin by itself: a flew no leg of 'West'")
+    await until_alarms(service, east, (AlarmKind.NOT_BEGUN, True))
 
 
 async def test_vehicles_that_come_home_at_the_end_go_on_from_there(service: MissionService) -> None:

@@ -16,6 +16,7 @@ from app.api.http.json_text import (
     Bounds,
     EntryTooLongError,
     NameTwiceError,
+    Unreadable,
     may_be_unstorable,
     parse,
     unstorable,
@@ -40,7 +41,8 @@ _reader = ThreadPoolExecutor(1, thread_name_prefix="bodies")
 class JsonRoute(APIRoute):
     """Gives its endpoint a body that was checked already.
 
-    What a model's attribute ``json_bounds`` says counts for its bodies in place of the usual :class:`Bounds`.
+    What a model's attribute ``json_bounds`` says counts for its bodies in place of the usual :class:`Bounds`. One whose
+    ``judges_items`` is true gets an :class:`Unreadable` for each of its ``items`` with text that cannot be stored.
     """
 
     @cached_property
@@ -51,6 +53,7 @@ class JsonRoute(APIRoute):
         field = self.body_field
         model = field.field_info.annotation
         bounds: Bounds = getattr(model, "json_bounds", Bounds())
+        judges_items: bool = getattr(model, "judges_items", False)
 
         def checked(body: bytes, scope: Scope) -> tuple[Any, Problem | None]:
             if excess := bounds.excess(body):
@@ -62,8 +65,12 @@ class JsonRoute(APIRoute):
             except (ValueError, RecursionError) as error:
                 return None, _malformed(error, scope)
             if may_be_unstorable(body):
-                for path, text in unstorable(parsed):
-                    return None, invalid([_unstorable(path, text)], 1, scope)
+                for path, text in list(unstorable(parsed)):
+                    if not (judges_items and _is_of_item(parsed, path)):
+                        return None, invalid([_unstorable(path, text)], 1, scope)
+                    fault = _unstorable(path[2:], text)
+                    words = f"{fault.field}: {fault.message}; expected {fault.expected}"
+                    parsed["items"][int(path[1])] = Unreadable(words)
             if parsed is None:
                 return None, None
             value, errors = field.validate(parsed, {}, loc=("body",))
@@ -127,6 +134,11 @@ def _too_much(excess: str, scope: Scope) -> Problem:
         instance=instance_of(scope),
         remedy="Send it in several requests, or simplify it",
     )
+
+
+def _is_of_item(parsed: Any, path: tuple[str, ...]) -> bool:
+    """Tell whether a path leads into one of a body's items: a list's entry can be refused by itself."""
+    return len(path) > 1 and path[0] == "items" and isinstance(parsed["items"], list)
 
 
 def _unstorable(path: tuple[str, ...], text: str) -> FieldProblem:

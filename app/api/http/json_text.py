@@ -140,6 +140,10 @@ class NameTwiceError(ValueError):
     """A name stands twice in one object; the error's argument is the name."""
 
 
+class Unreadable(str):
+    """Stands for an entry of a list that cannot be read, and says why."""
+
+
 class EntryTooLongError(ValueError):
     """One entry of a list is longer than what is read at once."""
 

@@ -358,6 +358,10 @@ class Deployment:
 class PolledVehicles(Protocol):
     """What a link whose vehicles ask over HTTP is told as their requests come in."""
 
+    def doubt(self, report: VehicleReport) -> str:
+        """Return why a vehicle cannot be where it says; '' where it can: then :meth:`heard` is called with it, too."""
+        ...
+
     def heard(self, report: VehicleReport) -> None:
         """Take a position that a vehicle posted."""
         ...

@@ -165,7 +165,8 @@ class OwnLegs:
         if any(m.name not in self._sent_home and self._has_way(m) for m in gave_up):
             return f"nobody surveys any more{self._left_words()}"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
-        return f"{words} but {', '.join(m.name for m in left)}" if left else words
+        words += f" but {', '.join(m.name for m in left)}" if left else ""
+        return words + team.missed_words({m.name for m in left})
 
     def _left_words(self) -> str:
         """Return how much of the mission's length is left, as words after a reason; '' where it is counted in steps."""

@@ -97,7 +97,9 @@ class TeamSteps:
                 # Those that are back have nothing to do; who is held is not left at sea.
                 await self._waiting.until(lambda: not live.team.held, None)
                 decision = None
-        return "every step is done" if live.header.step >= self._spec.steps else "nobody surveys any more"
+        if live.header.step < self._spec.steps:
+            return "nobody surveys any more"
+        return f"every step is done{live.team.missed_words()}"
 
     async def _decide_to_fly(self) -> Decision | None:
         """Decide a step that at least one vehicle flies: one in which nobody may go anywhere is no step.

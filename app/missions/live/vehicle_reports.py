@@ -22,7 +22,7 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.flown import Phase
+from app.missions.flown import Phase, is_flown
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.header import MissionHeader
 from app.missions.live.journals.journal import Journal
@@ -38,8 +38,6 @@ from app.missions.views.mission import Level
 
 LONGEST_GAP_S = 60.0
 """What a vehicle flew in a longer silence is not known."""
-FASTEST_MPS = 10.0
-"""A position that is farther from the last one than this speed makes was corrected, not flown to."""
 SURFACE_M = 0.7
 """Who is not deeper can receive satellites."""
 LONGEST_SILENCE_S = 6 * 3600.0
@@ -159,13 +157,11 @@ class VehicleReports:
         """Add what a vehicle has flown since its last report, if that can have been."""
         flown = member.flown
         way_left_m = member.way_left_m(spec)
-        # Legs of a way home are none of the survey's.
-        surveys = member.withdrawal is None or member.withdrawal.response is Response.HOLD
-        flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if surveys else 0.0)
+        flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if member.flies_survey else 0.0)
         before = None if member.report is None else local_place(self._frame, member.report.position)
         if before is None:
             return
-        if not 0.0 < passed_s <= LONGEST_GAP_S or math.dist(before, place) > FASTEST_MPS * passed_s:
+        if passed_s > LONGEST_GAP_S or not is_flown(math.dist(before, place), passed_s):
             return
         leg = None
         if member.ordered and member.leg_start_m is not None and member.target_m is not None:
@@ -229,11 +225,15 @@ class VehicleReports:
         member.reason = event.reason
         if event.status is WaypointStatus.REACHED:
             member.misses = 0
+            if member.flies_survey:
+                member.flown.reach_leg()
             took_s = asyncio.get_running_loop().time() - member.leg_began_s
             before_s = took_s if self.leg_s is None else self.leg_s
             self.leg_s = PACE_MEMORY * before_s + (1 - PACE_MEMORY) * took_s
         elif event.status in (WaypointStatus.MISSED, WaypointStatus.REFUSED):
             member.misses += 1
+            if member.flies_survey:
+                member.flown.miss_leg()
         self._journal.waypoint(event)
         self._waypoints.take(event)
 

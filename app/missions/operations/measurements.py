@@ -19,10 +19,12 @@ from app.missions.fleet.interface import BeamGeometry, PingReport, Position, Ran
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
 from app.missions.pings.store import BEAMS_PER_ITEM, JudgedBatch
+from app.missions.soundings.gate import impossible_place
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.vehicle import Sensor
 from app.missions.states import MissionState
 from app.missions.targets.filters import Arrived
+from app.missions.team import Member
 from app.missions.views.measurements.soundings import BatchVerdict, ItemVerdict, Verdict, batch_verdict
 from app.storage.concurrency.group_commit import Grouped
 from app.storage.models import BatchRow
@@ -125,8 +127,9 @@ class _Batch:
     ranges: Mapping[int, Arrived]
 
     @property
-    def known(self) -> list[Measurement]:
-        return [item for i, item in enumerate(self.items) if not self.strangers[i]]
+    def known(self) -> dict[int, Measurement]:
+        """The items that are not refused."""
+        return {i: item for i, item in enumerate(self.items) if not self.strangers[i]}
 
 
 class _Intake:
@@ -148,7 +151,8 @@ class _Intake:
             rows = await sounding_queries.answers_to(session, live.id, keys)
             known = _answers(batches, {row.key: (row.digest, BatchVerdict.model_validate(row.answer)) for row in rows})
             fresh = _first_of_each(batches, known)
-            stored, committed = await _store(live, [batches[i] for i in fresh], session)
+            doubts = {i: await _doubts(live, batches[i]) for i in fresh}
+            stored, committed = await _store(live, [batches[i] for i in fresh], list(doubts.values()), session)
             await self._forget_old_keys(session)
         for work in committed:
             work()
@@ -158,10 +162,10 @@ class _Intake:
             answers.get(i) or _again(batch, known) for i, batch in enumerate(batches)
         ]
         try:
-            for batch, result in zip(batches, results, strict=True):
+            for i, (batch, result) in enumerate(zip(batches, results, strict=True)):
                 if isinstance(result, BatchVerdict):
                     # The first answer may have got lost together with the process that knew where the vehicle is.
-                    await _hear(live, batch.known, only_unknown=result.replayed)
+                    await _hear(live, batch, doubts.get(i, {}), only_unknown=result.replayed)
             # Where the vehicle is, and whether it arrived, is on disk as well before it is answered.
             await live.journal.flush()
         except Exception as error:
@@ -218,21 +222,38 @@ def _again(batch: _Batch, known: Mapping[str, _Answer]) -> BatchVerdict | Confli
     )
 
 
+async def _doubts(live: LiveMission, batch: _Batch) -> dict[int, str]:
+    """Return by item why its vehicle cannot be where it says; its place may be true whatever else is wrong with it."""
+    doubts = {i: reason for i, item in batch.known.items() if (reason := _impossible_depth(item))}
+    links = {name: live.hub.polled.get(_member(live, name).spec.kind) for name in _names(batch)}
+
+    def judge(i: int) -> None:
+        item = batch.items[i]
+        link = links[item.vehicle]
+        if link is not None and (reason := link.doubt(_vehicle_report(item))):
+            doubts[i] = reason
+
+    can_be = (i for i in batch.known if i not in doubts)
+    await each_of(sorted(can_be, key=lambda i: batch.items[i].time_s), judge)
+    return doubts
+
+
 async def _store(
-    live: LiveMission, batches: Sequence[_Batch], session: AsyncSession
+    live: LiveMission, batches: Sequence[_Batch], doubts: Sequence[Mapping[int, str]], session: AsyncSession
 ) -> tuple[list[BatchVerdict], list[Callable[[], None]]]:
     """Store batches that are new; returns their answers, and what is done once they are committed."""
     reports = [report for batch in batches for report in batch.reports.values()]
     on_reports, counted = await live.journal.take(reports, session)
     on_pings, pinged = await live.journal.take_pings([b.pings.judged for b in batches if b.pings.items], session)
     verdicts, ping_verdicts, then, answers = iter(on_reports), iter(on_pings), [counted, pinged], []
-    for batch in batches:
+    for batch, refused in zip(batches, doubts, strict=True):
         taken = {i: next(verdicts) for i in batch.reports} | {i: next(ping_verdicts) for i in batch.pings.items}
         if batch.ranges:
             on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
             taken |= dict(zip(batch.ranges, on_ranges, strict=True))
             then.append(used)
-        answers.append(await made_of(batch.items, _batch_verdict, len(batch.items), taken, batch.strangers))
+        reasons = {**batch.strangers, **refused}
+        answers.append(await made_of(batch.items, _batch_verdict, len(batch.items), taken, reasons))
     moment = now()
     written = [await made_of(answer.items, partial(answer.model_dump, mode="json")) for answer in answers]
     session.add_all(
@@ -249,18 +270,32 @@ async def _store(
     return answers, then
 
 
-async def _hear(live: LiveMission, items: Sequence[Measurement], *, only_unknown: bool = False) -> None:
+async def _hear(live: LiveMission, batch: _Batch, doubts: Mapping[int, str], *, only_unknown: bool = False) -> None:
     """Tell the links where vehicles are; ``only_unknown``: of those only whose place they do not know."""
     links = {}
-    for name in {item.vehicle for item in items}:
-        # One that left meanwhile was still heard.
-        member = live.team.get(name) or live.team.left[name]
+    for name in _names(batch):
+        member = _member(live, name)
         link = live.hub.polled.get(member.spec.kind)
         if link is not None and not (only_unknown and live.hub.info(member.key).report is not None):
             links[name] = link
-    fresh = [item for item in items if item.vehicle in links]
+    if only_unknown and links:
+        doubts = await _doubts(live, batch)
+    fresh = [item for i, item in batch.known.items() if item.vehicle in links and i not in doubts]
     reports = await made_of(fresh, _vehicle_reports, fresh)
     await each_of(reports, lambda report: links[report.vehicle].heard(report))
+
+
+def _names(batch: _Batch) -> set[str]:
+    return {item.vehicle for item in batch.known.values()}
+
+
+def _member(live: LiveMission, name: str) -> Member:
+    # One that left meanwhile was still heard.
+    return live.team.get(name) or live.team.left[name]
+
+
+def _impossible_depth(item: Measurement) -> str:
+    return impossible_place(item.lat_deg, item.lon_deg, item.depth_m).removeprefix("vehicle_")
 
 
 def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
@@ -274,7 +309,11 @@ def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
     if item.beams is not None and member.spec.sensor is not Sensor.MULTIBEAM:
         words = f"has sensor {member.spec.sensor}; only vehicles with sensor {Sensor.MULTIBEAM} send pings"
         return f"beams: {item.vehicle!r} {words}"
-    return ("" if near else _impossible_place(item, live.frame)) or _useless_range(item, live)
+    if not near and (reason := _impossible_place(item, live.frame)):
+        return reason
+    if item.target is not None and (reason := _impossible_depth(item)):
+        return reason
+    return _useless_range(item, live)
 
 
 def _useless_range(item: Measurement, live: LiveMission) -> str:

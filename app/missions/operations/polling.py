@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 
-from app.missions.errors import ConflictError, VehicleNotFoundError
+from app.missions.errors import ConflictError, InvalidRequestError, VehicleNotFoundError
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
@@ -17,7 +17,8 @@ async def waypoint(
 ) -> WaypointView | None:
     """Return a vehicle's waypoint when it is newer than ``after_step``, waiting for it; None when none came.
 
-    A polling vehicle acknowledges the waypoint by this. Raises ConflictError when it must stop, or stay where it is.
+    A polling vehicle acknowledges the waypoint by this. Raises ConflictError when it must stop, or stay where it is,
+    InvalidRequestError when there is no ``after_step`` yet.
     """
     member = live.team.get(vehicle)
     if member is None:
@@ -43,6 +44,8 @@ async def waypoint(
     def settled() -> bool:
         return newer() is not None or must_stop() or _staying(member) is not None
 
+    if not must_stop() and _staying(member) is None:
+        _check_given(live, vehicle, after)
     if link is not None:
         link.has_waypoint(vehicle, after)
     await _wait_watching(live, settled, timeout_s)
@@ -66,6 +69,19 @@ async def waypoint(
     lats, lons = live.frame.to_geographic(way_m[:, 0], way_m[:, 1])
     way = [(float(lon), float(lat)) for lat, lon in zip(lats, lons, strict=True)]
     return found.model_copy(update={"way_home": way})
+
+
+def _check_given(live: LiveMission, vehicle: str, after: int) -> None:
+    """Raise InvalidRequestError where a vehicle says that it has a step that it was never given."""
+    shown = live.waypoints.of(vehicle)
+    newest = 0 if shown is None else shown.step
+    if after > newest:
+        words = f"the newest is {newest}" if newest else "it was given none yet"
+        raise InvalidRequestError(
+            "after_step",
+            f"{vehicle!r} has no waypoint of step {after}: {words}",
+            "send the step of the newest waypoint that it fetched in this mission, or leave after_step out",
+        )
 
 
 def _staying(member: Member) -> Withdrawal | None:

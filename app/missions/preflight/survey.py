@@ -333,7 +333,7 @@ def _known_bottom(live: LiveMission) -> Iterator[CheckView]:
             id="bottom",
             title="Known bottom",
             status=NOTE,
-            message="soundings were imported; their map is being made",
+            message="there are soundings; their map is being made",
         )
         return
     if built is None:

@@ -42,7 +42,8 @@ class Gate:
         self._zone = area.buffer(margin_m)
         self._margin_m = margin_m
         self._noise = noise
-        self._last: dict[str, tuple[float, float, float]] = {}
+        self._last: dict[str, tuple[float, float, float, float]] = {}
+        """By vehicle the time of its last accepted sounding, where that was, east and north, and its own depth."""
         shapely.prepare(self._zone)
 
     def check(self, reports: Iterable[SoundingReport]) -> list[PlacedSounding]:
@@ -60,7 +61,7 @@ class Gate:
             return replace(found, sd_m=sd_m)
         reason = self.outside(found.east_m, found.north_m) or self._jump(found)
         if not reason:
-            self._last[report.vehicle] = (report.time_s, found.east_m, found.north_m)
+            self._last[report.vehicle] = report.time_s, found.east_m, found.north_m, report.vehicle_depth_m
         return replace(found, sd_m=sd_m, reason=reason)
 
     def deviation_m(self, range_m: float) -> float:
@@ -81,8 +82,9 @@ class Gate:
         last = self._last.get(report.vehicle)
         if last is None:
             return ""
-        time_s, last_east, last_north = last
-        distance = math.hypot(found.east_m - last_east, found.north_m - last_north)
+        time_s, last_east, last_north, last_depth = last
+        deeper = report.vehicle_depth_m - last_depth
+        distance = math.hypot(found.east_m - last_east, found.north_m - last_north, deeper)
         # Footprints of slanted beams lie beside the vehicle, by at most about the range.
         allowed = JUMP_ALLOWANCE_M + report.range_m + MAX_VEHICLE_SPEED_MPS * abs(report.time_s - time_s)
         if distance <= allowed:

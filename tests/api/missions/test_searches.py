@@ -1,5 +1,6 @@
 """Missions that search, over HTTP."""
 
+import json
 from typing import Any
 
 import httpx
@@ -60,6 +61,16 @@ async def test_a_scan_that_cannot_be_read_is_named_and_spoils_no_other(client: h
     assert found["items"][1]["reason"].startswith("reach_m: ")
     assert "nobody" in found["items"][3]["reason"]
     assert (await client.get(f"{path}/search")).json()["version"] == 2
+
+
+async def test_a_scan_with_text_that_cannot_be_stored_spoils_no_other(client: httpx.AsyncClient) -> None:
+    made = await client.post("/missions", json=search_json(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    body = json.dumps({"items": [scan(1.0), scan(2.0, vehicle="boat\0"), scan(3.0)]})
+    path = f"/missions/{made.json()['id']}/scans"
+    answer = await client.post(path, content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 200, answer.text
+    assert [item["verdict"] for item in answer.json()["items"]] == ["accepted", "rejected", "accepted"]
+    assert answer.json()["items"][1]["reason"].startswith("vehicle: ")
 
 
 async def test_a_survey_has_no_search(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import httpx
+import pytest
 from sqlalchemy import select
 
 from app.api.accounts.tokens import Role, TokenStore
@@ -70,6 +71,23 @@ async def test_a_batch_of_another_shape_is_refused_whole(client: httpx.AsyncClie
     too_many = await client.post(path, json={"items": [None] * 10_001})
     assert too_many.json()["errors"][0]["expected"] == "at most 10000 entries"
     assert (await client.get(f"/missions/{mission['id']}")).json()["progress"]["soundings"] == 0
+
+
+@pytest.mark.parametrize("text", ["\\u0000", "\\ud800"])
+@pytest.mark.parametrize("item", ["a@", {"vehicle": "a@", "target": "@"}, {"@": 1}, {"x": [["@"]]}])
+async def test_text_that_cannot_be_stored_spoils_no_other_item(
+    client: httpx.AsyncClient, mission: dict[str, Any], text: str, item: Any
+) -> None:
+    path = f"/missions/{mission['id']}/measurements"
+    body = json.dumps({"items": [*soundings(1), item, *soundings(1)]}).replace("@", text)
+    headers = {"Content-Type": "application/json"}
+    answer = await client.post(path, content=body, headers=headers)
+    assert answer.status_code == 200, answer.text
+    assert [item["verdict"] for item in answer.json()["items"]] == ["accepted", "rejected", "duplicate"]
+    assert "NUL character or a lone surrogate; expected valid Unicode text" in answer.json()["items"][1]["reason"]
+    for whole in ({"@": [], "items": soundings(1)}, {"items": {"0": "@"}}, {"items": "@"}, ["@"]):
+        answer = await client.post(path, content=json.dumps(whole).replace("@", text), headers=headers)
+        assert answer.status_code == 422, answer.text
 
 
 async def test_a_batch_with_only_unreadable_items_is_answered(
@@ -191,8 +209,18 @@ def _sounding(position: dict[str, float], clock: float) -> dict[str, Any]:
 async def test_nothing_newer_is_204_without_a_body(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
     path = f"/missions/{mission['id']}"
     await client.post(f"{path}/start")
-    answer = await client.get(f"{path}/vehicles/rover/waypoint", params={"after_step": 1000, "timeout_s": 0})
+    answer = await client.get(f"{path}/vehicles/rover/waypoint", params={"timeout_s": 0})
     assert (answer.status_code, answer.content) == (204, b"")
+
+
+async def test_who_says_that_it_has_a_waypoint_of_a_step_to_come_is_refused(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    path = f"/missions/{mission['id']}"
+    await client.post(f"{path}/start")
+    answer = await client.get(f"{path}/vehicles/rover/waypoint", params={"after_step": 1000, "timeout_s": 0})
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "after_step")
+    assert "it was given none yet" in answer.text
 
 
 async def test_a_stopping_service_ends_the_wait(
@@ -200,9 +228,7 @@ async def test_a_stopping_service_ends_the_wait(
 ) -> None:
     path = f"/missions/{mission['id']}"
     await client.post(f"{path}/start")
-    waiting = asyncio.create_task(
-        client.get(f"{path}/vehicles/rover/waypoint", params={"after_step": 1000, "timeout_s": 60})
-    )
+    waiting = asyncio.create_task(client.get(f"{path}/vehicles/rover/waypoint", params={"timeout_s": 60}))
     metrics = server.url + "/health"
     while True:  # until the wait has begun: the server answers a later request only after it accepted the earlier one
         await client.get(metrics)

@@ -14,12 +14,14 @@ from affine import Affine
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.layers import LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.geotiff import geotiff
 from app.mapping.products.netcdf import netcdf
 from app.mapping.products.text import map_xyz, soundings_xyz
+from app.mapping.readers import raster
 from app.mapping.readers.file_extensions import ending
 from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings
@@ -204,6 +206,43 @@ def test_what_a_file_does_not_say_has_to_be_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(s.sd_m, np.hypot(0.25, 0.0075 * s.depth_m) / NORMAL_95)
     assert len(found.notes) == 2
     assert "positive down, from their sign" in found.notes[0]
+
+
+HEADER = "ncols 20\nnrows 20\nxllcorner 0\nyllcorner 0\ncellsize 2\n"
+
+
+@pytest.mark.parametrize("header", [HEADER, HEADER + "NODATA_value -9999\n", HEADER.upper() + "nodata_value nan\n"])
+@pytest.mark.parametrize("value", ["9.5", "9,5", "nan"])
+@pytest.mark.parametrize("end", ["", "\n", "\r\n \x1a"])
+def test_an_ascii_grid_has_one_value_for_each_cell(header: str, value: str, end: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.asc"
+
+    def of(*counts: int) -> FloatArray:
+        rows = [" ".join([value] * (n - 1) + ["7"]) for n in counts]
+        path.write_text(header + "\n".join(rows) + end)
+        content = read_path(path)
+        assert isinstance(content, Raster)
+        return content.z
+
+    z = of(*20 * [20])
+    assert z.shape == (20, 20)
+    np.testing.assert_array_equal(z[:, 0], np.nan if value == "nan" else 9.5)
+    assert of(400).shape == of(*10 * [40]).shape == (20, 20), "rows may be broken elsewhere"
+    path.write_text(header + 399 * f"{value} " + "x" + end)
+    with pytest.raises(ReadError, match="some of its values are no numbers"):
+        read_path(path)
+    for counts, found in ([*19 * [20], 19], 399), ([*20 * [20], 1], 401), ([3], 3), (19 * [20], 380):
+        with pytest.raises(ReadError, match=f"20 x 20 = 400, and {found} values follow"):
+            of(*counts)
+
+
+def test_values_of_an_ascii_grid_are_counted_across_the_parts_that_are_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (path := tmp_path / "a.asc").write_text(HEADER + 400 * "12.25\n")
+    for size in range(1, 9):
+        monkeypatch.setattr(raster, "BYTES_AT_ONCE", size)
+        assert isinstance(read_path(path), Raster)
 
 
 def test_netcdf_with_latitude_and_longitude_and_heights(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable
@@ -9,6 +10,7 @@ from collections.abc import AsyncIterator, Callable
 import numpy as np
 import pytest
 
+from app.missions import clock
 from app.missions.fleet.interface import (
     FleetEvent,
     FleetLink,
@@ -433,6 +435,50 @@ async def test_a_position_of_before_moves_nobody_back_unless_the_clock_was_set_b
         return report is not None and report.time_s == 50.0
 
     await until(told_it_is_50, "nothing newer comes: the clock was set back")
+    await link.close()
+
+
+async def test_one_position_with_a_time_ahead_does_not_make_those_after_it_older() -> None:
+    here, moment_s = Position(LAT, LON, 1.0), 1000.0
+    with clock.told_by(lambda: moment_s):
+        for before in ([990.0], []):
+            link = RestFleetLink(lost_after_s=300.0)
+            events: list[FleetEvent] = []
+            await link.start(events.append)
+            told = [*before, 4600.0, 1001.0, 1002.0]
+            for time_s in [*told, 950.0]:
+                link.heard(VehicleReport("r", time_s, here))
+            assert [e.time_s for e in events if isinstance(e, VehicleReport)] == told, "what is old moves nobody back"
+            await link.close()
+
+
+async def test_a_time_ahead_tells_nothing_of_how_far_a_vehicle_came() -> None:
+    link = RestFleetLink(lost_after_s=300.0)
+    await link.start(lambda _event: None)
+    with clock.told_by(lambda: 1000.0):
+        report = VehicleReport("r", 999.0, Position(LAT, LON, 1.0))
+        assert link.doubt(report) == ""
+        link.heard(report)
+        assert "at most 80 m can be" in link.doubt(VehicleReport("r", 4600.0, Position(LAT + 0.1, LON, 1.0)))
+    await link.close()
+
+
+async def test_a_clock_that_is_always_ahead_is_the_vehicles_own() -> None:
+    link = RestFleetLink(lost_after_s=0.2)
+    await link.start(lambda _event: None)
+    here, times_s = Position(LAT, LON, 1.0), itertools.count(5000.0)
+
+    def moved_back() -> bool:
+        """Post what is new, and what was kept; whether that moved it back."""
+        link.heard(VehicleReport("r", newest_s := next(times_s), here))
+        link.heard(VehicleReport("r", newest_s - 500.0, here))
+        report = link.vehicles()[0].report
+        return report is not None and report.time_s < newest_s
+
+    with clock.told_by(lambda: 1000.0):
+        assert moved_back()
+        await until(lambda: not moved_back(), "its clock is known")
+        assert not moved_back()
     await link.close()
 
 

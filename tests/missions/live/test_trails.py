@@ -4,6 +4,8 @@ from shapely.geometry import LineString, Point
 
 from app.missions.live.journals.journal import METRES_PER_DEGREE
 from app.missions.live.trails import TOLERANCE_M, in_order, worth_drawing
+from tests.support.missions.harbour import Harbour, Rover, act, sim_spec
+from tests.support.missions.specs import lon_lat
 
 
 def wandering(seed: int, count: int = 400) -> np.ndarray:
@@ -60,3 +62,17 @@ def test_points_of_a_log_lie_where_the_clock_puts_them() -> None:
     log = np.array([at(190, 4), at(115, 3), at(90, 0), at(210, 6)])
     assert in_order(heard, log)[:, 1].tolist() == [0, 1, 2, 3, 4, 5, 6]
     assert in_order(np.zeros((0, 4)), log)[:, 1].tolist() == [0, 3, 4, 6]
+
+
+async def test_a_position_that_is_corrected_is_no_way_that_was_flown_also_after_a_restart(harbour: Harbour) -> None:
+    service = await harbour.reopen(time_scale=1.0)
+    mission = await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))
+    rover = Rover(service, mission.id, "a")
+    await rover.post()
+    await act(service, mission.id, "start")
+    for east_m in (2.0, 5.0, 5.1, 27.0, 25.0):
+        lon, lat = lon_lat(east_m, 5.0)
+        await rover.post(lat_deg=lat, lon_deg=lon)
+    for _ in range(2):
+        assert (await service.get(mission.id)).journal.travelled_m == pytest.approx(5.0, abs=0.1)
+        service = await harbour.reopen(time_scale=1.0)

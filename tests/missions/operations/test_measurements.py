@@ -2,14 +2,20 @@
 
 import asyncio
 import math
+from collections.abc import AsyncIterator
 
 import pytest
 
+from app.missions import clock
+from app.missions.fleet.interface import Position
+from app.missions.live.mission import LiveMission
 from app.missions.operations.measurements import measure
+from app.missions.preflight.survey import preflight
+from app.missions.soundings.measurement import Measurement
 from app.missions.views.measurements.soundings import BatchVerdict, Verdict
 from app.storage.database import Database
 from app.storage.queries.soundings import counts
-from tests.support.missions.harbour import Harbour, Rover, sim_spec
+from tests.support.missions.harbour import CLOCK_S, Harbour, Rover, sim_spec
 from tests.support.missions.measured import measured
 from tests.support.missions.specs import make_spec
 
@@ -61,3 +67,80 @@ async def test_altitude_is_how_far_the_bottom_is_below_a_vehicle_however_its_bea
     report = live.hub.info(live.team.named("a").key).report
     assert report is not None
     assert (report.time_s, report.position.depth_m) == (time_s + 1.0, 3.0)
+
+
+@pytest.fixture
+async def mission(harbour: Harbour) -> AsyncIterator[LiveMission]:
+    """One polling vehicle, whose clock is the wall's."""
+    service = await harbour.reopen(time_scale=1.0)
+    with clock.told_by(lambda: CLOCK_S + 60.0):
+        yield await service.get((await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))).id)
+
+
+async def place_after(live: LiveMission, *items: Measurement) -> tuple[Position, list[tuple[Verdict, str]]]:
+    """Where the vehicle is taken to be after a batch, and what was said of each item."""
+    answer = await measure(live, items)
+    report = live.hub.info(live.team.named("a").key).report
+    assert report is not None
+    return report.position, [(item.verdict, item.reason.partition(":")[0]) for item in answer.items]
+
+
+@pytest.mark.parametrize("range_m", [9.0, 20_000.0, None])
+@pytest.mark.parametrize("wrong", [{"depth_m": 5000.0}, {"depth_m": 1e9}, {"depth_m": -500.0}, {"lat_deg": 41.9}])
+async def test_where_no_vehicle_can_be_none_is_taken_to_be(
+    harbour: Harbour, mission: LiveMission, wrong: dict[str, float], range_m: float | None
+) -> None:
+    rover = Rover(harbour.service, mission.id, "a")
+    here, _ = await place_after(mission, rover.item())
+    place, [(verdict, field)] = await place_after(mission, rover.item(range_m=range_m, **wrong))
+    assert place == here
+    assert verdict is Verdict.REJECTED
+    if range_m is None:
+        assert set(wrong) <= set(field.split(", ")), "what is wrong is named"
+
+
+async def test_a_sounding_that_is_wrong_tells_where_its_vehicle_is_all_the_same(
+    harbour: Harbour, mission: LiveMission
+) -> None:
+    rover = Rover(harbour.service, mission.id, "a")
+    await measure(mission, [rover.item()])
+    for wrong in (-3.0, 20_000.0):
+        depth_m = 2.0 + wrong / 1e5
+        place, [(verdict, _)] = await place_after(mission, rover.item(range_m=wrong, depth_m=depth_m))
+        assert (verdict, place.depth_m) == (Verdict.REJECTED, depth_m)
+
+
+async def test_a_vehicle_that_comes_up_far_away_is_believed_when_it_goes_on_saying_so(
+    harbour: Harbour, mission: LiveMission
+) -> None:
+    rover = Rover(harbour.service, mission.id, "a")
+    here, _ = await place_after(mission, rover.item())
+    there = {"lat_deg": here.lat_deg + 0.01, "range_m": None}
+    items = [rover.item(**there) for _ in range(6)]
+    place, said = await place_after(mission, *items)
+    assert place.lat_deg == there["lat_deg"]
+    assert [verdict for verdict, _ in said] == 3 * [Verdict.REJECTED] + 3 * [Verdict.ACCEPTED]
+    back = rover.item(range_m=None)
+    for _ in range(2):
+        place, said = await place_after(mission, back)
+        assert place.lat_deg == there["lat_deg"], "one from where it was does not move it back"
+
+
+async def test_ranges_to_targets_from_where_no_vehicle_can_be_are_refused(harbour: Harbour) -> None:
+    service = await harbour.reopen(time_scale=1.0)
+    spec = sim_spec(
+        vehicles=[{"name": "a", "kind": "rest"}],
+        targets=[{"name": "t"}],
+    )
+    live = await service.get((await service.create(spec)).id)
+    item = Rover(service, live.id, "a").item(range_m=None, depth_m=1e9, target="t", target_range_m=20.0)
+    answer = await measure(live, [item])
+    assert [verdict.reason for verdict in answer.items] == ["depth_m: 1e+09 is not between -2 and 11100"]
+
+
+async def test_the_checklist_calls_what_a_vehicle_posted_no_import(harbour: Harbour) -> None:
+    service = harbour.service
+    live = await service.get((await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))).id)
+    await measure(live, [Rover(service, live.id, "a").item()])
+    messages = [check.message for check in preflight(live).checks if check.id == "bottom"]
+    assert messages == ["there are soundings; their map is being made"]

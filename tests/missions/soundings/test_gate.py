@@ -113,6 +113,17 @@ def test_a_vehicle_whose_first_fix_was_wrong_is_believed_again_in_time() -> None
     assert accepted == sorted(accepted[1:], key=bool) or accepted[1:] == sorted(accepted[1:])
 
 
+def test_a_vehicle_that_would_have_sunk_in_no_time_is_refused() -> None:
+    there = [
+        sounding(),
+        sounding(time_s=1001.0, vehicle_depth_m=5000.0, footprint=at(depth=5009.0)),
+        sounding(time_s=1002.0),
+    ]
+    results = make_gate().check(there)
+    assert [r.accepted for r in results] == [True, False, True]
+    assert "jumped 4998.0 m in 1.0 s" in results[1].reason
+
+
 def test_vehicles_jump_on_their_own_account() -> None:
     other = replace(sounding(95, 95), vehicle="b")
     assert [r.accepted for r in make_gate().check([sounding(5, 5), other])] == [True, True]

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
+from app.missions.clock import now
 from app.missions.fleet.interface import (
     EventSink,
     LinkCapabilities,
@@ -23,35 +24,59 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.visiting import VisitedLink, Visitor
+from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, Step, distance_m, reach_m
+from imc_bridge.telemetry.soundings import StateSample
 
 EARTH_RADIUS_M = 6_371_000.0
 
 KEPT_S = 86_400.0
 """For how long vehicles may keep positions before they post them, at the most: older ones tell of another clock."""
 
+AHEAD_S = 5.0
+"""A time that is farther ahead than this of our clock, and of what has passed by its own, is not a vehicle's."""
+
 
 @dataclass
 class _Poller(Visitor):
     heard_s: float = 0.0
-    newest_heard_s: float = -math.inf
-    """When its newest position came, the event loop's time."""
+    newest_s: float = -math.inf
+    """The newest time by its clock: what is older was kept until now."""
+    newest_heard_s: float = 0.0
+    """When that came, the event loop's time."""
+    ahead_since_s: float | None = None
+    """Since when its times have been too far ahead, the event loop's time; None: they are not."""
+
+    def latest_s(self, now_s: float, time_scale: float) -> float:
+        """Return the latest time that its clock can tell, at the event loop's time ``now_s``."""
+        own_s = self.newest_s + time_scale * (now_s - self.newest_heard_s)
+        return max(own_s, now().timestamp()) + AHEAD_S
+
     stopping: bool = False
     told: asyncio.Event = field(default_factory=asyncio.Event)
 
 
 class RestFleetLink(VisitedLink):
-    """The fleet interface for vehicles that poll."""
+    """The fleet interface for vehicles that poll.
+
+    Parameters
+    ----------
+    time_scale
+        How much faster than the wall clock the vehicles live.
+    """
 
     kind = "rest"
     capabilities = LinkCapabilities(stays_put=True)
 
-    def __init__(self, *, lost_after_s: float = 30.0) -> None:
+    def __init__(self, time_scale: float = 1.0, *, lost_after_s: float = 30.0) -> None:
         super().__init__(lost_after_s)
+        self._time_scale = time_scale
         self._pollers: dict[str, _Poller] = {}
+        self._places: dict[str, PlausiblePlace] = {}
+        """Where vehicles can be, by where they were."""
 
     @property
     def polled_vehicles(self) -> Self:
-        """The link itself: ``heard``, ``has_waypoint`` and ``told_to_stop`` are called as requests come in."""
+        """The link itself, which is called as requests come in."""
         return self
 
     async def start(self, sink: EventSink) -> None:
@@ -121,17 +146,55 @@ class RestFleetLink(VisitedLink):
             return StopReceipt(vehicle, acknowledged=False, detail="has not polled since; it is told at its next poll")
         return StopReceipt(vehicle, acknowledged=True, detail="told at its poll")
 
+    def doubt(self, report: VehicleReport) -> str:
+        """Return why a vehicle cannot be where it says, by where it was; '' where it can.
+
+        Asked once of every position, in the order of their times. One far away is believed when others agree.
+        """
+        places = self._places.setdefault(report.vehicle, PlausiblePlace())
+        sample = self._sample(report)
+        if places.take(sample) is not Step.DOUBTFUL or (last := places.last) is None:
+            return ""
+        self._touch(report.vehicle)
+        passed_s = abs(sample.time_s - last.time_s) / self._time_scale
+        away_m, most_m = distance_m(last, sample), reach_m(last, sample)
+        return (
+            f"lat_deg, lon_deg, depth_m: {away_m:.0f} m from where it was {passed_s:.1f} s before; "
+            f"at most {most_m:.0f} m can be; believed once {CONFIRMATIONS} positions in a row agree"
+        )
+
+    def _sample(self, report: VehicleReport) -> StateSample:
+        place, time_s = report.position, report.time_s
+        lat_rad, lon_rad = math.radians(place.lat_deg), math.radians(place.lon_deg)
+        poller = self._pollers.get(report.vehicle)
+        if poller is not None and math.isfinite(poller.newest_s):
+            # Nobody comes farther by a time that is ahead.
+            time_s = min(time_s, poller.latest_s(asyncio.get_running_loop().time(), self._time_scale))
+        # Clocks that keep to the wall's tell little of how far one comes that lives faster.
+        return StateSample(self._time_scale * time_s, lat_rad, lon_rad, place.depth_m, 0.0, 0.0, 0.0)
+
     def heard(self, report: VehicleReport) -> None:
         """Take a position that a vehicle posted, unless a newer one is known: it may post what it kept under water.
 
         One whose clock was set back is believed after ``lost_after_s``, and at once where that was by a day or more.
+        What comes after a time that is ahead is not older for that, unless times have been ahead for as long.
         """
         poller = self._touch(report.vehicle)
         now_s = asyncio.get_running_loop().time()
-        older_s = 0.0 if poller.report is None else poller.report.time_s - report.time_s
+        older_s = poller.newest_s - report.time_s
         if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
-        poller.report, poller.newest_heard_s = report, now_s
+        is_ahead = report.time_s > poller.latest_s(now_s, self._time_scale)
+        if is_ahead or older_s > 0.0:
+            # Its clock was set: nothing tells how far it can have come.
+            self._places.pop(report.vehicle, None)
+        if not is_ahead:
+            poller.ahead_since_s = None
+        elif poller.ahead_since_s is None:
+            poller.ahead_since_s = now_s
+        if poller.ahead_since_s is None or now_s - poller.ahead_since_s >= self._lost_after_s:
+            poller.newest_s, poller.newest_heard_s = report.time_s, now_s
+        poller.report = report
         self._sink(report)
         self._check_arrival(poller)
 

@@ -191,9 +191,11 @@ class Dispatch:
         """End the leg that a vehicle flies, and those after it; returns where they were to end, each (2,)."""
         ends = [member.target_m] if member.ordered and member.target_m is not None else []
         if member.ordered:
-            misses = member.misses
+            misses, flown = member.misses, member.flown
+            missed, missed_last = flown.legs_missed, flown.missed_last
             self.settle(member, WaypointStatus.MISSED, reason)
-            member.misses = misses  # it would have got there
+            # It would have got there.
+            member.misses, flown.legs_missed, flown.missed_last = misses, missed, missed_last
         return self._note_given_up(member, [*ends, *self._spare(member, ends, reason)])
 
     def leave_line(self, member: Member, reason: str) -> None:

@@ -20,6 +20,7 @@ from app.missions.alarm_kinds import ALARMS, AlarmKind
 from app.missions.alarms.raised import copy_of, make_alarm
 from app.missions.clock import now
 from app.missions.fleet.interface import PingReport, ScanReport, SoundingReport, VehicleReport, WaypointReport
+from app.missions.flown import is_flown
 from app.missions.large_batches import made_of
 from app.missions.live.journals.db_retry import DatabaseRetry
 from app.missions.live.journals.write_behind import Committed, WriteBehind
@@ -130,6 +131,8 @@ class Journal(WriteBehind[Noted]):
         self._told_of_missing_level = False
         self._untold = ""
         self._track_ends: dict[str, tuple[float, float]] = {}
+        self._heard_s: dict[str, float] = {}
+        """By vehicle the time of its last position, noted or not."""
 
     def sounding(self, report: SoundingReport) -> None:
         """Note a sounding; it is written within a moment."""
@@ -149,11 +152,13 @@ class Journal(WriteBehind[Noted]):
         place = report.position
         end = (place.lon_deg, place.lat_deg)
         last = self._track_ends.get(report.vehicle)
+        passed_s = report.time_s - self._heard_s.get(report.vehicle, report.time_s)
+        self._heard_s[report.vehicle] = report.time_s
         if last is not None:
             leg_m = track_length_m([last, end])
             if leg_m < TRACK_SPACING_M:
                 return
-            self.travelled_m += leg_m
+            self.travelled_m += leg_m if is_flown(leg_m, passed_s) else 0.0
         self._track_ends[report.vehicle] = end
         self._note(report)
 
