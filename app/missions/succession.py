@@ -169,10 +169,10 @@ def _unfit(live: LiveMission, before: LiveMission) -> str:
         if earlier.withdrawal is not None and not earlier.withdrawal.done:
             return f"{member.name} did not fly {before.spec.name!r} to its end: {earlier.withdrawal.why}"
         flown = earlier.flown
-        if not flown.legs_reached:
+        if earlier.legs and not flown.legs_reached:
             return f"{member.name} flew no leg of {before.spec.name!r}"
-        # The first leg may have led to where it was.
-        if flown.missed_last >= min(NOT_WAITED_FOR, flown.legs_reached):
+        # The first leg may have led to where it was. Who was given none had nothing to fly.
+        if flown.missed_last and flown.missed_last >= min(NOT_WAITED_FOR, flown.legs_reached):
             words = f"it missed its last {flown.missed_last} of {flown.legs_missed + flown.legs_reached} legs"
             return f"{member.name} did not fly {before.spec.name!r} to its end: {words}"
     return ""

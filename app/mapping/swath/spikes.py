@@ -17,7 +17,12 @@ FAR_M, FAR_OF_DEPTH = 0.6, 0.12
 """A beam is a spike when it is farther from the bottom than the larger of these: metres, and share of the height."""
 
 SAME_OF_FAR = 0.25
-"""Beams of the ping before or after agree with one when they are no farther from it than this share of that."""
+"""Beams of the next ping agree with one when they are no farther from it than this share of that, and of the one after
+when they are no farther than twice as much."""
+
+BESIDE = (-2, -1, 1, 2)
+AGREEING = 2
+"""So many of these pings beside its own have to agree with a beam: fish do so by chance, where there are many."""
 
 NEXT_BEAMS = 1.5
 """And when they point no farther aside than so many beams lie apart."""
@@ -33,9 +38,8 @@ def spikes(pings: Pings) -> BoolArray:
     """Return which beams (n, b) lie far above or below their neighbours in the same ping, and in that ping alone.
 
     Neighbours are a level median, or the straight line that most of them lie on: slopes stay, of however few beams.
-    Steps of the bottom are wider than a few beams and stay, and so does what the ping before or after met, too, in the
-    same place: a wreck's mast, a rock. A single ping's beam, or a few, do not. At either end of the pings one of the
-    two is missing, and the other tells alone.
+    Steps of the bottom are wider than a few beams and stay, and so does what ping after ping met in the same place: a
+    wreck's mast, a rock. A single ping's beam, or a few, do not.
     """
     aside = pings.angle_rad.astype(np.float64) - np.nan_to_num(pings.roll_rad)[:, None]
     slant = pings.range_m.astype(np.float64)
@@ -95,23 +99,26 @@ def _met_again(
     slope: FloatArray,
     same: FloatArray,
 ) -> BoolArray:
-    """Return which beams, (m,), a beam of the ping before or after agrees with, along the slope of the bottom.
+    """Return which beams, (m,), pings beside theirs agree with, along the slope of the bottom.
 
     ``swath`` has the directions of all beams, how far across they met something, and how deep.
     """
     aside, across, below = swath
     pings, beams = aside.shape
+    agreeing, asked = np.zeros(len(ping), dtype=int), np.zeros(len(ping), dtype=int)
     with np.errstate(invalid="ignore"):
         step = NEXT_BEAMS * _median(np.abs(np.diff(aside, axis=1)))[ping] if beams > 1 else np.zeros(len(ping))
-        agreed = np.zeros(len(ping), dtype=bool)
-        for other in (ping - 1, ping + 1):
-            there = np.clip(other, 0, pings - 1)
+        for away in BESIDE:
+            there = np.clip(ping + away, 0, pings - 1)
             turned = np.abs(aside[there] - aside[ping, beam][:, None])
             line = slope[:, None] * (across[there] - across[ping, beam][:, None])
             off = np.abs(below[there] - below[ping, beam][:, None] - line)
-            near = (turned <= step[:, None]) & (off <= same[:, None])
-            agreed |= near.any(axis=1) & (other == there)
-    return agreed
+            near = (turned <= step[:, None]) & (off <= abs(away) * same[:, None])
+            is_there = ping + away == there
+            agreeing += near.any(axis=1) & is_there
+            asked += is_there
+    # Of two pings alone the one tells of the other.
+    return np.asarray(agreeing >= np.clip(asked, 1, AGREEING))
 
 
 def _median(values: NDArray[np.float64]) -> FloatArray:
