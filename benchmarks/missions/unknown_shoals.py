@@ -4,8 +4,9 @@ Each floor is drawn by its number: an area of 60 to 160 m, 3 to 12 m deep, with 
 radius that rise to 0.3 to 0.8 m below the surface with slopes of 0.1 to 1; every third one rises to a shore along its
 southern border instead, where the vehicles begin. One to three simulated vehicles, which need 1 m of water, fly it by
 lines and by what the service has by default, in simulated time; their minutes are enough for lines 8 m apart. Told are
-the part of the area that is known to the wanted accuracy at the end, the longest time that a vehicle stayed within 12 m
-of one place, and how much of the area is deep enough.
+the part of the area that is known to the wanted accuracy at the end, as the map has it, the true error of the map where
+it is deep enough, the longest time that a vehicle stayed within 12 m of one place, and how much of the area is deep
+enough.
 """
 
 import asyncio
@@ -25,6 +26,7 @@ from app.api import logs
 from app.arrays import FloatArray
 from app.commands.simulated_service import served
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.types import BathymetricMap
 from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
@@ -58,6 +60,16 @@ class Floor:
     def deep_enough_pct(self) -> float:
         """The part of the area that vehicles may go over."""
         return round(100.0 * float((self.depth_m >= LEAST_M).mean()), 1)
+
+    def error_m(self, made: BathymetricMap) -> float:
+        """Return the root mean square error of a map of it, in the middle of its cells, where it is deep enough."""
+        north, east = (
+            np.clip(begin_m + (np.arange(count) + 0.5) * made.grid.cell_m, 0, self.side_m - 1).astype(int)
+            for begin_m, count in zip((made.grid.south_m, made.grid.west_m), made.depth_m.shape, strict=True)
+        )
+        true_m = self.depth_m[np.ix_(north, east)]
+        told = np.isfinite(made.depth_m) & (true_m >= LEAST_M)
+        return float(np.sqrt(np.mean((made.depth_m - true_m)[told] ** 2)))
 
 
 def drawn(number: int) -> Floor:
@@ -103,20 +115,21 @@ def fly(number: int, planner: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "floor.npz"
         save_npz(Terrain(floor.depth_m, 1.0), file)
-        work = partial(_flown, mission(floor, planner, number))
-        coverage_pct, stay_s, stopped = served(SimulationSettings(terrain=file), TIME_SCALE, work)
+        work = partial(_flown, mission(floor, planner, number), floor)
+        coverage_pct, error_m, stay_s, stopped = served(SimulationSettings(terrain=file), TIME_SCALE, work)
     return {
         "side_m": floor.side_m,
         "vehicles": floor.vehicles,
         "deep_enough_pct": floor.deep_enough_pct,
         "coverage_pct": round(coverage_pct, 1),
+        "error_m": round(error_m, 2),
         "longest_stay_s": round(stay_s),
         "finished": not stopped,
     }
 
 
-async def _flown(spec: MissionSpec, service: MissionService) -> tuple[float, float, bool]:
-    """Return how much is known, for how long a vehicle stayed at one place at most, and whether it ended early."""
+async def _flown(spec: MissionSpec, floor: Floor, service: MissionService) -> tuple[float, float, float, bool]:
+    """Return how much is known, how wrong the map is, how long a vehicle stayed at one place, and if it ended early."""
     live = await service.get((await service.create(spec)).id)
     await service.act(live, Action.START, actor="benchmark")
     ways: dict[str, list[tuple[float, float]]] = {vehicle.name: [] for vehicle in spec.vehicles}
@@ -128,7 +141,9 @@ async def _flown(spec: MissionSpec, service: MissionService) -> tuple[float, flo
         await asyncio.sleep(LOOK_S / TIME_SCALE)
     await live.build_map()
     stay_s = LOOK_S * max(longest_stay(way) for way in ways.values())
-    return live.progress().coverage_pct or 0.0, stay_s, view.state != "finished"
+    built = live.builder.newest
+    error_m = math.nan if built is None else floor.error_m(built.map)
+    return live.progress().coverage_pct or 0.0, error_m, stay_s, view.state != "finished"
 
 
 def longest_stay(way: list[tuple[float, float]]) -> int:
@@ -154,6 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         flown = {number: fly(number, planner) for number in numbers}
         figures[f"{planner}: mean coverage_pct"] = round(fmean(one["coverage_pct"] for one in flown.values()), 1)
         figures[f"{planner}: least coverage_pct"] = min(one["coverage_pct"] for one in flown.values())
+        figures[f"{planner}: mean error_m"] = round(fmean(one["error_m"] for one in flown.values()), 2)
         figures[f"{planner}: longest_stay_s"] = max(one["longest_stay_s"] for one in flown.values())
         for number, one in flown.items():
             figures[f"{planner}, floor {number}"] = ", ".join(f"{name} {value}" for name, value in one.items())
