@@ -30,6 +30,7 @@ from app.storage.concurrency.group_commit import Grouped
 from app.storage.models import BatchRow
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries.soundings import LOG_KEY
+from imc_bridge.nodes.plausibility import ALLOWANCE_M
 from imc_bridge.telemetry.soundings import Beam, StateSample, footprint
 
 MAX_BATCH = 10_000
@@ -230,12 +231,26 @@ async def _doubts(live: LiveMission, batch: _Batch) -> dict[int, str]:
     def judge(i: int) -> None:
         item = batch.items[i]
         link = links[item.vehicle]
-        if link is not None and (reason := link.doubt(_vehicle_report(item))):
+        if link is not None and (reason := link.doubt(_vehicle_report(item))) and not _is_at_work(live, item):
             doubts[i] = reason
 
     can_be = (i for i in batch.known if i not in doubts)
     await each_of(sorted(can_be, key=lambda i: batch.items[i].time_s), judge)
     return doubts
+
+
+def _is_at_work(live: LiveMission, item: Measurement) -> bool:
+    """Tell whether a vehicle is near the area or where it was sent, and not much deeper than it may go.
+
+    Nothing speaks against that, wherever it was before: some tell only where they come to, without the way there.
+    """
+    east, north = map(float, live.frame.to_local(item.lat_deg, item.lon_deg))
+    if item.depth_m > live.spec.limits.max_depth_m + ALLOWANCE_M:
+        return False
+    target_m = _member(live, item.vehicle).target_m
+    if target_m is not None and math.dist((east, north), target_m) <= live.spec.arrival_radius_m + ALLOWANCE_M:
+        return True
+    return not live.gate.outside(east, north)
 
 
 async def _store(

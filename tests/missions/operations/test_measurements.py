@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 
+import numpy as np
 import pytest
 
 from app.missions import clock
@@ -120,10 +121,30 @@ async def test_a_vehicle_that_comes_up_far_away_is_believed_when_it_goes_on_sayi
     place, said = await place_after(mission, *items)
     assert place.lat_deg == there["lat_deg"]
     assert [verdict for verdict, _ in said] == 3 * [Verdict.REJECTED] + 3 * [Verdict.ACCEPTED]
-    back = rover.item(range_m=None)
+    back = rover.item(range_m=None, lat_deg=here.lat_deg - 0.01)
     for _ in range(2):
         place, said = await place_after(mission, back)
         assert place.lat_deg == there["lat_deg"], "one from where it was does not move it back"
+
+
+@pytest.mark.parametrize("east_m", [80.0, 45.0])
+async def test_who_tells_only_where_it_comes_to_is_where_it_works_or_was_sent(
+    harbour: Harbour, mission: LiveMission, east_m: float
+) -> None:
+    """As a client does that posts once at each waypoint, without the way there."""
+    rover = Rover(harbour.service, mission.id, "a")
+    far = Rover(harbour.service, mission.id, "a", east_m, 20.0)
+    await place_after(mission, rover.item())
+    member = mission.team.named("a")
+    if east_m > 60.0:
+        member.target_m = np.array([east_m, 20.0])
+    item = far.item(time_s=rover.item().time_s)
+    place, said = await place_after(mission, item)
+    assert place.lon_deg == item.lon_deg
+    deep = far.item(time_s=item.time_s + 1.0, depth_m=300.0)
+    place, _ = await place_after(mission, deep)
+    assert place.depth_m == item.depth_m
+    assert said[0][0] is Verdict.REJECTED, "its sounding may be anywhere on that way"
 
 
 async def test_ranges_to_targets_from_where_no_vehicle_can_be_are_refused(harbour: Harbour) -> None:
