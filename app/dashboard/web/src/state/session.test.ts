@@ -115,3 +115,18 @@ it("of missions whose tide table is refused none stays", async () => {
     "DELETE /missions/m2",
   ]);
 });
+
+describe("a refusal", () => {
+  it("stays when a command that was sent before it is answered, and goes with one that was sent after it", async () => {
+    const { ServiceError } = await import("../api/client");
+    const { refusal, send } = await import("./session");
+    let answered: (value: string) => void = () => undefined;
+    const slow = send("resume", new Promise<string>((resolve) => (answered = resolve)));
+    await send("go", Promise.reject(new ServiceError("outside the area", 422)));
+    answered("done");
+    await slow;
+    expect(refusal.value?.error.message).toBe("outside the area");
+    await send("hold", Promise.resolve("done"));
+    expect(refusal.value).toBeNull();
+  });
+});

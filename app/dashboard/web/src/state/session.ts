@@ -394,9 +394,11 @@ export async function bringHome(name: string): Promise<void> {
 
 /** Awaits an answer; null where the service refused, which is shown. */
 export async function send<T>(what: string, answer: Promise<T>, inDialog = false): Promise<T | null> {
+  const before = refusal.peek();
   try {
     const found = await answer;
-    refusal.value = null;
+    // What was refused meanwhile is still to be read.
+    if (refusal.peek() === before) refusal.value = null;
     void refresh();
     return found;
   } catch (error) {
