@@ -6,6 +6,10 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from app.arrays import BoolArray
 from app.exploration.motion.on_leg import Place, along_leg
 
 FASTEST_MPS = 10.0
@@ -78,9 +82,10 @@ class Flown:
         return cls(**(stored or {}))
 
 
-def is_flown(away_m: float, passed_s: float) -> bool:
-    """Tell whether a vehicle flew from one position to the next, or only its position was corrected."""
-    return passed_s > 0.0 and away_m <= FASTEST_MPS * passed_s
+def is_flown(away_m: ArrayLike, passed_s: ArrayLike) -> BoolArray:
+    """Tell, for each, whether a vehicle flew from one position to the next, or only its position was corrected."""
+    away, passed = np.asarray(away_m), np.asarray(passed_s)
+    return np.asarray((passed > 0.0) & (away <= FASTEST_MPS * passed))
 
 
 def efficiency_pct(team: Iterable[Flown]) -> float | None:

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray
-from app.missions.flown import FASTEST_MPS
+from app.missions.flown import is_flown
 from app.missions.live.journals.journal import METRES_PER_DEGREE
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
@@ -108,7 +108,7 @@ def _length_m(points: FloatArray) -> float:
     """Return how far was flown of a way, shape (n, 4): time, longitude, latitude, depth."""
     passed_s, east, north = np.diff(points[:, :3], axis=0).T
     legs_m = METRES_PER_DEGREE * np.hypot(east * np.cos(np.radians(points[:-1, 2])), north)
-    return float(legs_m[(passed_s > 0.0) & (legs_m <= FASTEST_MPS * passed_s)].sum())
+    return float(legs_m[is_flown(legs_m, passed_s)].sum())
 
 
 def worth_drawing(places: FloatArray, tolerance_m: float = TOLERANCE_M) -> NDArray[np.intp]:

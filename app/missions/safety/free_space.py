@@ -35,8 +35,8 @@ NEARER = 0.9
 CLEAR, NARROW = 0.9, 0.4
 """Parts of the room beside a zone with which a way is clear of it, and with which a straight way is still better than
 one round it: who is a little beside where its way was to begin would cross the zone otherwise."""
-BESIDE, BESIDE_PARTS = 16, (1.0, 0.5)
-"""In so many directions, and so many parts of its reach away, a vehicle may go aside."""
+DIRECTIONS, PARTS = 16, (1.0, 0.5)
+"""Places that a vehicle may go to instead lie in so many directions, and these parts of its reach away."""
 ROUND_TO = 40
 """Of the places where a vehicle may come in, about so many are looked at for a way round zones."""
 
@@ -157,6 +157,13 @@ def ways_in(constraints: Constraints, place: FloatArray, inset_m: float) -> list
     return [entry for entry in _entries(constraints, place, inset_m) if not barred(constraints, place, entry)]
 
 
+def places_around(place: FloatArray, reach_m: float) -> FloatArray:
+    """Return places (n, 2) all around another one (2,), at most ``reach_m`` away."""
+    course = np.arange(0.0, 2 * np.pi, 2 * np.pi / DIRECTIONS)
+    unit = np.column_stack([np.sin(course), np.cos(course)])
+    return np.concatenate([place + part * reach_m * unit for part in PARTS])
+
+
 def ways_beside(constraints: Constraints, place: FloatArray, reach_m: float) -> FloatArray:
     """Return where else a vehicle outside the area may go straight to, (n, 2), at most ``reach_m`` away.
 
@@ -167,10 +174,7 @@ def ways_beside(constraints: Constraints, place: FloatArray, reach_m: float) -> 
     place : (2,)
         Where the vehicle is.
     """
-    area = Polygon(constraints.area)
-    course = np.arange(0.0, 2 * np.pi, 2 * np.pi / BESIDE)
-    unit = np.column_stack([np.sin(course), np.cos(course)])
-    ends = np.concatenate([place + part * reach_m * unit for part in BESIDE_PARTS])
+    area, ends = Polygon(constraints.area), places_around(place, reach_m)
     outside_m = shapely.distance(area, shapely.points(ends))
     zones = shapely.union_all([Polygon(zone) for zone in constraints.keep_out])
     near = ends[(outside_m <= distance_outside_m(area, place) + LEAST_LEG_M) & ~shapely.contains_xy(zones, ends)]

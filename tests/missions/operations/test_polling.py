@@ -4,6 +4,7 @@ import pytest
 
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import WaypointStatus
+from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
 from app.missions.operations.polling import waypoint
 from app.missions.running.homecoming import call_home, hold
@@ -17,12 +18,18 @@ from tests.support.waiting import until
 VEHICLES = [{"name": "asks", "kind": "rest"}]
 
 
-async def test_who_is_held_is_told_when_it_asks_and_gets_a_new_leg_when_it_is_sent_on(service: MissionService) -> None:
+async def begun(service: MissionService) -> tuple[LiveMission, Rover]:
+    """A mission whose vehicle has its first leg."""
     mission = await service.create(sim_spec(steps=1000, vehicles=VEHICLES))
     live, rover = await service.get(mission.id), Rover(service, mission.id, "asks")
     await rover.post()
     await act(service, mission.id, "start")
     await until(lambda: rover.poll(), "it has its first leg")
+    return live, rover
+
+
+async def test_who_is_held_is_told_when_it_asks_and_gets_a_new_leg_when_it_is_sent_on(service: MissionService) -> None:
+    live, rover = await begun(service)
     await until(lambda: live.team.members["asks"].ordered, "its second leg waits for it")
     await hold(live, "asks", "Ana")
     held = live.team.members["asks"]
@@ -35,15 +42,11 @@ async def test_who_is_held_is_told_when_it_asks_and_gets_a_new_leg_when_it_is_se
     await service.send_on(live, "asks", "Ana")
     await until(lambda: rover.poll(), "it gets a leg")
     assert rover.steps[-1] > given_up, "and none that was given up"
-    await act(service, mission.id, "abort")
+    await act(service, live.id, "abort")
 
 
 async def test_nobody_acknowledges_a_waypoint_that_it_was_never_given(service: MissionService) -> None:
-    mission = await service.create(sim_spec(steps=1000, vehicles=VEHICLES))
-    live, rover = await service.get(mission.id), Rover(service, mission.id, "asks")
-    await rover.post()
-    await act(service, mission.id, "start")
-    await until(lambda: rover.poll(), "it has its first leg")
+    live, _ = await begun(service)
     member = live.team.members["asks"]
     await until(lambda: member.ordered and member.status is WaypointStatus.SENT, "its second leg waits for it")
     with pytest.raises(InvalidRequestError, match="no waypoint of step 1000: the newest is 2") as caught:
@@ -52,7 +55,7 @@ async def test_nobody_acknowledges_a_waypoint_that_it_was_never_given(service: M
     assert member.status is WaypointStatus.SENT
     assert await waypoint(live, "asks", after_step=2) is None
     assert member.status in (WaypointStatus.ACKNOWLEDGED, WaypointStatus.REACHED), "the newest may be what it has"
-    await act(service, mission.id, "abort")
+    await act(service, live.id, "abort")
     with pytest.raises(ConflictError, match="stop and hold"):
         await waypoint(live, "asks", after_step=1000)
 

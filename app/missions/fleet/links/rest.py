@@ -33,7 +33,7 @@ KEPT_S = 86_400.0
 """For how long vehicles may keep positions before they post them, at the most: older ones tell of another clock."""
 
 AHEAD_S = 5.0
-"""A time that is farther ahead than this of our clock, and of what has passed by its own, is not a vehicle's."""
+"""A report whose time is farther ahead than this, both of our clock and of its vehicle's own, has a wrong time."""
 
 
 @dataclass
@@ -45,14 +45,13 @@ class _Poller(Visitor):
     """When that came, the event loop's time."""
     ahead_since_s: float | None = None
     """Since when its times have been too far ahead, the event loop's time; None: they are not."""
+    stopping: bool = False
+    told: asyncio.Event = field(default_factory=asyncio.Event)
 
     def latest_s(self, now_s: float, time_scale: float) -> float:
         """Return the latest time that its clock can tell, at the event loop's time ``now_s``."""
         own_s = self.newest_s + time_scale * (now_s - self.newest_heard_s)
         return max(own_s, now().timestamp()) + AHEAD_S
-
-    stopping: bool = False
-    told: asyncio.Event = field(default_factory=asyncio.Event)
 
 
 class RestFleetLink(VisitedLink):

@@ -17,10 +17,6 @@ from app.missions.spec.limits import Limits
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import OUT_OF_REACH, Member
 
-DIRECTIONS = 16
-PARTS = (1.0, 0.5)
-"""Of the longest leg."""
-
 LIMITS_OF_PLACES = (Limit.AREA, Limit.KEEP_OUT)
 """What the end of a leg can break by where it is."""
 
@@ -113,10 +109,9 @@ def ways_aside(
     or_nearer
         Have a vehicle that cannot get there in one leg come nearer to where it may be.
     """
-    course = np.arange(0.0, 2 * np.pi, 2 * np.pi / DIRECTIONS)
-    unit = np.column_stack([np.sin(course), np.cos(course), np.zeros(DIRECTIONS)])
     reach_m = constraints.max_step_m * (1 - 1e-9)
-    ends = np.concatenate([start + part * reach_m * unit for part in PARTS])
+    around = free_space.places_around(start[:2], reach_m)
+    ends = np.column_stack([around, np.full(len(around), start[2])])
     beyond_m = constraints.excess(start[None], ends[:, None], bottom)[:, 0, LIMITS_OF_PLACES]
     begins_m = constraints.excess(start[None], start[None, None], bottom)[0, 0, LIMITS_OF_PLACES]
     allowed = ((beyond_m <= TOLERANCE_M) | (or_nearer & (begins_m > reach_m))).all(axis=1)
