@@ -5,6 +5,9 @@ therefore starts a mixture of filters spread evenly over the water that it may b
 and weighs each by how well it predicted that range. Once the mixture is narrow enough to linearise about, it becomes
 a single filter. Only while its standard deviations are small does a target belong to the set ``A`` (MED13): unlike a
 landmark it leaves that set again.
+
+A vehicle that comes close to a target ranges it from a place beside which the filter is wide, above all along depth.
+Then what the filter says is cut into parts along the sphere of that range first (:mod:`app.estimation.range_sphere`).
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +17,7 @@ from numba import njit
 
 from app.arrays import FloatArray
 from app.estimation.range_filter import update_by_range
+from app.estimation.range_sphere import on_sphere, sphere_parts
 from app.estimation.sensors import RangeSensor
 
 EVERYWHERE = np.inf
@@ -23,6 +27,10 @@ PER_AXIS = (8, 8, 6)
 
 NARROW = 0.15
 """A mixture becomes one filter when its standard deviation, all axes together, is below this part of the range."""
+
+WIDE = 0.7
+"""Filters whose standard deviations, all axes together, are above this part of a range are cut into parts on its
+sphere."""
 
 FORGOTTEN = 1e-6
 """Weight below which a filter of a mixture is given up."""
@@ -99,6 +107,11 @@ class TargetTrack:
     def sd_m(self) -> FloatArray:
         """Standard deviations of east, north and depth, (3,)."""
         return np.sqrt(np.diagonal(self.covariance)[:3])
+
+    @property
+    def parts_m(self) -> float:
+        """Standard deviation of one filter of the mixture, all axes together, on average."""
+        return float(np.sqrt(self.weights @ np.trace(self.covariances[:, :3, :3], axis1=1, axis2=2)))
 
 
 @dataclass(frozen=True)
@@ -185,11 +198,16 @@ class TargetEstimator:
         heard = np.flatnonzero(np.isfinite(ranges))
         if len(heard) == 0:
             return track
-        if not track.known:
-            track = self._anywhere()
-        elif track.unease > WRONG:
-            track = _or(self._anywhere(), track)
         blur = np.zeros((len(positions), 3)) if blur_m2 is None else blur_m2
+        nearest = heard[np.argmin(ranges[heard])]
+        place, range_m = np.asarray(positions[nearest], dtype=np.float64), float(ranges[nearest])
+        sd_m = float(np.sqrt((self.sensor.relative_noise * range_m) ** 2 + blur[nearest].max()))
+        if not track.known:
+            track = self._begun(place, range_m, sd_m)
+        elif track.unease > WRONG:
+            track = _or(self._begun(place, range_m, sd_m), track)
+        if track.parts_m > WIDE * range_m > 0.0:
+            track = self._cut(track, place, range_m, sd_m)
         means, covariances = track.means.copy(), track.covariances.copy()
         weights = track.weights**DOUBT / (track.weights**DOUBT).sum()
         surprise = _take(
@@ -205,6 +223,35 @@ class TargetEstimator:
         if np.sqrt((mixture.sd_m**2).sum()) < NARROW * float(np.abs(ranges[heard]).min()):
             return TargetTrack(mixture.state[None], mixture.covariance[None], np.ones(1))
         return mixture
+
+    def _begun(self, place_m: FloatArray, range_m: float, sd_m: float) -> TargetTrack:
+        """Return filters spread over where a target may be whose first range is heard at a place (3,).
+
+        Those of the whole box, or of the sphere alone where they are wide beside it.
+        """
+        anywhere = self._anywhere()
+        if not anywhere.parts_m > WIDE * range_m > 0.0:
+            return anywhere
+        parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2])
+        low, high = np.array(self.low_m[:2]), np.array(self.high_m[:2])
+        inside = ((parts.place_m[:, :2] >= low) & (parts.place_m[:, :2] <= high)).all(axis=1)
+        inside |= not inside.any()
+        count = int(inside.sum())
+        covariances = np.zeros((count, 6, 6))
+        covariances[:, :3, :3] = parts.covariance_m2[inside]
+        covariances[:, 3:, 3:] = np.diag((self.speed_sd * self._axes) ** 2)
+        share = parts.share[inside]
+        return TargetTrack(np.hstack([parts.place_m[inside], np.zeros((count, 3))]), covariances, share / share.sum())
+
+    def _cut(self, track: TargetTrack, place_m: FloatArray, range_m: float, sd_m: float) -> TargetTrack:
+        """Return a track in parts that are narrow beside a range heard at a place (3,)."""
+        parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2])
+        means, covariances, score = on_sphere(track.means, track.covariances, track.weights, parts)
+        weights = np.exp(score - score.max())
+        likely = weights > FORGOTTEN * weights.sum()
+        return replace(
+            track, means=means[likely], covariances=covariances[likely], weights=weights[likely] / weights[likely].sum()
+        )
 
     def _anywhere(self) -> TargetTrack:
         """Return filters spread evenly over the box."""

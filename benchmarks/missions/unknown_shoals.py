@@ -5,7 +5,8 @@ radius that rise to 0.3 to 0.8 m below the surface with slopes of 0.1 to 1; ever
 southern border instead, where the vehicles begin. One to three simulated vehicles, which need 1 m of water, fly it by
 lines and by what the service has by default, in simulated time; their minutes are enough for lines 8 m apart. Told are
 the part of the area that is known to the wanted accuracy at the end, as the map has it, the true error of the map where
-it is deep enough, the longest time that a vehicle stayed within 12 m of one place, and how much of the area is deep
+it is deep enough, the longest time that a vehicle stayed within 12 m of one place, for how long vehicles were over
+ground where not even four fifths of what they need is left, all of them together, and how much of the area is deep
 enough.
 """
 
@@ -42,10 +43,14 @@ LEAST_M = 1.0
 """Height above the bottom that vehicles need."""
 SPEED_MPS, APART_M = 1.3, 8.0
 STAY_M = 12.0
+TOO_SHOAL_M = 0.8 * LEAST_M
 LOOK_S = 1.0
 TIME_SCALE = 10.0
 SHORE = 3
 """One floor in so many has a shore."""
+
+Way = list[tuple[float, float]]
+"""Where a vehicle was at every look, east and north, metres."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,12 @@ class Floor:
     def deep_enough_pct(self) -> float:
         """The part of the area that vehicles may go over."""
         return round(100.0 * float((self.depth_m >= LEAST_M).mean()), 1)
+
+    def over_shoals(self, way_m: Way) -> int:
+        """Return how many places of a way, east and north, are over ground that is too shoal."""
+        cells = np.floor(way_m).astype(int)
+        east, north = cells[((cells >= 0) & (cells < self.side_m)).all(axis=1)].T
+        return int((self.depth_m[north, east] < TOO_SHOAL_M).sum())
 
     def error_m(self, made: BathymetricMap) -> float:
         """Return the root mean square error of a map of it, in the middle of its cells, where it is deep enough."""
@@ -116,23 +127,24 @@ def fly(number: int, planner: str) -> dict[str, Any]:
         file = Path(folder) / "floor.npz"
         save_npz(Terrain(floor.depth_m, 1.0), file)
         work = partial(_flown, mission(floor, planner, number), floor)
-        coverage_pct, error_m, stay_s, stopped = served(SimulationSettings(terrain=file), TIME_SCALE, work)
+        coverage_pct, error_m, ways, stopped = served(SimulationSettings(terrain=file), TIME_SCALE, work)
     return {
         "side_m": floor.side_m,
         "vehicles": floor.vehicles,
         "deep_enough_pct": floor.deep_enough_pct,
         "coverage_pct": round(coverage_pct, 1),
         "error_m": round(error_m, 2),
-        "longest_stay_s": round(stay_s),
+        "longest_stay_s": round(LOOK_S * max(longest_stay(way) for way in ways)),
+        "over_shoals_s": round(LOOK_S * sum(floor.over_shoals(way) for way in ways)),
         "finished": not stopped,
     }
 
 
-async def _flown(spec: MissionSpec, floor: Floor, service: MissionService) -> tuple[float, float, float, bool]:
-    """Return how much is known, how wrong the map is, how long a vehicle stayed at one place, and if it ended early."""
+async def _flown(spec: MissionSpec, floor: Floor, service: MissionService) -> tuple[float, float, list[Way], bool]:
+    """Return how much is known, how wrong the map is, the vehicles' ways, and whether the mission ended early."""
     live = await service.get((await service.create(spec)).id)
     await service.act(live, Action.START, actor="benchmark")
-    ways: dict[str, list[tuple[float, float]]] = {vehicle.name: [] for vehicle in spec.vehicles}
+    ways: dict[str, Way] = {vehicle.name: [] for vehicle in spec.vehicles}
     while (view := mission_view(live)).state not in ENDED:
         for member in live.team.present:
             if member.report is not None:
@@ -140,13 +152,12 @@ async def _flown(spec: MissionSpec, floor: Floor, service: MissionService) -> tu
                 ways[member.name].append((float(east_m), float(north_m)))
         await asyncio.sleep(LOOK_S / TIME_SCALE)
     await live.build_map()
-    stay_s = LOOK_S * max(longest_stay(way) for way in ways.values())
     built = live.builder.newest
     error_m = math.nan if built is None else floor.error_m(built.map)
-    return live.progress().coverage_pct or 0.0, error_m, stay_s, view.state != "finished"
+    return live.progress().coverage_pct or 0.0, error_m, list(ways.values()), view.state != "finished"
 
 
-def longest_stay(way: list[tuple[float, float]]) -> int:
+def longest_stay(way: Way) -> int:
     """Return how many looks in a row a vehicle was within :data:`STAY_M` of where it was at the first of them."""
     longest = begin = 0
     for at, place in enumerate(way):
@@ -170,6 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         figures[f"{planner}: mean coverage_pct"] = round(fmean(one["coverage_pct"] for one in flown.values()), 1)
         figures[f"{planner}: least coverage_pct"] = min(one["coverage_pct"] for one in flown.values())
         figures[f"{planner}: mean error_m"] = round(fmean(one["error_m"] for one in flown.values()), 2)
+        figures[f"{planner}: over_shoals_s"] = sum(one["over_shoals_s"] for one in flown.values())
         figures[f"{planner}: longest_stay_s"] = max(one["longest_stay_s"] for one in flown.values())
         for number, one in flown.items():
             figures[f"{planner}, floor {number}"] = ", ".join(f"{name} {value}" for name, value in one.items())

@@ -144,3 +144,73 @@ def test_a_covariance_stays_symmetric_and_positive(place: Any, y: Any, noise: An
         assert np.isfinite(mean).all()
         np.testing.assert_array_equal(P, P.T)
         assert np.linalg.eigvalsh(P).min() > -1e-12 * np.abs(P).max()
+
+
+def reference(
+    low: Any, high: Any, places: np.ndarray, ranges: list[float], sd: Any, count: int = 2_000_000
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviations (3,) of a still target: evenly drawn places, weighed by every range."""
+    cloud = np.random.default_rng(0).uniform(low, high, (count, 3))
+    score = np.zeros(count)
+    for place, measured in zip(places, ranges, strict=True):
+        away = np.linalg.norm(cloud - place, axis=1)
+        score -= 0.5 * ((measured - away) / sd(away)) ** 2 + np.log(sd(away))
+    share = np.exp(score - score.max())
+    share /= share.sum()
+    mean = share @ cloud
+    return mean, np.sqrt(share @ (cloud - mean) ** 2)
+
+
+def close_by(low: Any = (-500, -500, 0), high: Any = (1500, 1500, 30)) -> TargetEstimator:
+    """A filter in a sea of 2 km, for ranges of 1 %."""
+    return TargetEstimator(RangeSensor(np.inf, 0.01), 0.0, 5.0, low, high, 0.01, 0.3)
+
+
+@pytest.mark.parametrize("depth", [3.0, 8.0, 20.0])
+def test_ranges_from_close_by_tell_as_much_as_they_can(depth: float) -> None:
+    """Beside them the water is wide: the filter says what evenly drawn places say that are weighed by them."""
+    estimator, track = close_by(), TargetTrack.unknown()
+    rng, target = np.random.default_rng(3), np.array([510.0, 503.0, depth])
+    places = np.array([[500.0 + 2.0 * k, 500.0 + (k % 3), 2.0] for k in range(4)])
+    near = (np.array([470.0, 470.0, 0.0]), np.array([550.0, 540.0, 30.0]))
+    heard: list[float] = []
+    for k, place in enumerate(places):
+        away = float(np.linalg.norm(target - place))
+        heard.append(away * (1.0 + 0.01 * rng.standard_normal()) + 0.5 * rng.standard_normal())
+        track = estimator.update(track, place[None], np.array(heard[-1:]), np.full((1, 3), 0.25))
+        mean, sd = reference(*near, places[: k + 1], heard, lambda r: np.hypot(0.01 * r, 0.5))
+        assert np.linalg.norm(track.state[:3] - mean) < 0.5 * np.linalg.norm(sd)
+        assert 0.8 < np.linalg.norm(track.sd_m) / np.linalg.norm(sd) < 1.4
+
+
+def test_who_is_passed_close_by_is_known_better_and_not_forgotten() -> None:
+    """East and north are known, depth is not: a range of about that size tells of it."""
+    mean, P = np.array([500.0, 500.0, 15.0, 0, 0, 0]), np.diag([1.0, 1.0, 64.0, 1e-6, 1e-6, 1e-6])
+    track, place, measured = TargetTrack(mean[None], P[None], np.ones(1)), np.array([504.0, 500.0, 4.0]), 5.0
+    after = close_by().update(track, place[None], np.array([measured]), np.full((1, 3), 0.25))
+    cloud = np.random.default_rng(1).multivariate_normal(mean[:3], P[:3, :3], 2_000_000)
+    cloud = cloud[(cloud[:, 2] > 0.0) & (cloud[:, 2] < 30.0)]
+    away = np.linalg.norm(cloud - place, axis=1)
+    sd = np.hypot(0.01 * away, 0.5)
+    share = np.exp(-0.5 * ((measured - away) / sd) ** 2) / sd
+    share /= share.sum()
+    expected = share @ cloud
+    np.testing.assert_allclose(after.state[:3], expected, atol=0.5)
+    np.testing.assert_allclose(after.sd_m, np.sqrt(share @ (cloud - expected) ** 2), rtol=0.2)
+
+
+@given(
+    st.tuples(st.floats(-400, 400), st.floats(-400, 400), st.floats(-2, 60)), st.floats(1e-3, 900.0), st.integers(0, 9)
+)
+@settings(max_examples=40, deadline=None)
+def test_no_range_makes_a_filter_that_is_none(place: Any, measured: float, seed: int) -> None:
+    """Wherever it is heard from, however far: the next one, too."""
+    estimator, track, rng = close_by(), TargetTrack.unknown(), np.random.default_rng(seed)
+    for _ in range(4):
+        track = estimator.update(track, np.array([place]), np.array([measured]), np.full((1, 3), 0.25))
+        assert np.isfinite(track.state).all()
+        assert track.weights.sum() == pytest.approx(1.0)
+        for P in track.covariances:
+            assert np.linalg.eigvalsh(P).min() > -1e-9 * np.abs(P).max()
+        place, measured = tuple(np.array(place) + rng.normal(0, 30, 3)), float(rng.uniform(1e-3, 900.0))
+        track = estimator.predict(track, 5.0)

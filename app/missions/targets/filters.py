@@ -34,9 +34,6 @@ FAR_OFF = 6.0
 ECHOES = 6
 """So many of them more than of others are the target after all, and its filter is wrong: it is begun anew."""
 
-WIDE = 0.7
-"""Standard deviation, in ranges, beyond which a filter cannot be linearised about its mean: it is begun anew."""
-
 MINUTE_S = 60.0
 VERTICAL = 0.3
 """How much less targets move up and down than over ground."""
@@ -156,8 +153,6 @@ class TargetFilters:
                     return replace(known, echoes=echoes, rejected=rejected, last_refusal=reason), reason
                 track = TargetTrack.unknown()
         estimator = self._estimators[name]
-        if track.single and float(np.sqrt((track.sd_m**2).sum())) > WIDE * report.range_m:
-            track = TargetTrack.unknown()
         track = estimator.update(track, place[None], np.array([report.range_m]), blur[None])
         track = in_the_water(track, estimator.low_m[2], estimator.high_m[2])
         at_s = max(arrived.at_s, known.at_s)
@@ -212,6 +207,15 @@ class TargetFilters:
     def at(self, name: str, at_s: float) -> TargetTrack:
         """Return what is known of a target, foretold for a time; as the last range left it where that is later."""
         return self._ahead(name, self.known[name], at_s)
+
+    @property
+    def accuracy_m(self) -> float:
+        """Standard deviation below which a target is known as well as asked."""
+        return self._spec.accuracy_m
+
+    def untold_sd_mps(self, name: str) -> float:
+        """Return how uncertain each horizontal component of a target's velocity is before it is ranged."""
+        return self._estimators[name].speed_sd
 
     def accurate(self, track: TargetTrack) -> bool:
         """Tell whether a target is known as well as asked."""

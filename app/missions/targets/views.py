@@ -15,6 +15,9 @@ from app.missions.views.targets import EllipseView, TargetState, TargetView
 PROBABILITY = 0.95
 _SCALE = math.sqrt(-2.0 * math.log(1.0 - PROBABILITY))
 
+LEARNT = 0.5
+"""A velocity is told once its standard deviation, along every direction, is this part of what it was before a range."""
+
 
 def target_views(
     tracking: TargetFilters, frame: LocalFrame, area: FloatArray, now_s: float, pursuers: dict[str, str]
@@ -42,7 +45,7 @@ def _view(
     accurate = tracking.accurate(track)
     view = TargetView(
         name=name,
-        state=_state(track, accurate=accurate),
+        state=_state(track, tracking.accuracy_m, accurate=accurate),
         accurate=accurate,
         age_s=round(max(0.0, now_s - known.at_s), 1) if math.isfinite(known.at_s) else None,
         ranges=known.used,
@@ -52,7 +55,8 @@ def _view(
     )
     if not track.known:
         return view
-    east, north, depth, east_rate, north_rate, _ = (float(value) for value in track.state)
+    east, north, depth = (float(value) for value in track.state[:3])
+    speed_mps, course_deg = _velocity(track, tracking.untold_sd_mps(name))
     try:
         lat, lon = frame.to_geographic(np.array(east), np.array(north))
     except ValueError:
@@ -67,8 +71,8 @@ def _view(
             "east_m": round(east, 3),
             "north_m": round(north, 3),
             "depth_m": round(max(depth, 0.0), 3),
-            "speed_mps": round(math.hypot(east_rate, north_rate), 3),
-            "course_deg": round(math.degrees(math.atan2(east_rate, north_rate)) % 360.0, 1),
+            "speed_mps": speed_mps,
+            "course_deg": course_deg,
             "sd_east_m": sd[0],
             "sd_north_m": sd[1],
             "sd_depth_m": sd[2],
@@ -77,12 +81,28 @@ def _view(
     )
 
 
-def _state(track: TargetTrack, *, accurate: bool) -> TargetState:
+def _state(track: TargetTrack, accuracy_m: float, *, accurate: bool) -> TargetState:
     if not track.known:
         return TargetState.UNHEARD
     if accurate:
         return TargetState.ACCURATE
-    return TargetState.UNCERTAIN if track.single else TargetState.SEARCHING
+    # Who passes a target close by leaves several depths possible, at one place.
+    one_place = track.single or (track.sd_m[:2] < accuracy_m).all()
+    return TargetState.UNCERTAIN if one_place else TargetState.SEARCHING
+
+
+def _velocity(track: TargetTrack, untold_sd_mps: float) -> tuple[float | None, float | None]:
+    """Return the speed and the course of a target, degrees; None for what its ranges do not tell.
+
+    ``untold_sd_mps``: how uncertain each component of its velocity was before any range.
+    """
+    velocity, covariance = track.state[3:5], track.covariance[3:5, 3:5]
+    if np.sqrt(np.linalg.eigvalsh(covariance)[-1]) > LEARNT * untold_sd_mps:
+        return None, None
+    speed_mps = float(np.hypot(*velocity))
+    moves = velocity @ np.linalg.solve(covariance, velocity) > _SCALE**2
+    course_deg = round(math.degrees(math.atan2(velocity[0], velocity[1])) % 360.0, 1) if moves else None
+    return round(speed_mps, 3), course_deg
 
 
 def ellipse(covariance: FloatArray) -> EllipseView:

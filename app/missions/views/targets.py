@@ -14,7 +14,7 @@ class TargetState(StrEnum):
     UNHEARD = "unheard"
     """No vehicle has ranged to it yet."""
     SEARCHING = "searching"
-    """Heard; several places are possible."""
+    """Heard; several places are possible, farther apart than ``tracking.accuracy_m``."""
     UNCERTAIN = "uncertain"
     """One place, not known as well as asked."""
     ACCURATE = "accurate"
@@ -41,8 +41,12 @@ class TargetView(View):
     east_m: float | None = None
     north_m: float | None = None
     depth_m: float | None = None
-    speed_mps: float | None = Field(default=None, description="Over ground, horizontally")
-    course_deg: float | None = Field(default=None, description="Clockwise from north")
+    speed_mps: float | None = Field(
+        default=None, description="Over ground, horizontally; null: its ranges do not tell yet"
+    )
+    course_deg: float | None = Field(
+        default=None, description="Clockwise from north; null: not known, or it may stand still"
+    )
     sd_east_m: float | None = None
     sd_north_m: float | None = None
     sd_depth_m: float | None = None

@@ -1,10 +1,9 @@
-"""Adjustments of tracks as they are stored and applied, and fixes that show as jumps at the surface."""
+"""Adjustments of tracks as they are stored and applied."""
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.missions.operations.corrections.adjustment import jumps
 from app.missions.soundings.adjustment import TrackAdjustment
 
 NODES = np.array([[100.0, 0.0, 0.0], [120.0, 2.0, -1.0], [120.0, 0.0, 0.0], [140.0, 1.0, 1.0]])
@@ -24,17 +23,3 @@ def test_offsets_are_linear_within_a_dive_and_nothing_beyond() -> None:
     found = adjustment.offsets("rover", np.array([99.0, 110.0, 130.0, 141.0]))
     np.testing.assert_allclose(found, [[0.0, 0.0], [1.0, -0.5], [0.5, 0.5], [0.0, 0.0]])
     assert not adjustment.offsets("scout", np.array([110.0])).any()
-
-
-def test_a_jump_at_the_surface_is_a_fix_and_a_way_is_none() -> None:
-    time_s = np.arange(0.0, 60.0, 5.0)
-    east = 1.5 * time_s
-    depth = np.where(time_s >= 30.0, 0.1, 5.0)
-    track = np.column_stack([time_s, east, 0.0 * east, depth])
-    assert jumps(track) == []
-    track[time_s >= 40.0, 2] -= 40.0
-    ((at_s, off_east, off_north),) = jumps(track)
-    assert at_s == 35.0
-    np.testing.assert_allclose((off_east, off_north), (0.0, 40.0), atol=1e-9)
-    track[:, 3] = 5.0
-    assert jumps(track) == []  # under water it is no fix

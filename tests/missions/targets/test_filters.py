@@ -190,3 +190,46 @@ def test_the_ellipse_holds_95_percent(a: float, b: float, turn: float) -> None:
 def test_targets_that_cannot_be_are_refused_with_what_would_be_right(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         spec_with(**changes)
+
+
+def test_who_is_passed_close_by_stays_where_it_is_known() -> None:
+    """From afar its depth is not told; the range of a vehicle that is near is of that size."""
+    tracks = tracking(limits={"max_depth_m": 30.0})
+    from_afar = [
+        heard(np.array([TAG[0] + 80 * math.cos(0.3 * k), TAG[1] + 80 * math.sin(0.3 * k), 6.0]), 100.0 + k)
+        for k in range(60)
+    ]
+    told(tracks, from_afar)
+    before = view_of(tracks)
+    assert before.sd_depth_m is not None
+    assert before.sd_depth_m > 5.0
+    assert told(
+        tracks, [heard(TAG + np.array([7.0, 0.0, -2.0]), 160.5), heard(TAG + np.array([2.0, 1.0, -2.0]), 162.0)]
+    ) == ["", ""]
+    after = view_of(tracks, now_s=162.0)
+    assert after.state in {TargetState.UNCERTAIN, TargetState.ACCURATE}
+    assert math.hypot(after.east_m - TAG[0], after.north_m - TAG[1]) < 2.0
+    assert max(after.sd_east_m or math.inf, after.sd_north_m or math.inf) < 2.0
+    assert (after.sd_depth_m or math.inf) < 0.6 * before.sd_depth_m
+
+
+def test_speed_and_course_are_told_once_ranges_tell_them() -> None:
+    tracks = tracking()
+    told(tracks, around(3))
+    early = view_of(tracks, now_s=103.0)
+    assert (early.speed_mps, early.course_deg) == (None, None)
+    assert early.east_m is not None
+    told(tracks, around(120, 103.0))
+    still = view_of(tracks, now_s=223.0)
+    assert still.speed_mps is not None
+    assert still.speed_mps < 0.1
+    assert still.course_deg is None
+
+
+def test_the_course_of_a_target_that_moves_is_told() -> None:
+    tracks = tracking()
+    places = [np.array([30 + 22 * math.cos(k), 30 + 22 * math.sin(k), 2.0 + 5.0 * (k % 2)]) for k in range(150)]
+    told(tracks, [heard(place, 100.0 + k, TAG + np.array([0.25 * k, 0.0, 0.0])) for k, place in enumerate(places)])
+    moving = view_of(tracks, now_s=249.0)
+    assert moving.speed_mps == pytest.approx(0.25, abs=0.06)
+    assert moving.course_deg == pytest.approx(90.0, abs=15.0)

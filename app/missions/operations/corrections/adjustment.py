@@ -12,9 +12,10 @@ from app.arrays import FloatArray
 from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.clock import now
-from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.errors import ConflictError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.swath_grid import Place, beams_of
+from app.missions.operations.corrections.fixes import in_order, jumps, sent_fixes
 from app.missions.operations.corrections.recorrection import recorrect
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import Corrections
@@ -48,12 +49,6 @@ MOST_BEAMS = 64
 REACH_M = 8.0
 FEWEST = 50
 """Soundings that there have to be."""
-
-SURFACE_M = 0.5
-JUMP_M, FASTEST_MPS = 1.5, 3.0
-"""A position at the surface that is farther from the last one than a vehicle can have moved is a fix."""
-JUMP_WITHIN_S = 30.0
-FIX_SD_M = 1.0
 
 
 def adjustment_view(live: LiveMission) -> AdjustmentView:
@@ -97,8 +92,8 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
             raise ConflictError(
                 f"there are {len(soundings)} places with accepted soundings", f"tracks are adjusted from {FEWEST} on"
             )
-        tracks = await _positions(live, places)
-        fixes = await asyncio.to_thread(_fixes, request.fixes, tracks, names, live.frame)
+        told = await _positions(live)
+        fixes = await asyncio.to_thread(_fixes, request.fixes, told, places, names, live.frame)
         model = DriftModel(walk_m=request.walk_m, rate_mph=request.rate_mph)
         found = await (asyncio.to_thread if live.compute is None else live.compute.run)(
             adjusted, soundings, fixes, model, cell_m=max(FINEST_M, live.spec.cell_m), reach_m=REACH_M
@@ -199,11 +194,8 @@ def _thinned(number: int, table: FloatArray, off: FloatArray, cell_m: float) -> 
     return thinned(raw, cell_m, PERIOD_S)
 
 
-async def _positions(live: LiveMission, places: Places) -> dict[str, FloatArray]:
-    """Return by vehicle its positions (n, 4) in the order of its clock: time, east, north, depth.
-
-    Those stored of its track; of vehicles without one the places of its pings, or below which it sounded.
-    """
+async def _positions(live: LiveMission) -> Places:
+    """Return by vehicle the positions (n, 4) that are stored of its track."""
     found: Places = {}
 
     def take(rows: Sequence[Any]) -> None:
@@ -215,35 +207,19 @@ async def _positions(live: LiveMission, places: Places) -> dict[str, FloatArray]
             found.setdefault(name, []).append(np.column_stack([own[:, 0], east, north, own[:, 3]]))
 
     await read_in_pieces(live.database, mission_queries.positions_after(live.id, 0), take)
-    tables = {name: np.concatenate(parts) for name, parts in (places | found).items()}
-    return {name: table[np.argsort(table[:, 0], kind="stable")] for name, table in tables.items()}
+    return found
 
 
-def _fixes(asked: Sequence[FixRequest], tracks: dict[str, FloatArray], names: list[str], frame: LocalFrame) -> Fixes:
-    """Return the fixes that were sent, and the jumps of positions at the surface where none was."""
-    rows: list[tuple[int, float, float, float, float, bool]] = []
-    for k, fix in enumerate(asked):
-        track = tracks.get(fix.vehicle)
-        if fix.vehicle not in names or track is None:
-            raise InvalidRequestError(
-                f"fixes.{k}.vehicle",
-                f"{fix.vehicle!r} sounded nothing",
-                f"it must be one of {', '.join(sorted(names))}",
-            )
-        before = int(np.searchsorted(track[:, 0], fix.time_s, side="right")) - 1
-        if before < 0 or fix.time_s - track[before, 0] > JUMP_WITHIN_S:
-            raise InvalidRequestError(
-                f"fixes.{k}.time_s",
-                f"{fix.time_s:.1f} is not within {JUMP_WITHIN_S:g} s after a position of {fix.vehicle}",
-                "send a time of its own clock at which its reckoned position is known",
-            )
-        reckoned = track[before, 1:3]
-        east, north = frame.to_local(fix.lat_deg, fix.lon_deg)
-        off = float(reckoned[0] - east), float(reckoned[1] - north)
-        rows.append((names.index(fix.vehicle), fix.time_s, *off, fix.sd_m, fix.resets))
-    for name in names:
-        if name in tracks and not any(fix.vehicle == name for fix in asked):
-            rows += [(names.index(name), *jump, FIX_SD_M, True) for jump in jumps(tracks[name])]
+def _fixes(asked: Sequence[FixRequest], told: Places, sounded: Places, names: list[str], frame: LocalFrame) -> Fixes:
+    """Return the fixes that were sent, and the jumps of a vehicle's positions where none was.
+
+    ``told`` are the positions that are stored of tracks, ``sounded`` the places where vehicles sounded.
+    """
+    tracks = {name: in_order(parts) for name, parts in told.items()}
+    places = {name: in_order(sounded[name]) for name in names}
+    rows = [(names.index(fix.vehicle), *row) for fix, row in sent_fixes(asked, tracks, places, frame)]
+    for name in set(names) - {fix.vehicle for fix in asked}:
+        rows += [(names.index(name), *row) for row in jumps(tracks.get(name, places[name]))]
     if not rows:
         return Fixes.none()
     rows.sort(key=lambda row: row[:2])
@@ -256,26 +232,6 @@ def _fixes(asked: Sequence[FixRequest], tracks: dict[str, FloatArray], names: li
         sd_m=columns[:, 3],
         resets=np.array([row[5] for row in rows], dtype=bool),
     )
-
-
-def jumps(track: FloatArray) -> list[tuple[float, float, float]]:
-    """Return when a vehicle's position jumped at the surface, and from where to where it did not move, east and north.
-
-    Positions (n, 4): time, east, north, depth. At a jump it is told where it is; what it had reckoned until
-    then, less that, is its error.
-    """
-    if len(track) < 2:
-        return []
-    east, north = track[:, 1], track[:, 2]
-    step_s = np.diff(track[:, 0])
-    away = np.hypot(np.diff(east), np.diff(north))
-    found = (away > JUMP_M + FASTEST_MPS * step_s) & (step_s <= JUMP_WITHIN_S) & (track[1:, 3] < SURFACE_M)
-    # It went on meanwhile as it went before.
-    speed = np.column_stack([np.diff(east), np.diff(north)]) / np.maximum(step_s, 1e-3)[:, None]
-    steady = np.vstack([np.zeros(2), np.where((away <= JUMP_M + FASTEST_MPS * step_s)[:, None], speed, 0.0)[:-1]])
-    reckoned = track[:-1, 1:3] + steady * step_s[:, None]
-    off = reckoned - track[1:, 1:3]
-    return [(float(track[k, 0]), float(off[k, 0]), float(off[k, 1])) for k in np.flatnonzero(found).tolist()]
 
 
 def _nodes(found: AdjustedTracks, number: int) -> FloatArray:

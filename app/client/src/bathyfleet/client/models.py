@@ -2149,9 +2149,9 @@ class TargetView(Model):
     north_m: float | None
     depth_m: float | None
     speed_mps: float | None
-    """Over ground, horizontally"""
+    """Over ground, horizontally; null: its ranges do not tell yet"""
     course_deg: float | None
-    """Clockwise from north"""
+    """Clockwise from north; null: not known, or it may stand still"""
     sd_east_m: float | None
     sd_north_m: float | None
     sd_depth_m: float | None

@@ -6621,12 +6621,12 @@ export interface components {
             depth_m: number | null;
             /**
              * Speed Mps
-             * @description Over ground, horizontally
+             * @description Over ground, horizontally; null: its ranges do not tell yet
              */
             speed_mps: number | null;
             /**
              * Course Deg
-             * @description Clockwise from north
+             * @description Clockwise from north; null: not known, or it may stand still
              */
             course_deg: number | null;
             /** Sd East M */

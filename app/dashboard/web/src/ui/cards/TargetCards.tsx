@@ -84,10 +84,12 @@ function TargetCard({ target }: { target: TargetView }) {
               : say("targets.outsideTheArea"),
           target.speed_mps === null
             ? null
-            : say("targets.speedTo", {
-                speed: speed(target.speed_mps),
-                courseDeg: direction(target.course_deg ?? 0),
-              }),
+            : target.course_deg === null
+              ? speed(target.speed_mps)
+              : say("targets.speedTo", {
+                  speed: speed(target.speed_mps),
+                  courseDeg: direction(target.course_deg),
+                }),
           say("targets.ranges", {
             ranges: target.ranges,
             it: target.rejected > 0 ? say("targets.notUsed", { rejected: target.rejected }) : "",
