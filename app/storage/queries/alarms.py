@@ -1,9 +1,9 @@
 """Queries on alarms and on what is told of them."""
 
 from collections.abc import Collection, Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 
-from sqlalchemy import exists, select, update
+from sqlalchemy import ColumnElement, exists, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -59,26 +59,37 @@ async def end(
 
 async def to_be_told(session: AsyncSession, at: datetime, limit: int) -> Sequence[AlarmRow]:
     """Return alarms of which somebody is to be told by now, and that no other transaction is at, oldest first."""
-    query = select(AlarmRow).where(AlarmRow.next_at <= at).order_by(AlarmRow.next_at).limit(limit)
+    query = select(AlarmRow).where(AlarmRow.next_at <= at).order_by(AlarmRow.next_at, AlarmRow.raised_at).limit(limit)
     return (await session.scalars(query.with_for_update(skip_locked=True))).all()
 
 
-async def like_it(session: AsyncSession, alarm: AlarmRow, within_s: float) -> bool:
-    """Tell whether the same happened to the same vehicle so shortly before, was told, and nobody acknowledged it."""
+async def told_like(session: AsyncSession, alarm: AlarmRow, since: datetime) -> Sequence[AlarmRow]:
+    """Return what was told of the same vehicle before, newest first: raised after ``since``, not acknowledged."""
     other = AlarmRow
-    query = select(
-        exists().where(
-            other.mission_id == alarm.mission_id,
-            other.kind == alarm.kind,
-            other.vehicle.is_(None) if alarm.vehicle is None else other.vehicle == alarm.vehicle,
-            other.acknowledged_at.is_(None),
-            other.told_after_s.is_not(None),
-            other.raised_at <= alarm.raised_at,
-            other.raised_at > alarm.raised_at - timedelta(seconds=within_s),
-            other.id != alarm.id,
-        )
+    query = select(other).where(
+        *_like(alarm), other.told_after_s.is_not(None), other.raised_at <= alarm.raised_at, other.raised_at > since
     )
-    return bool(await session.scalar(query))
+    return (await session.scalars(query.order_by(other.raised_at.desc(), other.id))).all()
+
+
+async def untold_like(session: AsyncSession, alarm: AlarmRow) -> Sequence[AlarmRow]:
+    """Return what goes on like an alarm, of the same vehicle, and waits to be told."""
+    other = AlarmRow
+    query = select(other).where(
+        *_like(alarm), other.told_after_s.is_(None), other.ended_at.is_(None), other.next_at.is_not(None)
+    )
+    return (await session.scalars(query)).all()
+
+
+def _like(alarm: AlarmRow) -> list[ColumnElement[bool]]:
+    """Return which others are of the same kind and vehicle, and that nobody acknowledged."""
+    return [
+        AlarmRow.mission_id == alarm.mission_id,
+        AlarmRow.kind == alarm.kind,
+        AlarmRow.vehicle.is_(None) if alarm.vehicle is None else AlarmRow.vehicle == alarm.vehicle,
+        AlarmRow.acknowledged_at.is_(None),
+        AlarmRow.id != alarm.id,
+    ]
 
 
 async def add_deliveries(session: AsyncSession, rows: Collection[AlarmDeliveryRow]) -> None:

@@ -202,22 +202,82 @@ async def test_two_processes_tell_once(keep_watch_on_either: Keep) -> None:
     assert len(program.ids) == 6
 
 
-async def test_the_same_again_is_shown_but_not_told_again_for_a_while(keep_watch: Keep, clock: Clock) -> None:
+async def test_the_same_again_is_held_back_while_it_goes_on_and_told_when_that_lasts(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
     with hook() as program:
-        watch = await keep_watch(told_by(program, repeat_after_s=60))
+        watch = await keep_watch_on_either(told_by(program, repeat_after_s=60))
         await watch.raise_alarm()
         await watch.look()
         clock.advance(30)
-        again = await watch.raise_alarm()
+        again, more = await watch.raise_alarm(), await watch.raise_alarm()
         other = await watch.raise_alarm(vehicle="b")
         await watch.look()
-        assert (await watch.report(again)).deliveries == []
+        assert [(await watch.report(row)).deliveries for row in (again, more)] == [[], []]
         assert len((await watch.report(other)).deliveries) == 1
         clock.advance(31)
         later = await watch.raise_alarm()
         await watch.look()
-        assert len((await watch.report(later)).deliveries) == 1
-        assert len(await watch.dispatcher.alarms(AlarmState.OPEN)) == 4
+        told = [row for row in (again, more, later) if (await watch.report(row)).deliveries]
+        assert len(told) == 1, "one is told for all that were held back"
+        assert told[0] in (again, more)
+        clock.advance(600)
+        await watch.look()
+        assert len(await watch.dispatcher.alarms(AlarmState.OPEN)) == 5
+    assert len(program.requests) == 3
+
+
+async def test_what_comes_again_after_it_was_over_is_told_at_once_and_escalated(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b"], "after_s": 120}]
+    with hook() as bridge, hook() as captain:
+        watch = await keep_watch_on_either(told_by(bridge, captain, routes=ladder))
+        first = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(20)
+        await watch.end(first)
+        await watch.look()
+        clock.advance(20)
+        again = await watch.raise_alarm()
+        await watch.look()
+        assert [said["type"] for said in bridge.said] == ["alarm.raised", "alarm.ended", "alarm.raised"]
+        assert bridge.said[-1]["data"]["id"] == again.id
+        clock.advance(120)
+        await watch.look()
+    assert [(said["type"], said["data"]["id"]) for said in captain.said] == [("alarm.escalated", again.id)]
+
+
+async def test_what_comes_and_goes_is_told_twice_and_then_once_it_stays(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b"], "after_s": 120}, {"to": ["c"], "after_s": 600}]
+    with hook() as bridge, hook() as captain, hook() as shore:
+        watch = await keep_watch_on_either(told_by(bridge, captain, shore, routes=ladder))
+        for _ in range(12):
+            await watch.end(await watch.raise_alarm())
+            await watch.look()
+            clock.advance(5)
+            row = await watch.raise_alarm()
+            await watch.look()
+            clock.advance(5)
+            await watch.end(row)
+            await watch.look()
+        stays = await watch.raise_alarm()
+        await watch.look()
+        heard = len(bridge.requests)
+        assert heard <= 2 * 2
+        clock.at = BEGAN + timedelta(seconds=299)
+        await watch.look()
+        assert len(bridge.requests) == heard
+        clock.advance(11)
+        await watch.look()
+        assert (bridge.said[-1]["type"], bridge.said[-1]["data"]["id"]) == ("alarm.raised", stays.id)
+        assert [said["type"] for said in captain.said] == ["alarm.escalated"], "it is open for so long already"
+        assert shore.requests == []
+        clock.at = stays.raised_at + timedelta(seconds=600)
+        await watch.look()
+    assert [said["data"]["id"] for said in shore.said] == [stays.id]
 
 
 async def test_a_delivery_that_fails_for_too_long_is_given_up(keep_watch: Keep, clock: Clock) -> None:
