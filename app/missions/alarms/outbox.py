@@ -78,7 +78,7 @@ def new_delivery(alarm_id: str, recipient: str, notice: Notice, at: datetime) ->
 
 
 async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> None:
-    """Store what is to be told by now of every alarm."""
+    """Store what is to be told by now of every alarm, and settle what need not be any more."""
     planned: list[AlarmDeliveryRow] = []
     for alarm in await alarm_queries.to_be_told(session, at, AT_ONCE):
         if alarm.next_at is None:
@@ -102,6 +102,7 @@ async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> 
         planned += made
     await session.flush()
     await alarm_queries.add_deliveries(session, planned)
+    await alarm_queries.supersede(session, at)
 
 
 async def _held_until(session: AsyncSession, settings: AlarmSettings, alarm: AlarmRow, at: datetime) -> datetime | None:
@@ -134,12 +135,9 @@ async def acknowledge(
     alarm.acknowledged_at, alarm.acknowledged_by = alarm.acknowledged_at or at, alarm.acknowledged_by or actor
     # That it is over is still told.
     alarm.next_at = alarm.next_at if alarm.ended_at is not None else None
-    known = await alarm_queries.deliveries_of(session, [alarm.id])
-    reached = _reached(known)
-    for row in known:
-        if row.state == DeliveryState.WAITING and row.process_id is None:
-            row.state, row.done_at = DeliveryState.SUPERSEDED, at
+    reached = _reached(await alarm_queries.deliveries_of(session, [alarm.id]))
     await session.flush()
+    await alarm_queries.supersede(session, at)
     told = await _further(session, settings, alarm, reached, Notice.ACKNOWLEDGED, at)
     await alarm_queries.add_deliveries(session, told)
 
@@ -149,7 +147,8 @@ def _reached(deliveries_made: Sequence[AlarmDeliveryRow]) -> set[str]:
     return {
         row.recipient
         for row in deliveries_made
-        if row.state == DeliveryState.DELIVERED or row.attempts or row.process_id is not None
+        if row.state == DeliveryState.DELIVERED
+        or (row.state != DeliveryState.FAILED and (row.attempts or row.process_id is not None))
     }
 
 

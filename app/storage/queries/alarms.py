@@ -3,14 +3,17 @@
 from collections.abc import Collection, Sequence
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, exists, select, update
+from sqlalchemy import ColumnElement, and_, exists, or_, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
+from sqlalchemy.orm import aliased
 
 from app.storage.models import AlarmDeliveryRow, AlarmRow, MissionRow
 
-WAITING = "waiting"
-"""The state of a delivery that is still to be made."""
+WAITING, GIVEN_UP, SUPERSEDED = "waiting", "failed", "superseded"
+"""States of deliveries: still to be made, tried for long enough, not needed any more."""
+CALLS = ("raised", "escalated")
+"""Notices that call somebody; the other ones tell those what became of the alarm."""
 
 
 async def newest(
@@ -120,12 +123,7 @@ async def due(
         select(AlarmDeliveryRow, AlarmRow, MissionRow.name)
         .join(AlarmRow, AlarmRow.id == AlarmDeliveryRow.alarm_id)
         .outerjoin(MissionRow, MissionRow.id == AlarmRow.mission_id)
-        .where(
-            AlarmDeliveryRow.state == WAITING,
-            AlarmDeliveryRow.process_id.is_(None),
-            AlarmDeliveryRow.next_try_at <= at,
-            AlarmDeliveryRow.recipient.not_in(list(but_not_to)),
-        )
+        .where(*_ready(at), AlarmDeliveryRow.recipient.not_in(list(but_not_to)))
         .order_by(AlarmDeliveryRow.next_try_at, AlarmDeliveryRow.id)
         .limit(limit)
         .with_for_update(of=AlarmDeliveryRow, skip_locked=True)
@@ -133,12 +131,55 @@ async def due(
     return [(delivery, alarm, name or "") for delivery, alarm, name in await session.execute(query)]
 
 
+def _ready(at: datetime) -> list[ColumnElement[bool]]:
+    """Return which deliveries can be made by now: an alarm's notices go to a recipient in their order."""
+    before = aliased(AlarmDeliveryRow)
+    first = and_(before.notice.in_(CALLS), AlarmDeliveryRow.notice.not_in(CALLS))
+    return [
+        AlarmDeliveryRow.state == WAITING,
+        AlarmDeliveryRow.process_id.is_(None),
+        AlarmDeliveryRow.next_try_at <= at,
+        ~exists().where(
+            before.alarm_id == AlarmDeliveryRow.alarm_id,
+            before.recipient == AlarmDeliveryRow.recipient,
+            before.id != AlarmDeliveryRow.id,
+            before.state == WAITING,
+            first | (before.created_at < AlarmDeliveryRow.created_at),
+        ),
+    ]
+
+
+async def supersede(session: AsyncSession, at: datetime) -> None:
+    """Settle what need not be told any more.
+
+    That is a call of an alarm that was acknowledged, one further up of an alarm that is over, and what follows a call
+    that was given up. What an attempt is under way for is left until that has failed.
+    """
+    call = aliased(AlarmDeliveryRow)
+    given_up = exists().where(
+        call.alarm_id == AlarmDeliveryRow.alarm_id,
+        call.recipient == AlarmDeliveryRow.recipient,
+        call.notice.in_(CALLS),
+        call.state == GIVEN_UP,
+    )
+    taken = exists().where(AlarmRow.id == AlarmDeliveryRow.alarm_id, AlarmRow.acknowledged_at.is_not(None))
+    over = exists().where(AlarmRow.id == AlarmDeliveryRow.alarm_id, AlarmRow.ended_at.is_not(None))
+    query = update(AlarmDeliveryRow).where(
+        AlarmDeliveryRow.state == WAITING,
+        AlarmDeliveryRow.process_id.is_(None),
+        or_(
+            and_(AlarmDeliveryRow.notice.in_(CALLS), taken),
+            and_(AlarmDeliveryRow.notice == CALLS[1], over),
+            and_(AlarmDeliveryRow.notice.not_in(CALLS), given_up),
+        ),
+    )
+    await session.execute(query.values(state=SUPERSEDED, done_at=at), execution_options={"synchronize_session": False})
+
+
 async def anything_to_do(session: AsyncSession, at: datetime) -> bool:
     """Tell whether an alarm is to be told, or a delivery made, by now."""
     told = exists().where(AlarmRow.next_at <= at)
-    made = exists().where(
-        AlarmDeliveryRow.state == WAITING, AlarmDeliveryRow.process_id.is_(None), AlarmDeliveryRow.next_try_at <= at
-    )
+    made = exists().where(*_ready(at))
     return bool(await session.scalar(select(told | made)))
 
 

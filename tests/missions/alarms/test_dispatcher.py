@@ -137,6 +137,58 @@ async def test_whoever_was_told_hears_that_it_is_over_and_nobody_else_is_called(
     assert shore.requests == []
 
 
+async def test_who_does_not_answer_hears_that_it_is_over_after_that_it_was_raised(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b", "c"], "after_s": 60}]
+    with hook(*[503] * 8) as bridge, hook() as captain, hook() as shore:
+        captain.release.clear()
+        watch = await keep_watch_on_either(told_by(bridge, captain, shore, routes=ladder))
+        other = await watch.raise_alarm(AlarmKind.LEAK)
+        clock.advance(30)
+        alarm = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(30)
+        await watch.dispatcher.look()
+        await until(lambda: watch.dispatcher.sending == {"b"}, "the captain is being told of the first one")
+        clock.advance(30)
+        await watch.dispatcher.look()
+        await until(lambda: len(shore.requests) == 2, "the others are told of both")
+        await watch.end(alarm)
+        captain.release.set()
+        for _ in range(10):
+            await watch.look()
+            clock.advance(60)
+        told = {(d.recipient, d.notice): d.state for d in (await watch.report(alarm)).deliveries}
+    heard = [said["type"] for said in bridge.said if said["data"]["id"] == alarm.id]
+    assert set(heard[:-1]) == {"alarm.raised"}
+    assert heard[-1] == "alarm.ended"
+    assert [said["type"] for said in shore.said if said["data"]["id"] == alarm.id] == ["alarm.escalated", "alarm.ended"]
+    assert told == {
+        ("a", "raised"): DeliveryState.DELIVERED,
+        ("a", "ended"): DeliveryState.DELIVERED,
+        ("b", "escalated"): DeliveryState.SUPERSEDED,
+        ("c", "escalated"): DeliveryState.DELIVERED,
+        ("c", "ended"): DeliveryState.DELIVERED,
+    }, "whom nobody had tried to call is called no more"
+    assert [said["data"]["id"] for said in captain.said] == [other.id]
+
+
+async def test_who_never_answers_is_not_told_for_another_day_that_it_is_over(keep_watch: Keep, clock: Clock) -> None:
+    with hook(*[500] * 20) as program:
+        watch = await keep_watch(told_by(program, give_up_after_s=60))
+        alarm = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(30)
+        await watch.end(alarm)
+        for _ in range(10):
+            await watch.look()
+            clock.advance(30)
+        told = {d.notice: d.state for d in (await watch.report(alarm)).deliveries}
+    assert told == {"raised": DeliveryState.FAILED, "ended": DeliveryState.SUPERSEDED}
+    assert {said["type"] for said in program.said} == {"alarm.raised"}
+
+
 async def test_what_was_over_before_anybody_was_told_is_told_once(keep_watch: Keep) -> None:
     with hook() as program:
         watch = await keep_watch(told_by(program))
@@ -155,6 +207,37 @@ async def test_who_was_not_told_yet_is_not_told_of_what_is_taken(keep_watch: Kee
         await watch.look()
         assert (await watch.report(alarm)).deliveries == []
     assert program.requests == []
+
+
+async def test_what_was_taken_while_it_was_being_told_is_not_told_again_as_raised(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    with hook(503) as program:
+        program.release.clear()
+        watch = await keep_watch_on_either(told_by(program))
+        alarm = await watch.raise_alarm()
+        await watch.dispatcher.look()
+        await until(lambda: len(program.requests) == 1, "it is being told")
+        await watch.dispatcher.acknowledge(alarm.id, "Ana")
+        program.release.set()
+        await watch.sent()
+        clock.advance(600)
+        await watch.look()
+        await watch.look()
+        told = {d.notice: d.state for d in (await watch.report(alarm)).deliveries}
+        assert [said["type"] for said in program.said] == ["alarm.raised", "alarm.acknowledged"]
+        assert told == {"raised": DeliveryState.SUPERSEDED, "acknowledged": DeliveryState.DELIVERED}
+        # The process that was telling it is killed.
+        program.release.clear()
+        second = await watch.raise_alarm(AlarmKind.LEAK)
+        await watch.dispatcher.look()
+        await until(lambda: len(program.requests) == 3, "it is being told")
+        await watch.dispatcher.acknowledge(second.id, "Ana")
+        await end_of_process(watch)
+        program.release.set()
+        after = await keep_watch_on_either(told_by(program))
+        await after.look()
+    assert [said["type"] for said in program.said[2:]] == ["alarm.raised", "alarm.acknowledged"]
 
 
 async def test_the_first_who_acknowledges_stays_and_unknown_alarms_are_refused(keep_watch: Keep, clock: Clock) -> None:
