@@ -156,6 +156,15 @@ class Settings(BaseSettings, ServiceSettings):
             raise ValueError("use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME")
         return f"{scheme}://{rest}"
 
+    @field_validator("pings_url")
+    @classmethod
+    def _can_be_reached(cls, url: str) -> str:
+        if "://" in url:
+            from app.storage.ping_files import check_place  # with the database's library: few need it here
+
+            check_place(url)
+        return url
+
     @field_validator("trusted_proxies")
     @classmethod
     def _are_networks(cls, proxies: tuple[str, ...]) -> tuple[str, ...]:
