@@ -4,7 +4,7 @@ import difflib
 import ipaddress
 import os
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import urlsplit
@@ -29,7 +29,7 @@ _OTHER_VARIABLES = {
     *(PREFIX + name for name in ("TOKEN", "TERRAINS", "CAPTURES", "SKIP_DASHBOARD")),
 }
 
-_SECRET = {"database_url", "alarms"}
+_SECRET = {"database_url", "pings_url", "alarms"}
 """Settings with passwords in them: a value that is wrong is not shown."""
 
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg", "postgres": "postgresql+asyncpg"}
@@ -155,6 +155,15 @@ class Settings(BaseSettings, ServiceSettings):
         if not separator or scheme not in _DRIVERS.values():
             raise ValueError("use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME")
         return f"{scheme}://{rest}"
+
+    @field_validator("pings_url")
+    @classmethod
+    def _can_be_reached(cls, url: str) -> str:
+        if "://" in url:
+            from app.storage.ping_files import check_place  # with the database's library: few need it here
+
+            check_place(url)
+        return url
 
     @field_validator("trusted_proxies")
     @classmethod
@@ -299,6 +308,23 @@ def _variable_names(model: type[BaseModel], prefix: str) -> set[str]:
     return names
 
 
+def _source(path: Sequence[str], message: str) -> str:
+    """Return the variables that a wrong value comes from, or else the file.
+
+    A section that does not fit together comes from all that is set of it, unless the message names what is wrong.
+    """
+    variables = [PREFIX + "__".join(path[: k + 1]).upper() for k in range(len(path))]
+    above = [variable for variable in variables if variable in os.environ]
+    if above:
+        return above[-1]
+    below = sorted(name for name in os.environ if name.startswith(variables[-1] + "__"))
+    named = [name for name in below if name.rpartition("__")[2].lower() in message]
+    if named:
+        return ", ".join(named)
+    file = config_file()
+    return ", ".join([*below, *([str(file)] if file.is_file() or not below else [])])
+
+
 def _unknown(what: str, name: str, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean {close[0]}?" if close else "known are " + ", ".join(sorted(known))
@@ -309,13 +335,7 @@ def _describe(error: ValidationError, overrides: dict[str, Any]) -> Iterable[str
     for entry in error.errors(include_url=False):
         path = [str(part) for part in entry["loc"]]
         name = ".".join(path)
-        variable = PREFIX + "__".join(path).upper()
-        if overrides.get(path[0]) is not None:
-            source = "the command line"
-        elif variable in os.environ:
-            source = variable
-        else:
-            source = str(config_file())
+        source = "the command line" if overrides.get(path[0]) is not None else _source(path, entry["msg"])
         if entry["type"] == "extra_forbidden":
             model: type[BaseModel] = Settings
             for part in path[:-1]:

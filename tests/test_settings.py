@@ -102,6 +102,24 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
             "variable BATHYFLEET_PROT is not a setting: did you mean BATHYFLEET_PORT?",
         ),
         ("", {"BATHYFLEET_IMC__PROT": "1"}, {}, "did you mean BATHYFLEET_IMC__PORT?"),
+        (
+            "",
+            {"BATHYFLEET_ALARMS__CA_FILE": "/nope", "BATHYFLEET_ALARMS__GIVE_UP_AFTER_S": "60"},
+            {},
+            "alarms (from BATHYFLEET_ALARMS__CA_FILE): ca_file '/nope' is not a file",
+        ),
+        (
+            '[alarms]\nca_file = "/nope"',
+            {"BATHYFLEET_ALARMS__GIVE_UP_AFTER_S": "60"},
+            {},
+            "alarms (from BATHYFLEET_ALARMS__GIVE_UP_AFTER_S, bathyfleet.toml): ca_file '/nope' is not a file",
+        ),
+        (
+            "",
+            {"BATHYFLEET_ALARMS__WEBHOOKS": '[{"name": "a", "url": "nonsense", "secret": "0123456789abcdef"}]'},
+            {},
+            "alarms.webhooks.0.url (from BATHYFLEET_ALARMS__WEBHOOKS): write a whole address",
+        ),
         ("", {"BATHYFLEET_IMC__PORT": "x"}, {}, "imc.port is 'x' (from BATHYFLEET_IMC__PORT): input should be a valid"),
         ("", {"BATHYFLEET_ALLOWED_ORIGINS": "a"}, {}, "lists and tables are written as JSON"),
         (

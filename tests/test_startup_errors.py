@@ -5,6 +5,7 @@ import socket
 import sqlite3
 import subprocess
 from contextlib import closing
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,23 @@ def test_settings_that_are_not_utf8(tmp_path: Path) -> None:
     code, said = start(tmp_path)
     assert code == 2
     check_one_line(said, "bathyfleet.toml is not UTF-8", "byte 6 is 0xf5")
+
+
+@pytest.mark.parametrize(
+    ("url", "parts"),
+    [
+        ("nosuch://me:swordfish@x/y", ["nosuch:// is not known", "use a folder, or a URL such as s3://bucket/pings"]),
+        ("s3://me:swordfish@b/p", ["s3:// needs a package that is not installed (Install s3fs", "or name a folder"]),
+    ],
+)
+def test_a_place_for_pings_that_nothing_here_reaches(tmp_path: Path, url: str, parts: list[str]) -> None:
+    if url.startswith("s3:") and find_spec("s3fs") is not None:
+        pytest.skip("s3fs is installed")
+    code, said = start(tmp_path, BATHYFLEET_PINGS_URL=url)
+    assert code == 2
+    check_one_line(said, "pings_url (from BATHYFLEET_PINGS_URL): ", *parts)
+    assert "swordfish" not in said
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_database_of_a_newer_version(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def configure(level: str = "info", form: Literal["console", "json"] = "console",
         logger = logging.getLogger(name)
         logger.handlers.clear()
         logger.propagate = True
-    for noisy in ("asyncio", "aiosqlite", "alembic", "matplotlib", "PIL", "rasterio", "numba", "httpx"):
+    for noisy in ("asyncio", "aiosqlite", "alembic", "matplotlib", "PIL", "rasterio", "numba", "httpx", "httpcore"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     structlog.configure(
         processors=[

@@ -6,6 +6,8 @@ import threading
 from collections.abc import AsyncIterator, Awaitable, Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from contextvars import copy_context
+from functools import partial
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import structlog
@@ -61,6 +63,7 @@ class Compute:
         self._processes = processes
         self._turn = threading.BoundedSemaphore(AT_ONCE_HERE)
         self._waiting = ThreadPoolExecutor(WAITING, thread_name_prefix="compute") if settings.scheduler else None
+        self._repeating = ThreadPoolExecutor(AT_ONCE_HERE, "repeating") if settings.scheduler else None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ending = False
 
@@ -81,8 +84,9 @@ class Compute:
         self.end()
         if self._cluster is not None:
             await asyncio.to_thread(self._cluster.join)
-        if self._waiting is not None:
-            await asyncio.to_thread(self._waiting.shutdown, wait=True, cancel_futures=True)
+        for threads in (self._waiting, self._repeating):
+            if threads is not None:
+                await asyncio.to_thread(threads.shutdown, wait=True, cancel_futures=True)
 
     @property
     def elsewhere(self) -> bool:
@@ -109,11 +113,20 @@ class Compute:
     async def run(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
         """Return what a function of a module returns: by the cluster, else by a thread."""
         try:
+            return await self.away(work, *arguments, **named)
+        except NotDoneError:
+            # Whoever waits for a turn must not hold a thread that all of the service shares.
+            here = partial(copy_context().run, self._here, work, arguments, named)
+            return await asyncio.get_running_loop().run_in_executor(self._repeating, here)
+
+    async def away(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
+        """Return what :meth:`run` does, never by a thread of this process. Raises NotDoneError where it would be."""
+        try:
             return await self._there(work, arguments, named)
         except NotDoneError as error:
             if self._apart(error):
                 return await self._processes.make(work, *arguments, **named)
-            return await asyncio.to_thread(self._here, work, arguments, named)
+            raise
 
     async def make(self, work: Callable[P, Made], *arguments: P.args, **named: P.kwargs) -> Made:
         """Return what a function of a module returns: by the cluster, else by a process of its own.

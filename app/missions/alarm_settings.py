@@ -138,8 +138,8 @@ class AlarmSettings(_Section):
         default=300.0,
         ge=0,
         le=86_400,
-        description="An alarm like one that was told less than this ago and is not acknowledged is shown, but told to "
-        "nobody",
+        description="An alarm like one that was told less than this ago, goes on and is not acknowledged is shown, but "
+        "told to nobody before",
     )
     give_up_after_s: float = Field(
         default=86_400.0, ge=60, le=2_592_000, description="A delivery that fails is tried again for so long"

@@ -22,6 +22,22 @@ class PingFileError(Exception):
     """A file of pings is missing or damaged; ``str()`` names it."""
 
 
+def check_place(url: str) -> None:
+    """Raise ValueError where nothing that is installed reaches files at such a URL, one of fsspec."""
+    import fsspec  # slow to import, and needed by those only who have such a URL
+
+    for part in url.split("::"):
+        protocol = part.partition("://")[0]
+        try:
+            fsspec.get_filesystem_class(protocol)
+        except ImportError as error:
+            raise ValueError(
+                f"{protocol}:// needs a package that is not installed ({error}); or name a folder"
+            ) from None
+        except ValueError:
+            raise ValueError(f"{protocol}:// is not known; use a folder, or a URL such as s3://bucket/pings") from None
+
+
 def file_name(mission_id: str, first_block: int, digest: str) -> str:
     """Return what the file of some blocks with this SHA-256 is called; written again it has the same name."""
     return f"{mission_id}/{first_block:012d}-{digest}.parquet"

@@ -7,7 +7,9 @@ import os
 import shutil
 import signal
 import subprocess
+import threading
 from collections.abc import AsyncIterator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -223,6 +225,30 @@ async def test_without_a_cluster_that_answers_everything_is_done_here(
     assert str(unused_tcp_port) in (compute.state or "")
     assert not logging.getLogger("distributed.client").isEnabledFor(logging.ERROR), "it is told here, not by tracebacks"
     assert await asyncio.to_thread(compute.in_thread, heavy_work.process) == os.getpid()
+    await compute.close()
+    await processes.close()
+
+
+async def test_what_waits_to_be_repeated_here_holds_no_thread_of_the_service(unused_tcp_port: int) -> None:
+    processes = WorkProcesses()
+    compute = Compute(ComputeSettings(scheduler=f"tcp://127.0.0.1:{unused_tcp_port}"), processes)
+    shared = ThreadPoolExecutor(2)
+    asyncio.get_running_loop().set_default_executor(shared)
+    begun, go_on = threading.Event(), threading.Event()
+
+    def work() -> bool:
+        begun.set()
+        return go_on.wait(60.0)
+
+    works = [asyncio.create_task(compute.run(work)) for _ in range(6)]
+    try:
+        await until(begun.is_set, "one is being repeated")
+        async with asyncio.timeout(20.0):
+            assert await asyncio.to_thread(os.getpid) == os.getpid()
+        works[-1].cancel()
+    finally:
+        go_on.set()
+    assert await asyncio.gather(*works[:-1]) == [True] * 5
     await compute.close()
     await processes.close()
 

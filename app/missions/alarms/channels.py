@@ -4,6 +4,7 @@ import asyncio
 import base64
 import hashlib
 import hmac
+import re
 import socket
 import ssl
 from collections.abc import Mapping
@@ -66,7 +67,7 @@ class Channels:
             raise DeliveryError(f"no answer within {PATIENCE_S:g} s") from None
         except Exception as error:
             # Whatever it is, another attempt is made later, and its words are the operator's clue.
-            raise DeliveryError(self._shown(error)) from None
+            raise DeliveryError(self._shown(error, known)) from None
 
     async def _send(self, recipient: Webhook | MailRecipient | Topic, message: Message, at: datetime) -> None:
         match recipient:
@@ -157,8 +158,11 @@ class Channels:
             context.load_verify_locations(self._settings.ca_file)
         return context
 
-    def _shown(self, error: Exception) -> str:
+    def _shown(self, error: Exception, recipient: Webhook | MailRecipient | Topic) -> str:
         words = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        if isinstance(recipient, Webhook):
+            for part in _parts(recipient):
+                words = re.sub(re.escape(part), "***", words, flags=re.IGNORECASE)
         for secret in self._settings.secrets:
             words = words.replace(secret, "***")
         return " ".join(words.split())[:LONGEST_ERROR]
@@ -168,3 +172,12 @@ class Channels:
         if self._client is not None:
             await self._client.aclose()
             self._client = None
+
+
+def _parts(webhook: Webhook) -> list[str]:
+    """Return what of a webhook's address libraries put into errors, longest first."""
+    url = httpx.URL(webhook.url.get_secret_value())
+    encoded = [url.raw_host, url.netloc, url.userinfo, url.raw_path, url.query]
+    parts = [webhook.url.get_secret_value(), str(url), url.host, url.username, url.password, url.path]
+    parts += [part.decode("ascii") for part in encoded]
+    return sorted({part for part in parts if part.strip("/")}, key=len, reverse=True)

@@ -21,6 +21,8 @@ from app.storage.queries import alarms as alarm_queries
 
 AT_ONCE = 200
 """Alarms that are planned in one transaction, and deliveries that are looked at to be taken."""
+MOST_TOLD = 2
+"""What comes and goes is told so often within ``repeat_after_s``; then it has to stay."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,17 +78,23 @@ def new_delivery(alarm_id: str, recipient: str, notice: Notice, at: datetime) ->
 
 
 async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> None:
-    """Store what is to be told by now of every alarm."""
+    """Store what is to be told by now of every alarm, and settle what need not be any more."""
     planned: list[AlarmDeliveryRow] = []
     for alarm in await alarm_queries.to_be_told(session, at, AT_ONCE):
+        if alarm.next_at is None:
+            continue  # told with one before it in this list
         first = alarm.told_after_s is None
         if alarm.ended_at is not None and not first:
             planned += await _end(session, settings, alarm, at)
             alarm.next_at = None
             continue
-        if first and await alarm_queries.like_it(session, alarm, settings.repeat_after_s):
-            alarm.next_at = None
+        until = await _held_until(session, settings, alarm, at) if first else None
+        if until is not None:
+            # What was over before its time has come is told to nobody.
+            alarm.next_at = until if alarm.ended_at is None else None
             continue
+        if first and alarm.ended_at is None and alarm.next_at > alarm.raised_at:
+            await _tell_for_others(session, alarm)
         made, alarm.next_at = deliveries(settings, alarm, await _name(session, alarm), at)
         alarm.told_after_s = max(0.0, (at - alarm.raised_at).total_seconds())
         if alarm.ended_at is not None:
@@ -94,6 +102,23 @@ async def plan(session: AsyncSession, settings: AlarmSettings, at: datetime) -> 
         planned += made
     await session.flush()
     await alarm_queries.add_deliveries(session, planned)
+    await alarm_queries.supersede(session, at)
+
+
+async def _held_until(session: AsyncSession, settings: AlarmSettings, alarm: AlarmRow, at: datetime) -> datetime | None:
+    """Return until when nobody is told of an alarm: the same was told shortly before. None: it is told now."""
+    window = timedelta(seconds=settings.repeat_after_s)
+    seen_at = at if alarm.ended_at is None else alarm.raised_at
+    told = await alarm_queries.told_like(session, alarm, seen_at - window)
+    goes_on = [other for other in told if other.ended_at is None or other.ended_at > alarm.raised_at]
+    holding = goes_on[:1] or told[MOST_TOLD - 1 : MOST_TOLD]
+    return holding[0].raised_at + window if holding else None
+
+
+async def _tell_for_others(session: AsyncSession, alarm: AlarmRow) -> None:
+    """Let an alarm that was held back stand for the others that were with it."""
+    for other in await alarm_queries.untold_like(session, alarm):
+        other.told_after_s, other.next_at = 0.0, None
 
 
 async def keep_begun(session: AsyncSession, rows: Sequence[AlarmDeliveryRow], waiting: Collection[str]) -> set[str]:
@@ -110,12 +135,9 @@ async def acknowledge(
     alarm.acknowledged_at, alarm.acknowledged_by = alarm.acknowledged_at or at, alarm.acknowledged_by or actor
     # That it is over is still told.
     alarm.next_at = alarm.next_at if alarm.ended_at is not None else None
-    known = await alarm_queries.deliveries_of(session, [alarm.id])
-    reached = _reached(known)
-    for row in known:
-        if row.state == DeliveryState.WAITING and row.process_id is None:
-            row.state, row.done_at = DeliveryState.SUPERSEDED, at
+    reached = _reached(await alarm_queries.deliveries_of(session, [alarm.id]))
     await session.flush()
+    await alarm_queries.supersede(session, at)
     told = await _further(session, settings, alarm, reached, Notice.ACKNOWLEDGED, at)
     await alarm_queries.add_deliveries(session, told)
 
@@ -125,7 +147,8 @@ def _reached(deliveries_made: Sequence[AlarmDeliveryRow]) -> set[str]:
     return {
         row.recipient
         for row in deliveries_made
-        if row.state == DeliveryState.DELIVERED or row.attempts or row.process_id is not None
+        if row.state == DeliveryState.DELIVERED
+        or (row.state != DeliveryState.FAILED and (row.attempts or row.process_id is not None))
     }
 
 

@@ -94,7 +94,7 @@ class FleetHub:
         info = link.vehicle(name)
         if info is not None:
             return info
-        reason = "never heard of: is it switched on, and does it reach this service?"
+        reason = "not heard since the service was started: is it switched on, and does it reach this service?"
         if link.capabilities.simulated:
             reason = "simulated: it is launched when its mission starts"
         return VehicleInfo(name, kind, LinkState.UNKNOWN, reason)

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -11,6 +12,7 @@ from pydantic import Field
 from shapely.geometry import Point, Polygon
 
 from app.arrays import FloatArray
+from app.compute.cluster import NotDoneError
 from app.compute.compute import Compute
 from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
@@ -45,7 +47,7 @@ BUDGET_S = 10.0
 """Seconds of the processor for each floor."""
 
 PATIENCE_S = 60.0
-"""After so long by the clock no further floor is begun."""
+"""After so long by the clock no further floor is begun, nor one waited for that the cluster flies."""
 
 START_MARGIN_M, START_SPACING_M = 2.0, 5.0
 NEAR_M = 500.0
@@ -89,7 +91,10 @@ class ForecastView(View):
 
 
 class Forecaster:
-    """Makes forecasts beside the planning of running missions: on a cluster over all floors at the same time."""
+    """Makes forecasts beside the planning of running missions: on a cluster over all floors at the same time.
+
+    A cluster that fails is done without, in the time that is left.
+    """
 
     def __init__(self, hub: FleetHub, compilation: Compilation, compute: Compute) -> None:
         self._hub = hub
@@ -154,16 +159,40 @@ class Forecaster:
         """
         ours = members or described_team(self._hub, spec)
         starts, where = await asyncio.to_thread(starts_of, spec, ours)
-        if self._compute.elsewhere:
-            floors = await asyncio.to_thread(lambda: list(floors_under(spec, ours, so_far, floor_depth_m)))
-            flights = await asyncio.gather(
-                *(self._compute.run(fly_over, floor, spec, ours, starts, so_far, BUDGET_S) for floor in floors)
-            )
-            found = Forecast(list(flights), floors)
-        else:
-            found = await self._here(spec, ours, starts, so_far, floor_depth_m)
+        begun = time.monotonic()
+        found = await self._there(spec, ours, starts, so_far, floor_depth_m) if self._compute.elsewhere else None
+        if found is None:
+            left_s = max(PATIENCE_S - (time.monotonic() - begun), 0.0)
+            found = await self._here(spec, ours, starts, so_far, floor_depth_m, left_s)
         steps = max(spec.steps - so_far.first_step + 1, 0)
         return _view(spec, found, where, steps, await asyncio.to_thread(_whole, spec, ours, found))
+
+    async def _there(
+        self,
+        spec: MissionSpec,
+        members: list[Member],
+        starts_m: FloatArray,
+        so_far: SoFar,
+        floor_depth_m: float | None,
+    ) -> Forecast | None:
+        """Return what the cluster flies as long as a forecast may take; None where it fails, or flies nothing."""
+        floors = await asyncio.to_thread(lambda: list(floors_under(spec, members, so_far, floor_depth_m)))
+        flying = [
+            asyncio.ensure_future(
+                self._compute.away(fly_over, floor, spec, members, starts_m, so_far, BUDGET_S),
+            )
+            for floor in floors
+        ]
+        try:
+            await asyncio.wait(flying, timeout=PATIENCE_S, return_when=asyncio.FIRST_EXCEPTION)
+            flown = [(floor, task.result()) for floor, task in zip(floors, flying, strict=True) if task.done()]
+        except NotDoneError:
+            return None
+        finally:
+            for task in flying:
+                task.cancel()
+            await asyncio.gather(*flying, return_exceptions=True)
+        return Forecast([flight for _, flight in flown], [floor for floor, _ in flown]) if flown else None
 
     async def _here(
         self,
@@ -172,6 +201,7 @@ class Forecaster:
         starts_m: FloatArray,
         so_far: SoFar,
         floor_depth_m: float | None,
+        patience_s: float,
     ) -> Forecast:
         # The time that a forecast may take is for steps, not for compiling.
         await self._compilation.search()
@@ -184,7 +214,7 @@ class Forecaster:
             so_far,
             floor_depth_m=floor_depth_m,
             budget_s=BUDGET_S,
-            patience_s=PATIENCE_S,
+            patience_s=patience_s,
             stop=lambda: gone.is_set() or self._closing.is_set(),
         )
         try:

@@ -35,7 +35,7 @@ class DeliveryState(StrEnum):
     FAILED = "failed"
     """It was tried for as long as the settings say."""
     SUPERSEDED = "superseded"
-    """The alarm was acknowledged before anybody could be told."""
+    """The alarm was acknowledged, or over, before it could be told; or what it follows was given up."""
 
 
 class AlarmView(View):

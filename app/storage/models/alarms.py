@@ -46,7 +46,7 @@ class AlarmDeliveryRow(Base):
     alarm_id: Mapped[str] = mapped_column(ForeignKey("alarms.id", ondelete="CASCADE"), index=True)
     recipient: Mapped[str] = mapped_column(String(64))
     notice: Mapped[str] = mapped_column(String(16))
-    """raised, escalated or acknowledged."""
+    """raised, escalated, acknowledged or ended."""
     state: Mapped[str] = mapped_column(String(16))
     """waiting, delivered, failed or superseded."""
     attempts: Mapped[int]

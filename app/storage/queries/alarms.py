@@ -1,16 +1,19 @@
 """Queries on alarms and on what is told of them."""
 
 from collections.abc import Collection, Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 
-from sqlalchemy import exists, select, update
+from sqlalchemy import ColumnElement, and_, exists, or_, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.ext.asyncio import AsyncSession
+from sqlalchemy.orm import aliased
 
 from app.storage.models import AlarmDeliveryRow, AlarmRow, MissionRow
 
-WAITING = "waiting"
-"""The state of a delivery that is still to be made."""
+WAITING, GIVEN_UP, SUPERSEDED = "waiting", "failed", "superseded"
+"""States of deliveries: still to be made, tried for long enough, not needed any more."""
+CALLS = ("raised", "escalated")
+"""Notices that call somebody; the other ones tell those what became of the alarm."""
 
 
 async def newest(
@@ -59,26 +62,37 @@ async def end(
 
 async def to_be_told(session: AsyncSession, at: datetime, limit: int) -> Sequence[AlarmRow]:
     """Return alarms of which somebody is to be told by now, and that no other transaction is at, oldest first."""
-    query = select(AlarmRow).where(AlarmRow.next_at <= at).order_by(AlarmRow.next_at).limit(limit)
+    query = select(AlarmRow).where(AlarmRow.next_at <= at).order_by(AlarmRow.next_at, AlarmRow.raised_at).limit(limit)
     return (await session.scalars(query.with_for_update(skip_locked=True))).all()
 
 
-async def like_it(session: AsyncSession, alarm: AlarmRow, within_s: float) -> bool:
-    """Tell whether the same happened to the same vehicle so shortly before, was told, and nobody acknowledged it."""
+async def told_like(session: AsyncSession, alarm: AlarmRow, since: datetime) -> Sequence[AlarmRow]:
+    """Return what was told of the same vehicle before, newest first: raised after ``since``, not acknowledged."""
     other = AlarmRow
-    query = select(
-        exists().where(
-            other.mission_id == alarm.mission_id,
-            other.kind == alarm.kind,
-            other.vehicle.is_(None) if alarm.vehicle is None else other.vehicle == alarm.vehicle,
-            other.acknowledged_at.is_(None),
-            other.told_after_s.is_not(None),
-            other.raised_at <= alarm.raised_at,
-            other.raised_at > alarm.raised_at - timedelta(seconds=within_s),
-            other.id != alarm.id,
-        )
+    query = select(other).where(
+        *_like(alarm), other.told_after_s.is_not(None), other.raised_at <= alarm.raised_at, other.raised_at > since
     )
-    return bool(await session.scalar(query))
+    return (await session.scalars(query.order_by(other.raised_at.desc(), other.id))).all()
+
+
+async def untold_like(session: AsyncSession, alarm: AlarmRow) -> Sequence[AlarmRow]:
+    """Return what goes on like an alarm, of the same vehicle, and waits to be told."""
+    other = AlarmRow
+    query = select(other).where(
+        *_like(alarm), other.told_after_s.is_(None), other.ended_at.is_(None), other.next_at.is_not(None)
+    )
+    return (await session.scalars(query)).all()
+
+
+def _like(alarm: AlarmRow) -> list[ColumnElement[bool]]:
+    """Return which others are of the same kind and vehicle, and that nobody acknowledged."""
+    return [
+        AlarmRow.mission_id == alarm.mission_id,
+        AlarmRow.kind == alarm.kind,
+        AlarmRow.vehicle.is_(None) if alarm.vehicle is None else AlarmRow.vehicle == alarm.vehicle,
+        AlarmRow.acknowledged_at.is_(None),
+        AlarmRow.id != alarm.id,
+    ]
 
 
 async def add_deliveries(session: AsyncSession, rows: Collection[AlarmDeliveryRow]) -> None:
@@ -109,12 +123,7 @@ async def due(
         select(AlarmDeliveryRow, AlarmRow, MissionRow.name)
         .join(AlarmRow, AlarmRow.id == AlarmDeliveryRow.alarm_id)
         .outerjoin(MissionRow, MissionRow.id == AlarmRow.mission_id)
-        .where(
-            AlarmDeliveryRow.state == WAITING,
-            AlarmDeliveryRow.process_id.is_(None),
-            AlarmDeliveryRow.next_try_at <= at,
-            AlarmDeliveryRow.recipient.not_in(list(but_not_to)),
-        )
+        .where(*_ready(at), AlarmDeliveryRow.recipient.not_in(list(but_not_to)))
         .order_by(AlarmDeliveryRow.next_try_at, AlarmDeliveryRow.id)
         .limit(limit)
         .with_for_update(of=AlarmDeliveryRow, skip_locked=True)
@@ -122,12 +131,55 @@ async def due(
     return [(delivery, alarm, name or "") for delivery, alarm, name in await session.execute(query)]
 
 
+def _ready(at: datetime) -> list[ColumnElement[bool]]:
+    """Return which deliveries can be made by now: an alarm's notices go to a recipient in their order."""
+    before = aliased(AlarmDeliveryRow)
+    first = and_(before.notice.in_(CALLS), AlarmDeliveryRow.notice.not_in(CALLS))
+    return [
+        AlarmDeliveryRow.state == WAITING,
+        AlarmDeliveryRow.process_id.is_(None),
+        AlarmDeliveryRow.next_try_at <= at,
+        ~exists().where(
+            before.alarm_id == AlarmDeliveryRow.alarm_id,
+            before.recipient == AlarmDeliveryRow.recipient,
+            before.id != AlarmDeliveryRow.id,
+            before.state == WAITING,
+            first | (before.created_at < AlarmDeliveryRow.created_at),
+        ),
+    ]
+
+
+async def supersede(session: AsyncSession, at: datetime) -> None:
+    """Settle what need not be told any more.
+
+    That is a call of an alarm that was acknowledged, one further up of an alarm that is over, and what follows a call
+    that was given up. What an attempt is under way for is left until that has failed.
+    """
+    call = aliased(AlarmDeliveryRow)
+    given_up = exists().where(
+        call.alarm_id == AlarmDeliveryRow.alarm_id,
+        call.recipient == AlarmDeliveryRow.recipient,
+        call.notice.in_(CALLS),
+        call.state == GIVEN_UP,
+    )
+    taken = exists().where(AlarmRow.id == AlarmDeliveryRow.alarm_id, AlarmRow.acknowledged_at.is_not(None))
+    over = exists().where(AlarmRow.id == AlarmDeliveryRow.alarm_id, AlarmRow.ended_at.is_not(None))
+    query = update(AlarmDeliveryRow).where(
+        AlarmDeliveryRow.state == WAITING,
+        AlarmDeliveryRow.process_id.is_(None),
+        or_(
+            and_(AlarmDeliveryRow.notice.in_(CALLS), taken),
+            and_(AlarmDeliveryRow.notice == CALLS[1], over),
+            and_(AlarmDeliveryRow.notice.not_in(CALLS), given_up),
+        ),
+    )
+    await session.execute(query.values(state=SUPERSEDED, done_at=at), execution_options={"synchronize_session": False})
+
+
 async def anything_to_do(session: AsyncSession, at: datetime) -> bool:
     """Tell whether an alarm is to be told, or a delivery made, by now."""
     told = exists().where(AlarmRow.next_at <= at)
-    made = exists().where(
-        AlarmDeliveryRow.state == WAITING, AlarmDeliveryRow.process_id.is_(None), AlarmDeliveryRow.next_try_at <= at
-    )
+    made = exists().where(*_ready(at))
     return bool(await session.scalar(select(told | made)))
 
 

@@ -1,5 +1,8 @@
-"""E-mail and MQTT, against a real mail server and a real broker."""
+"""E-mail and MQTT, against a real mail server and a real broker; what errors and the log show of webhooks."""
 
+import asyncio
+import io
+import ssl
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -8,10 +11,20 @@ import aiomqtt
 import orjson
 import pytest
 
+from app.api import logs
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarm_settings import AlarmSettings
 from app.missions.views.alarms import DeliveryState
-from tests.support.missions.alarms import PASSWORD, Clock, Watch, broker, mail_server, make_certificate
+from tests.support.missions.alarms import (
+    PASSWORD,
+    SECRET,
+    Clock,
+    Watch,
+    broker,
+    hook,
+    mail_server,
+    make_certificate,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore:Session.login_data is deprecated")
 
@@ -123,3 +136,35 @@ async def test_mqtt_takes_it_at_least_once_and_no_broker_is_tried_again(keep_wat
     [delivery] = (await watch.report(later)).deliveries
     assert delivery.state is DeliveryState.WAITING
     assert delivery.error
+
+
+async def test_neither_errors_nor_the_log_show_parts_of_a_webhooks_address(keep_watch: Keep, tmp_path: Path) -> None:
+    certificate = make_certificate(tmp_path)  # for 127.0.0.1
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificate)
+    stream = io.StringIO()
+    logs.configure("debug", "console", stream)
+    try:
+        server = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0, ssl=context)
+        async with server:
+            port = server.sockets[0].getsockname()[1]
+            with hook(307) as elsewhere:
+                addresses = f"https://Key:word@LocalHost:{port}/in/it?token=7", elsewhere.url
+                for address in addresses:
+                    settings = {
+                        "webhooks": [{"name": "a", "url": address, "secret": SECRET}],
+                        "routes": [{"to": ["a"]}],
+                        "ca_file": certificate,
+                    }
+                    watch = await keep_watch(AlarmSettings.model_validate(settings))
+                    alarm = await watch.raise_alarm(vehicle=address[:5])
+                    await watch.look()
+                    [delivery] = (await watch.report(alarm)).deliveries
+                    assert ("Hostname mismatch" if address == addresses[0] else "answered HTTP 307") in delivery.error
+                    stream.write(delivery.error)
+            said = stream.getvalue().lower()
+    finally:
+        logs.configure()
+    assert "alarm not delivered" in said
+    for part in ("localhost", "127.0.0.1", str(port), str(elsewhere.port), "key:", "word@", "/in/it", "token=7"):
+        assert part not in said, part

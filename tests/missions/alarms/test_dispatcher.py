@@ -137,6 +137,58 @@ async def test_whoever_was_told_hears_that_it_is_over_and_nobody_else_is_called(
     assert shore.requests == []
 
 
+async def test_who_does_not_answer_hears_that_it_is_over_after_that_it_was_raised(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b", "c"], "after_s": 60}]
+    with hook(*[503] * 8) as bridge, hook() as captain, hook() as shore:
+        captain.release.clear()
+        watch = await keep_watch_on_either(told_by(bridge, captain, shore, routes=ladder))
+        other = await watch.raise_alarm(AlarmKind.LEAK)
+        clock.advance(30)
+        alarm = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(30)
+        await watch.dispatcher.look()
+        await until(lambda: watch.dispatcher.sending == {"b"}, "the captain is being told of the first one")
+        clock.advance(30)
+        await watch.dispatcher.look()
+        await until(lambda: len(shore.requests) == 2, "the others are told of both")
+        await watch.end(alarm)
+        captain.release.set()
+        for _ in range(10):
+            await watch.look()
+            clock.advance(60)
+        told = {(d.recipient, d.notice): d.state for d in (await watch.report(alarm)).deliveries}
+    heard = [said["type"] for said in bridge.said if said["data"]["id"] == alarm.id]
+    assert set(heard[:-1]) == {"alarm.raised"}
+    assert heard[-1] == "alarm.ended"
+    assert [said["type"] for said in shore.said if said["data"]["id"] == alarm.id] == ["alarm.escalated", "alarm.ended"]
+    assert told == {
+        ("a", "raised"): DeliveryState.DELIVERED,
+        ("a", "ended"): DeliveryState.DELIVERED,
+        ("b", "escalated"): DeliveryState.SUPERSEDED,
+        ("c", "escalated"): DeliveryState.DELIVERED,
+        ("c", "ended"): DeliveryState.DELIVERED,
+    }, "whom nobody had tried to call is called no more"
+    assert [said["data"]["id"] for said in captain.said] == [other.id]
+
+
+async def test_who_never_answers_is_not_told_for_another_day_that_it_is_over(keep_watch: Keep, clock: Clock) -> None:
+    with hook(*[500] * 20) as program:
+        watch = await keep_watch(told_by(program, give_up_after_s=60))
+        alarm = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(30)
+        await watch.end(alarm)
+        for _ in range(10):
+            await watch.look()
+            clock.advance(30)
+        told = {d.notice: d.state for d in (await watch.report(alarm)).deliveries}
+    assert told == {"raised": DeliveryState.FAILED, "ended": DeliveryState.SUPERSEDED}
+    assert {said["type"] for said in program.said} == {"alarm.raised"}
+
+
 async def test_what_was_over_before_anybody_was_told_is_told_once(keep_watch: Keep) -> None:
     with hook() as program:
         watch = await keep_watch(told_by(program))
@@ -155,6 +207,37 @@ async def test_who_was_not_told_yet_is_not_told_of_what_is_taken(keep_watch: Kee
         await watch.look()
         assert (await watch.report(alarm)).deliveries == []
     assert program.requests == []
+
+
+async def test_what_was_taken_while_it_was_being_told_is_not_told_again_as_raised(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    with hook(503) as program:
+        program.release.clear()
+        watch = await keep_watch_on_either(told_by(program))
+        alarm = await watch.raise_alarm()
+        await watch.dispatcher.look()
+        await until(lambda: len(program.requests) == 1, "it is being told")
+        await watch.dispatcher.acknowledge(alarm.id, "Ana")
+        program.release.set()
+        await watch.sent()
+        clock.advance(600)
+        await watch.look()
+        await watch.look()
+        told = {d.notice: d.state for d in (await watch.report(alarm)).deliveries}
+        assert [said["type"] for said in program.said] == ["alarm.raised", "alarm.acknowledged"]
+        assert told == {"raised": DeliveryState.SUPERSEDED, "acknowledged": DeliveryState.DELIVERED}
+        # The process that was telling it is killed.
+        program.release.clear()
+        second = await watch.raise_alarm(AlarmKind.LEAK)
+        await watch.dispatcher.look()
+        await until(lambda: len(program.requests) == 3, "it is being told")
+        await watch.dispatcher.acknowledge(second.id, "Ana")
+        await end_of_process(watch)
+        program.release.set()
+        after = await keep_watch_on_either(told_by(program))
+        await after.look()
+    assert [said["type"] for said in program.said[2:]] == ["alarm.raised", "alarm.acknowledged"]
 
 
 async def test_the_first_who_acknowledges_stays_and_unknown_alarms_are_refused(keep_watch: Keep, clock: Clock) -> None:
@@ -202,22 +285,82 @@ async def test_two_processes_tell_once(keep_watch_on_either: Keep) -> None:
     assert len(program.ids) == 6
 
 
-async def test_the_same_again_is_shown_but_not_told_again_for_a_while(keep_watch: Keep, clock: Clock) -> None:
+async def test_the_same_again_is_held_back_while_it_goes_on_and_told_when_that_lasts(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
     with hook() as program:
-        watch = await keep_watch(told_by(program, repeat_after_s=60))
+        watch = await keep_watch_on_either(told_by(program, repeat_after_s=60))
         await watch.raise_alarm()
         await watch.look()
         clock.advance(30)
-        again = await watch.raise_alarm()
+        again, more = await watch.raise_alarm(), await watch.raise_alarm()
         other = await watch.raise_alarm(vehicle="b")
         await watch.look()
-        assert (await watch.report(again)).deliveries == []
+        assert [(await watch.report(row)).deliveries for row in (again, more)] == [[], []]
         assert len((await watch.report(other)).deliveries) == 1
         clock.advance(31)
         later = await watch.raise_alarm()
         await watch.look()
-        assert len((await watch.report(later)).deliveries) == 1
-        assert len(await watch.dispatcher.alarms(AlarmState.OPEN)) == 4
+        told = [row for row in (again, more, later) if (await watch.report(row)).deliveries]
+        assert len(told) == 1, "one is told for all that were held back"
+        assert told[0] in (again, more)
+        clock.advance(600)
+        await watch.look()
+        assert len(await watch.dispatcher.alarms(AlarmState.OPEN)) == 5
+    assert len(program.requests) == 3
+
+
+async def test_what_comes_again_after_it_was_over_is_told_at_once_and_escalated(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b"], "after_s": 120}]
+    with hook() as bridge, hook() as captain:
+        watch = await keep_watch_on_either(told_by(bridge, captain, routes=ladder))
+        first = await watch.raise_alarm()
+        await watch.look()
+        clock.advance(20)
+        await watch.end(first)
+        await watch.look()
+        clock.advance(20)
+        again = await watch.raise_alarm()
+        await watch.look()
+        assert [said["type"] for said in bridge.said] == ["alarm.raised", "alarm.ended", "alarm.raised"]
+        assert bridge.said[-1]["data"]["id"] == again.id
+        clock.advance(120)
+        await watch.look()
+    assert [(said["type"], said["data"]["id"]) for said in captain.said] == [("alarm.escalated", again.id)]
+
+
+async def test_what_comes_and_goes_is_told_twice_and_then_once_it_stays(
+    keep_watch_on_either: Keep, clock: Clock
+) -> None:
+    ladder = [{"to": ["a"]}, {"to": ["b"], "after_s": 120}, {"to": ["c"], "after_s": 600}]
+    with hook() as bridge, hook() as captain, hook() as shore:
+        watch = await keep_watch_on_either(told_by(bridge, captain, shore, routes=ladder))
+        for _ in range(12):
+            await watch.end(await watch.raise_alarm())
+            await watch.look()
+            clock.advance(5)
+            row = await watch.raise_alarm()
+            await watch.look()
+            clock.advance(5)
+            await watch.end(row)
+            await watch.look()
+        stays = await watch.raise_alarm()
+        await watch.look()
+        heard = len(bridge.requests)
+        assert heard <= 2 * 2
+        clock.at = BEGAN + timedelta(seconds=299)
+        await watch.look()
+        assert len(bridge.requests) == heard
+        clock.advance(11)
+        await watch.look()
+        assert (bridge.said[-1]["type"], bridge.said[-1]["data"]["id"]) == ("alarm.raised", stays.id)
+        assert [said["type"] for said in captain.said] == ["alarm.escalated"], "it is open for so long already"
+        assert shore.requests == []
+        clock.at = stays.raised_at + timedelta(seconds=600)
+        await watch.look()
+    assert [said["data"]["id"] for said in shore.said] == [stays.id]
 
 
 async def test_a_delivery_that_fails_for_too_long_is_given_up(keep_watch: Keep, clock: Clock) -> None:

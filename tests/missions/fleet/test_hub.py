@@ -75,7 +75,7 @@ async def test_a_vehicle_belongs_to_one_mission_at_a_time(hub: FleetHub) -> None
 
 async def test_what_is_known_of_a_vehicle(hub: FleetHub, rest: RestFleetLink) -> None:
     assert hub.info(A).state is LinkState.UNKNOWN
-    assert "never heard of" in hub.info(A).reason
+    assert "not heard since the service was started" in hub.info(A).reason
     rest.heard(report())
     assert (hub.info(A).state, hub.info(A).report) == (LinkState.READY, report())
     hub.claim(A, "m1", lambda _: None, name="One")
@@ -105,7 +105,7 @@ async def test_a_link_says_itself_what_its_vehicles_can_do() -> None:
     members = [team.join(VehicleSpec(name=kind, kind=VehicleKind(kind)), 0) for kind in ("imc", "rest", "neptus")]
     assert [member.capabilities.circles_m for member in members] == [7.0, 0.0, 0.0]
     assert "launched when its mission starts" in hub.info(members[0].key).reason
-    assert "never heard of" in hub.info(members[1].key).reason
+    assert "not heard since the service was started" in hub.info(members[1].key).reason
     # Nobody comes over a link that is switched off: no mission may wait for that.
     assert [member.capabilities.ready_before_start for member in members] == [False, False, True]
     assert list(hub.polled) == [VehicleKind.IMC, VehicleKind.REST]

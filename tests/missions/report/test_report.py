@@ -13,8 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.missions.clock import now
 from app.missions.errors import MapNotReadyError
 from app.missions.live.mission import LiveMission
+from app.missions.operations import reports
 from app.missions.operations.measurements import measure
 from app.missions.operations.reports import ReportOptions
 from app.missions.report import contents
@@ -127,6 +129,21 @@ async def test_a_report_is_made_once_for_all_who_ask_and_is_the_same_for_the_sam
     answers = await harbour.service.reports.answers(live)
     one, other = (pdf(contents.document_of(answers, Texts(Language.EN))) for _ in range(2))
     assert one == other
+
+
+async def test_a_report_is_the_same_after_a_restart(
+    harbour: Harbour, live: LiveMission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It showed how sure positions were last, and how many maps were made, which the service that ran alone knew."""
+    moment = now()
+    monkeypatch.setattr(reports, "now", lambda: moment)
+    more = measured("a", flown([(3, 12.3), (27, 12.6)], start_s=1_795_235_140.0, spacing_m=2.0))
+    await measure(live, [Measurement.model_validate(item | {"position_sd_m": 0.7}) for item in more])
+    options = ReportOptions(REPORTS["html"])
+    before = (await harbour.service.reports.report(live, options)).content.whole()
+    service = await harbour.reopen()
+    again = await service.get(live.id)
+    assert (await service.reports.report(again, options)).content.whole() == before
 
 
 async def test_a_mission_under_way_has_a_report_of_what_is_known(harbour: Harbour) -> None:

@@ -1,5 +1,7 @@
 """A service with a cluster makes what one without makes, and goes on without it."""
 
+import asyncio
+import signal
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -86,8 +88,37 @@ async def surveyed(service: MissionService) -> LiveMission:
     return live
 
 
+def done(where: str) -> float:
+    return REGISTRY.get_sample_value("bathyfleet_heavy_work_total", {"where": where}) or 0.0
+
+
 def by_the_cluster() -> float:
-    return REGISTRY.get_sample_value("bathyfleet_heavy_work_total", {"where": "cluster"}) or 0.0
+    return done("cluster")
+
+
+async def test_a_forecast_waits_for_a_cluster_that_hangs_no_longer_than_for_this_machine(
+    service: MissionService, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(floor, "KINDS", floor.KINDS[:2])
+    spec = sim_spec(steps=3, planner={"name": "lawnmower"})
+    floors = (await service.forecaster.of_description(spec)).floors
+    by_threads = done("thread")
+    for process, patience_s, answer_s, expected in (
+        (dask.workers[0], 1.0, 60.0, 1),  # nothing comes of it: one floor is flown here all the same
+        (dask.scheduler, 600.0, 1.0, floors),  # it is noticed to be gone: this machine has the rest of the time
+    ):
+        assert process is not None
+        monkeypatch.setattr(request, "PATIENCE_S", patience_s)
+        monkeypatch.setattr(cluster_module, "ANSWER_S", answer_s)
+        await until(lambda: service.compute.elsewhere, "the cluster is there")
+        process.send_signal(signal.SIGSTOP)
+        try:
+            async with asyncio.timeout(90.0):
+                assert (await service.forecaster.of_description(spec)).floors == expected
+        finally:
+            process.send_signal(signal.SIGCONT)
+    assert done("thread") == by_threads, "its floors are flown one after the other, by the forecasts' own thread"
+    await until(lambda: service.compute.elsewhere, "the cluster is there again")
 
 
 async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
@@ -128,10 +159,10 @@ async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
     well, components = await service.ready()
     assert well
     assert dask.address in components["compute"]
-    done = by_the_cluster()
+    before = by_the_cluster()
     assert (await newest_map(last, service.maps)).built.digest == there.built.digest
     assert [(row.tolist(), reason) for row, reason in last.builder.doubted()] == doubted
     assert await service.forecaster.of_description(spec) == foretold
     assert await product() == file
     assert await adjusted(last) == ties
-    assert by_the_cluster() == done
+    assert by_the_cluster() == before

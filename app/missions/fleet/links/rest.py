@@ -108,7 +108,9 @@ class RestFleetLink(VisitedLink):
         poller = self._pollers.get(vehicle)
         if poller is None:
             raise VehicleRefusedError(
-                vehicle, "never heard of", "let it post its position: POST /api/v1/missions/{id}/measurements"
+                vehicle,
+                "not heard since the service was started",
+                "let it post its position: POST /api/v1/missions/{id}/measurements",
             )
         if poller.state is LinkState.LOST:
             raise VehicleRefusedError(vehicle, self._reason(poller.state), "check its connection; it must poll again")

@@ -4,6 +4,7 @@ import asyncio
 import re
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import partial
 
 import structlog
@@ -168,6 +169,10 @@ class Engagement:
         if live.team.get(member.name) is not member:
             return
         link = self._hub.info(member.key).state
+        if link is LinkState.UNKNOWN and member.heard_s is not None:
+            last = datetime.fromtimestamp(member.heard_s, UTC)
+            reason = f"not heard since the service was started, last at {last:%Y-%m-%d %H:%M:%S} UTC"
+            error = VehicleRefusedError(member.name, reason, error.remedy)
         before = self._refused.get(member.name)
         wait_s = min(2.0 * before.wait_s, LONGEST_WAIT_S) if before is not None and before.link is link else PERIOD_S
         self._refused[member.name] = _Refused(asyncio.get_running_loop().time(), wait_s, link)

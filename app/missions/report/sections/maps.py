@@ -38,7 +38,6 @@ def depths(w: Writer) -> list[Block]:
     )
     caption = t("caption_depth", interval=t.number(interval_m, 1 if interval_m < 1 else 0), exaggerated=exaggerated)
     facts: list[tuple[str, Text]] = [
-        (t("fact_version"), w.number("map.version")),
         (t("fact_cell"), w.number("map.cell_m", 2, "m")),
         (t("fact_rows"), w.number("map.rows")),
         (t("fact_cols"), w.number("map.cols")),

@@ -153,7 +153,6 @@ def vehicles(w: Writer) -> list[Block]:
                 w.number(f"{own}.flown_m", 0, "m"),
                 w.number(f"{own}.on_plan_m", 0, "m"),
                 w.number(f"{own}.risings"),
-                w.number(f"{own}.position_sd_m", 1, "m"),
             ]
         )
         place = described.get(vehicle["name"])
@@ -170,12 +169,9 @@ def vehicles(w: Writer) -> list[Block]:
             sonars.append([w.string(f"{own}.name"), *cells])
     blocks: list[Block] = [
         Table(
-            [
-                t(f"column_{name}")
-                for name in ("vehicle", "kind", "sensor", "flown", "on_plan", "risings", "position_sd")
-            ],
+            [t(f"column_{name}") for name in ("vehicle", "kind", "sensor", "flown", "on_plan", "risings")],
             rows,
-            numbers=(3, 4, 5, 6),
+            numbers=(3, 4, 5),
             caption=t("caption_vehicles"),
         )
     ]

@@ -1,10 +1,13 @@
 """Vehicles are asked to follow until they do."""
 
+import re
 from dataclasses import replace
+from datetime import datetime
 from typing import Any
 
 import pytest
 
+from app.missions.clock import now
 from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import FleetEvent, Position, RestartReport, VehicleInfo, VehicleReport
 from app.missions.live.vehicle_reports import VehicleReports
@@ -13,7 +16,9 @@ from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
 from app.missions.team import Member
-from tests.support.missions.harbour import act, sim_spec, until_step
+from app.storage.queries import telemetry as telemetry_queries
+from tests.support.missions.harbour import Harbour, Rover, act, sim_spec, until_step
+from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
 
 
@@ -68,3 +73,30 @@ async def test_a_vehicle_that_restarted_is_said_to_follow_again_however_soon_it_
     step = live.header.step
     await until_step(service, mission.id, step + 2)
     await act(service, mission.id, "abort")
+
+
+async def test_a_vehicle_that_is_not_heard_after_a_restart_is_said_to_have_been_heard_before(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = (await service.create(make_spec(steps=200, vehicles=[{"name": "b", "kind": "rest"}]))).id
+    began = now()
+    async with Rover(service, mission, "b", 20, 20):
+        await act(service, mission, "start")
+        await until_step(service, mission, 1)
+
+        async def stored() -> bool:
+            async with harbour.database.reading() as session:
+                return "b" in await telemetry_queries.last_heard(session, mission)
+
+        await until(stored, "it is stored when it was heard")
+    live = await (await harbour.reopen()).get(mission)
+
+    async def told() -> list[str]:
+        return [event.message for event in await events_after(live) if "not heard since" in event.message]
+
+    await until(told, "it is missed")
+    [said] = await told()
+    found = re.search(r"^b: not heard since the service was started, last at ([0-9: -]+) UTC; let it post", said)
+    assert found is not None, said
+    assert abs((datetime.fromisoformat(found[1] + "+00:00") - began).total_seconds()) < 120.0
+    assert "never heard" not in said
+    await act(harbour.service, mission, "abort")
