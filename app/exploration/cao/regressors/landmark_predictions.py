@@ -104,7 +104,7 @@ def predict(
     positions: FloatArray,
     candidates: FloatArray,
     listed: Listed,
-    goals: FloatArray,
+    goals: FloatArray | None,
     visibility: float,
     noise: float,
     step: float,
@@ -119,8 +119,8 @@ def predict(
         Configurations close to it.
     listed
         The landmarks around each vehicle.
-    goals : (g, 3)
-        Where the vehicles are drawn: a single common goal, or all landmarks, of which each vehicle takes the closest.
+    goals : (n_vehicles, 3) or None
+        Where each vehicle is drawn; None: to the landmark that is closest to it.
     visibility, noise : float
         Of the range sensor.
     step : float
@@ -149,8 +149,8 @@ def predict(
         _pool().map(lambda part: _predict(part, *arguments), parts) if len(parts) > 1 else [_predict(moves, *arguments)]
     )
     progress, completed, squared = (np.concatenate(rows) for rows in zip(*done, strict=True))
-    if len(goals) == 1:
-        squared = ((candidates - goals[0]) ** 2).sum(axis=2)
+    if goals is not None:
+        squared = ((candidates - goals) ** 2).sum(axis=2)
     return np.column_stack([progress, completed, -np.sqrt(squared).sum(axis=1) / step])
 
 

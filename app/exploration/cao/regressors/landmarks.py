@@ -3,7 +3,8 @@
 phi = (expected progress of landmarks in sight towards accuracy, expected newly accurate ones, minus the sum over the
 vehicles of the distance to the closest open landmark, in steps). Unseen landmarks are taken to be as deep as the
 closest seen one. While nothing is gained the whole team heads for one common landmark: vehicles that pull towards
-different ones under a communication limit would hold each other back for ever.
+different ones under a communication limit would hold each other back for ever. Each goes there round keep-out zones,
+and so high that it comes over what lies between: of small changes none leads out from behind a wall.
 """
 
 from typing import Any
@@ -16,13 +17,18 @@ from app.estimation import RangeSensor, Sensor
 from app.exploration.cao.regressors.landmark_predictions import Listed, predict, within_reach
 from app.exploration.cao.regressors.moves import team_moves
 from app.exploration.core.bottom import Bottom
+from app.exploration.core.constraints import Constraints
 from app.exploration.core.information_need import lacking
 from app.exploration.core.problem import Situation
+from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.measured import MeasuredObjective
 from app.exploration.planner.options import PlannerOptions
 
 PATIENCE = 3
 """Steps without a new accurate landmark after which the team heads for one common landmark."""
+
+SAME_OF_STEP = 1e-3
+"""A corner of a way this close, in steps, is passed."""
 
 
 class LandmarkRegressors:
@@ -36,6 +42,7 @@ class LandmarkRegressors:
         self._measured = MeasuredObjective(sensor, options)
         self._accurate = 0
         self._idle = 0
+        self._space: tuple[Constraints, FreeSpace] | None = None
 
     def begin(self, team: Situation, bottom: Bottom, seed: int) -> FloatArray:
         """See :class:`app.exploration.cao.planner.Regressors`."""
@@ -58,11 +65,31 @@ class LandmarkRegressors:
         gained = int(belief.accurate.sum()) > self._accurate
         self._accurate = int(belief.accurate.sum())
         self._idle = 0 if gained else self._idle + 1
-        self._goals = self._points
+        self._goals: FloatArray | None = None
         if self._idle >= PATIENCE and len(self._points):
             squared = ((self._points[None, :, :2] - team.positions[:, None, :2]) ** 2).sum(axis=2)
-            self._goals = self._points[[int(squared.min(axis=0).argmin())]]
+            self._goals = self._ways_to(self._points[int(squared.min(axis=0).argmin())], bottom)
         return J
+
+    def _ways_to(self, goal: FloatArray, bottom: Bottom) -> FloatArray:
+        """Return where each vehicle heads (n_vehicles, 3) to come to a landmark (3,)."""
+        team = self._team
+        ends = np.repeat(goal[None], len(team.positions), axis=0)
+        if team.constraints.keep_out:
+            space = self._free(team.constraints)
+            there, same = space.nearest(goal[:2]), SAME_OF_STEP * team.constraints.max_step_m
+            ends[:, :2] = [space.corner(here, there, same) for here in team.positions[:, :2]]
+        away = np.hypot(*(ends - team.positions)[:, :2].T).max()
+        along = np.linspace(0.0, 1.0, 2 + int(2.0 * away / bottom.cell_m))[:, None, None]
+        ways = team.positions[:, :2] + along * (ends - team.positions)[:, :2]
+        highest = np.fmin.reduce(bottom.at(ways), axis=0, initial=np.inf) - team.constraints.min_altitude_m
+        ends[:, 2] = np.maximum(np.minimum(ends[:, 2], highest), team.constraints.min_depth_m)
+        return ends
+
+    def _free(self, constraints: Constraints) -> FreeSpace:
+        if self._space is None or self._space[0] is not constraints:
+            self._space = constraints, FreeSpace(constraints, 0.0)
+        return self._space[1]
 
     def prior(self, team: Situation) -> tuple[FloatArray, float]:
         """Progress and completed landmarks count alike; the pull of far ones is gentle."""
