@@ -244,6 +244,12 @@ async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: 
         ({"window_s": 60.0}, CheckStatus.WARNING, "there and back"),
         # All that a look round shows is nearer to what nobody has looked at than legs may be.
         ({"scanner": {"reach_m": 2.5}}, CheckStatus.WARNING, "the scanner reaches 2.5 m"),
+        ({"goal_radius_m": 0.1}, CheckStatus.WARNING, "holds no open cell: no cell's centre is within 0.1 m of it"),
+        (
+            {"goal": lon_lat(28.5, 15), "goal_radius_m": 1.0},
+            CheckStatus.WARNING,
+            "no open cell: known obstacles cover it",
+        ),
     ]
     for change, status, words in cases:
         mission = await service.create(search_spec(search=change))
