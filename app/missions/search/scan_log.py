@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable, Sequence
+from datetime import datetime
+from typing import Any
 
 from sqlalchemy.ext.asyncio import AsyncSession
 
@@ -23,16 +25,21 @@ async def take(
 ) -> tuple[list[ItemVerdict], Callable[[], None]]:
     """Store scans in the caller's transaction; ``seen`` is called when they are in the grid.
 
+    One that was refused may be sent again as it should have been: what is accepted takes the refused one's place.
+
     Returns
     -------
     The verdicts in the order of the reports, and what to call once the transaction has committed.
     """
     known = await scan_queries.known_scans(session, mission_id, [_identity(r) for r in reports if _storable(r)])
+    refused_before = [scan for scan, verdict in known.items() if verdict != Verdict.ACCEPTED]
     verdicts: list[ItemVerdict] = []
-    rows, fresh = [], []
+    rows: dict[scan_queries.Identity, dict[str, Any]] = {}
+    fresh = []
     received = now()
     for index, report in enumerate(reports):
-        if _identity(report) in known:
+        scan = _identity(report)
+        if known.get(scan) == Verdict.ACCEPTED:
             verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
             continue
         reason = search.refusal(report)
@@ -40,35 +47,42 @@ async def take(
         verdicts.append(ItemVerdict(index=index, verdict=verdict, reason=reason))
         if not _storable(report):
             continue
-        known.add(_identity(report))
-        rows.append(
-            {
-                "mission_id": mission_id,
-                "vehicle": report.vehicle,
-                "time_s": report.time_s,
-                "received_at": received,
-                "step": step,
-                "source": report.source,
-                "lat_deg": report.position.lat_deg,
-                "lon_deg": report.position.lon_deg,
-                "depth_m": report.position.depth_m,
-                "first_bearing_deg": report.first_bearing_deg,
-                "bearing_step_deg": report.bearing_step_deg,
-                "reach_m": report.reach_m,
-                "ranges": scan_queries.pack_ranges(report.ranges_m),
-                "verdict": verdict,
-                "reason": reason,
-            }
-        )
+        known[scan] = verdict
+        # The last to be judged is stored last: a restart adds them to the grid in this order.
+        rows.pop(scan, None)
+        rows[scan] = _row(mission_id, report, step, received, verdict, reason)
         if not reason:
             fresh.append(report)
-    await scan_queries.add_scans(session, rows)
+    await scan_queries.remove_scans(session, mission_id, [scan for scan in refused_before if scan in rows])
+    await scan_queries.add_scans(session, list(rows.values()))
 
     def committed() -> None:
         search.see(fresh)
         seen()
 
     return verdicts, committed
+
+
+def _row(
+    mission_id: str, report: ScanReport, step: int, received_at: datetime, verdict: Verdict, reason: str
+) -> dict[str, Any]:
+    return {
+        "mission_id": mission_id,
+        "vehicle": report.vehicle,
+        "time_s": report.time_s,
+        "received_at": received_at,
+        "step": step,
+        "source": report.source,
+        "lat_deg": report.position.lat_deg,
+        "lon_deg": report.position.lon_deg,
+        "depth_m": report.position.depth_m,
+        "first_bearing_deg": report.first_bearing_deg,
+        "bearing_step_deg": report.bearing_step_deg,
+        "reach_m": report.reach_m,
+        "ranges": scan_queries.pack_ranges(report.ranges_m),
+        "verdict": verdict,
+        "reason": reason,
+    }
 
 
 def report_of(row: ScanRow) -> ScanReport:

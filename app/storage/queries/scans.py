@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from sqlalchemy import insert, select, tuple_
+from sqlalchemy import ColumnElement, and_, delete, insert, select, tuple_
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.storage.models import ScanRow
@@ -13,19 +13,27 @@ from app.storage.models import ScanRow
 Identity = tuple[str, float]
 """What makes a scan the same scan within a mission: vehicle, vehicle's time."""
 
+IDENTITY = (ScanRow.vehicle, ScanRow.time_s)
 CHUNK = 300
 
 
-async def known_scans(session: AsyncSession, mission_id: str, wanted: Sequence[Identity]) -> set[Identity]:
-    """Return those of the scans that are stored already."""
-    columns = (ScanRow.vehicle, ScanRow.time_s)
-    found: set[Identity] = set()
+async def known_scans(session: AsyncSession, mission_id: str, wanted: Sequence[Identity]) -> dict[Identity, str]:
+    """Return the verdicts on those of the scans that are stored already."""
+    found: dict[Identity, str] = {}
     for first in range(0, len(wanted), CHUNK):
-        query = select(*columns).where(
-            ScanRow.mission_id == mission_id, tuple_(*columns).in_(wanted[first : first + CHUNK])
-        )
-        found |= {(vehicle, time_s) for vehicle, time_s in await session.execute(query)}
+        query = select(*IDENTITY, ScanRow.verdict).where(_are(mission_id, wanted[first : first + CHUNK]))
+        found |= {(vehicle, time_s): verdict for vehicle, time_s, verdict in await session.execute(query)}
     return found
+
+
+async def remove_scans(session: AsyncSession, mission_id: str, unwanted: Sequence[Identity]) -> None:
+    """Take scans out that others come in place of."""
+    for first in range(0, len(unwanted), CHUNK):
+        await session.execute(delete(ScanRow).where(_are(mission_id, unwanted[first : first + CHUNK])))
+
+
+def _are(mission_id: str, scans: Sequence[Identity]) -> ColumnElement[bool]:
+    return and_(ScanRow.mission_id == mission_id, tuple_(*IDENTITY).in_(scans))
 
 
 async def add_scans(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> None:

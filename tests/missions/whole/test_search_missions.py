@@ -140,6 +140,27 @@ async def test_scans_are_judged_one_by_one_and_stored_once(service: MissionServi
     assert view.version == 1
 
 
+async def test_a_scan_that_was_refused_can_be_sent_again_as_it_should_be(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = await service.create(search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    live = await service.get(mission.id)
+    wrong, right = all_round(-9, 5, 1.0), all_round(14, 5, 1.0)
+    for _ in range(2):
+        [refused] = (await scan(live, [wrong])).items
+        assert (refused.verdict, "outside of the site" in refused.reason) == (Verdict.REJECTED, True)
+    [corrected] = (await scan(live, [right])).items
+    assert corrected.verdict is Verdict.ACCEPTED
+    # In one batch just so; and what was accepted stays, whatever comes after it.
+    several = [all_round(-9, 5, 2.0), all_round(14, 5, 2.0), wrong]
+    verdicts = [item.verdict for item in (await scan(live, several)).items]
+    assert verdicts == [Verdict.REJECTED, Verdict.ACCEPTED, Verdict.DUPLICATE]
+    before = search_grid(live)
+    assert before is not None
+    assert before.version == 2
+    service = await harbour.reopen()
+    assert search_grid(await service.get(mission.id)) == before
+
+
 async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up(service: MissionService) -> None:
     mission = await service.create(
         search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}], search={"simulated_obstacles": []})
