@@ -212,6 +212,18 @@ def test_no_leg_leads_closer_to_a_hazard_than_asked_whatever_a_planner_says() ->
     assert [note.partition(":")[0] for note in notes] == ["unseen"]
 
 
+def test_no_leg_leads_through_what_has_just_come_up_however_often_it_was_clear_there() -> None:
+    spec = search_spec()
+    assert spec.search is not None
+    search = Search(spec, spec.search, spec.frame(), 1.0)
+    search.see([report_of_posted(all_round(14, 5, float(k))) for k in range(10)])
+    here, end = np.array([14.0, 5.0]), np.array([14.0, 11.0])
+    assert search.clear(here, end)
+    came_up = {"first_bearing_deg": -20.0, "bearing_step_deg": 1.0, "ranges_m": [4.0] * 41}
+    search.see([report_of_posted(all_round(14, 5, 10.0, **came_up))])
+    assert not search.clear(here, end)
+
+
 async def test_what_a_search_lacks_is_told_field_by_field(service: MissionService) -> None:
     wrong: list[tuple[dict[str, Any], str]] = [
         ({"kind": "survey"}, "kind is survey and search is given"),
