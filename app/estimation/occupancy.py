@@ -98,6 +98,7 @@ class OccupancyGrid:
         ranges_m: FloatArray,
         reach_m: float,
         *,
+        passing: BoolArray | None = None,
         doubt_m: float = 0.0,
     ) -> "OccupancyGrid":
         """Return the grid after a scan.
@@ -115,6 +116,9 @@ class OccupancyGrid:
             Clockwise from north.
         ranges_m : (n,)
             To the echo; inf where there was none within ``reach_m``; NaN: the beam is left out.
+        passing : (n,)
+            Beams whose echo is of what only passes by: short of it is free, of itself and of what is beyond they say
+            nothing. None: of no beam.
         doubt_m : float
             How far an echo may lie in front of an obstacle of the blueprint and still come from it: neither ranges nor
             positions are exact.
@@ -127,6 +131,7 @@ class OccupancyGrid:
             np.asarray(bearings_rad, dtype=np.float64),
             np.asarray(ranges_m, dtype=np.float64) / self.cell_m,
             reach_m / self.cell_m,
+            np.zeros(len(ranges_m), dtype=np.bool_) if passing is None else passing,
             self.blueprint,
             doubt_m / self.cell_m,
         )
@@ -166,6 +171,7 @@ def _mark(
     bearings: FloatArray,
     ranges: FloatArray,
     reach: float,
+    passing: BoolArray,
     blueprint: BoolArray,
     doubt: float,
 ) -> None:
@@ -176,6 +182,7 @@ def _mark(
             continue
         echo = ranges[k] <= reach
         length = ranges[k] + INTO if echo else reach
+        echo = echo and not passing[k]
         east, north = np.sin(bearings[k]), np.cos(bearings[k])
         col, row = int(np.floor(start[0])), int(np.floor(start[1]))
         step_c, step_r = (1 if east > 0 else -1), (1 if north > 0 else -1)

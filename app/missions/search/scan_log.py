@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -9,6 +10,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, ScanReport
+from app.missions.search.mates import Mates
 from app.missions.search.state import Search
 from app.missions.views.measurements.soundings import ItemVerdict, Verdict
 from app.storage.models import ScanRow
@@ -17,6 +19,7 @@ from app.storage.queries import scans as scan_queries
 
 async def take(
     search: Search,
+    mates: Mates,
     mission_id: str,
     seen: Callable[[], None],
     reports: Sequence[ScanReport],
@@ -25,7 +28,8 @@ async def take(
 ) -> tuple[list[ItemVerdict], Callable[[], None]]:
     """Store scans in the caller's transaction; ``seen`` is called when they are in the grid.
 
-    One that was refused may be sent again as it should have been: what is accepted takes the refused one's place.
+    ``mates`` tells which beams ended on a vehicle of the team. A scan that was refused may be sent again as it should
+    have been: what is accepted takes the place of what was not.
 
     Returns
     -------
@@ -37,8 +41,8 @@ async def take(
     rows: dict[scan_queries.Identity, dict[str, Any]] = {}
     fresh = []
     received = now()
-    for index, report in enumerate(reports):
-        scan = _identity(report)
+    for index, told in enumerate(reports):
+        report, scan = told, _identity(told)
         if known.get(scan) == Verdict.ACCEPTED:
             verdicts.append(ItemVerdict(index=index, verdict=Verdict.DUPLICATE, reason="already stored"))
             continue
@@ -48,11 +52,13 @@ async def take(
         if not _storable(report):
             continue
         known[scan] = verdict
+        place_m = None if reason else search.place_m(report)
+        if place_m is not None:
+            report = replace(report, mates=mates.beams_on(report, place_m))
+            fresh.append(report)
         # The last to be judged is stored last: a restart adds them to the grid in this order.
         rows.pop(scan, None)
         rows[scan] = _row(mission_id, report, step, received, verdict, reason)
-        if not reason:
-            fresh.append(report)
     await scan_queries.remove_scans(session, mission_id, [scan for scan in refused_before if scan in rows])
     await scan_queries.add_scans(session, list(rows.values()))
 
@@ -79,14 +85,15 @@ def _row(
         "first_bearing_deg": report.first_bearing_deg,
         "bearing_step_deg": report.bearing_step_deg,
         "reach_m": report.reach_m,
-        "ranges": scan_queries.pack_ranges(report.ranges_m),
+        "ranges": scan_queries.pack_ranges(report.ranges_m, report.mates),
         "verdict": verdict,
         "reason": reason,
     }
 
 
 def report_of(row: ScanRow) -> ScanReport:
-    """Return a stored scan as it came."""
+    """Return a stored scan as it was taken in."""
+    ranges_m, mates = scan_queries.unpack_ranges(row.ranges)
     return ScanReport(
         vehicle=row.vehicle,
         time_s=row.time_s,
@@ -94,8 +101,9 @@ def report_of(row: ScanRow) -> ScanReport:
         first_bearing_deg=row.first_bearing_deg,
         bearing_step_deg=row.bearing_step_deg,
         reach_m=row.reach_m,
-        ranges_m=scan_queries.unpack_ranges(row.ranges),
+        ranges_m=ranges_m,
         source=row.source,
+        mates=mates,
     )
 
 

@@ -78,8 +78,10 @@ class Search:
             bearings = np.radians(scan.first_bearing_deg + scan.bearing_step_deg * np.arange(len(scan.ranges_m)))
             # As they are stored: a restart makes the same grid of them.
             ranges = np.array(scan.ranges_m, dtype=np.float32).astype(np.float64)
+            passing = np.zeros(len(ranges), dtype=np.bool_)
+            passing[list(scan.mates)] = True
             doubt_m = DOUBT_CELLS * self._grid.cell_m
-            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m, doubt_m=doubt_m)
+            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m, passing=passing, doubt_m=doubt_m)
             self.version += 1
         if scans:
             self._figures = self._ground = self._ways = None

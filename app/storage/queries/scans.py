@@ -50,11 +50,15 @@ async def accepted_scans(session: AsyncSession, mission_id: str, until_step: int
     return (await session.scalars(query.order_by(ScanRow.id))).all()
 
 
-def pack_ranges(ranges_m: Sequence[float]) -> bytes:
-    """Return ranges as they are stored."""
-    return zlib.compress(np.array(ranges_m, dtype="<f4").tobytes(), level=1)
+def pack_ranges(ranges_m: Sequence[float], mates: Sequence[int] = ()) -> bytes:
+    """Return ranges as they are stored; ``mates`` are the beams that ended on a vehicle of the team."""
+    stored = np.array(ranges_m, dtype="<f4")
+    stored[list(mates)] *= -1.0
+    return zlib.compress(stored.tobytes(), level=1)
 
 
-def unpack_ranges(stored: bytes) -> tuple[float, ...]:
-    """Return stored ranges."""
-    return tuple(np.frombuffer(zlib.decompress(stored), dtype="<f4").astype(np.float64).tolist())
+def unpack_ranges(stored: bytes) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Return the stored ranges of an accepted scan, and the beams that ended on a vehicle of the team."""
+    ranges = np.frombuffer(zlib.decompress(stored), dtype="<f4").astype(np.float64)
+    mates = np.flatnonzero(np.signbit(ranges) & ~np.isnan(ranges))
+    return tuple(np.abs(ranges).tolist()), tuple(mates.tolist())
