@@ -182,6 +182,16 @@ class Search:
         whole = self.way_m(here_m, end_m)
         return self._way_m(lambda ground: ground.way_towards(here_m, end_m)) if whole is None else whole
 
+    def gets_away(self, en_m: FloatArray) -> bool:
+        """Return whether a vehicle at a place (2,) gets a step away from there, by ways that are known now."""
+        grounds = (self._seen_ground, Ground.of(self.task(0.0)))
+        return any(ground.reaches_m(en_m) >= self._step_m for ground in grounds)
+
+    @property
+    def may_see_more(self) -> bool:
+        """Whether there are cells that nobody has looked at."""
+        return bool((self._grid.states == Cell.UNEXPLORED).any())
+
     def may_be_open(self, en_m: FloatArray) -> bool:
         """Return whether a place (2,) is on the site and keeps the safety distance from what is known to stand there.
 
