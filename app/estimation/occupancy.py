@@ -11,8 +11,8 @@ from app.arrays import BoolArray, FloatArray
 
 HIT, MISS = 1.2, -0.4
 """Logarithmic odds that one scan adds to a cell where a beam ended, or that beams only passed."""
-CLAMP = (-3.0, 4.0)
-"""Bounds of the evidence, so that a boat that left can be unlearned."""
+CLAMP = (-2.0, 4.0)
+"""Bounds of the evidence: a boat that left can be unlearned, and of two echoes in free water the second counts."""
 CLOSE = 0.1
 """Distance between the places beyond an echo that are looked at, in cells."""
 INTO = 1e-9
@@ -98,12 +98,15 @@ class OccupancyGrid:
         ranges_m: FloatArray,
         reach_m: float,
         *,
+        passing: BoolArray | None = None,
         doubt_m: float = 0.0,
     ) -> "OccupancyGrid":
         """Return the grid after a scan.
 
-        Every cell that beams pass or end in is counted once per scan; an echo in it outweighs beams that pass. An echo
-        in the cell that the scanner is in counts for the next one: no obstacle fills a cell that a vehicle is in.
+        Every cell that beams pass or end in is counted once per scan; an echo in it outweighs beams that pass, and
+        where no obstacle stands beside it all that was seen there before: something came. Beside an obstacle it may
+        be that one, since neither ranges nor positions are exact. An echo in the cell that the scanner is in counts
+        for the next one: no obstacle fills a cell that a vehicle is in.
 
         Parameters
         ----------
@@ -113,6 +116,9 @@ class OccupancyGrid:
             Clockwise from north.
         ranges_m : (n,)
             To the echo; inf where there was none within ``reach_m``; NaN: the beam is left out.
+        passing : (n,)
+            Beams whose echo is of what only passes by: short of it is free, of itself and of what is beyond they say
+            nothing. None: of no beam.
         doubt_m : float
             How far an echo may lie in front of an obstacle of the blueprint and still come from it: neither ranges nor
             positions are exact.
@@ -125,6 +131,7 @@ class OccupancyGrid:
             np.asarray(bearings_rad, dtype=np.float64),
             np.asarray(ranges_m, dtype=np.float64) / self.cell_m,
             reach_m / self.cell_m,
+            np.zeros(len(ranges_m), dtype=np.bool_) if passing is None else passing,
             self.blueprint,
             doubt_m / self.cell_m,
         )
@@ -164,6 +171,7 @@ def _mark(
     bearings: FloatArray,
     ranges: FloatArray,
     reach: float,
+    passing: BoolArray,
     blueprint: BoolArray,
     doubt: float,
 ) -> None:
@@ -174,6 +182,7 @@ def _mark(
             continue
         echo = ranges[k] <= reach
         length = ranges[k] + INTO if echo else reach
+        echo = echo and not passing[k]
         east, north = np.sin(bearings[k]), np.cos(bearings[k])
         col, row = int(np.floor(start[0])), int(np.floor(start[1]))
         step_c, step_r = (1 if east > 0 else -1), (1 if north > 0 else -1)
@@ -198,9 +207,12 @@ def _mark(
             else:
                 next_r += per_r
                 row += step_r
+    standing = blueprint | (evidence > 0.0)
     for row in range(rows):
         for col in range(cols):
             if passed[row, col] > 0:
-                before = evidence[row, col]
+                before = 0.0 if np.isnan(evidence[row, col]) else evidence[row, col]
                 told = HIT if passed[row, col] == 2 else MISS
-                evidence[row, col] = min(max((0.0 if np.isnan(before) else before) + told, CLAMP[0]), CLAMP[1])
+                if told == HIT and not standing[max(row - 1, 0) : row + 2, max(col - 1, 0) : col + 2].any():
+                    before = max(before, 0.0)
+                evidence[row, col] = min(max(before + told, CLAMP[0]), CLAMP[1])

@@ -93,6 +93,24 @@ def test_an_obstacle_that_left_is_unlearned_and_a_beam_without_a_value_says_noth
     assert (silent.states == Cell.UNEXPLORED).all()
 
 
+def test_what_comes_up_in_water_that_was_often_seen_free_is_an_obstacle_at_its_first_echo() -> None:
+    grid = OccupancyGrid.from_blueprint(np.zeros((5, 9), dtype=bool), 1.0)
+    place, east = np.array([0.5, 2.5]), np.array([np.pi / 2])
+
+    def seen(grid: OccupancyGrid, range_m: float, times: int = 1) -> OccupancyGrid:
+        for _ in range(times):
+            grid = grid.seen_from(place, east, np.array([range_m]), 8.0)
+        return grid
+
+    came = seen(seen(grid, np.inf, times=20), 4.0)
+    assert came.states[2, 4] == Cell.FOUND
+    assert (came.states[2, :4] == Cell.EXPLORED).all()
+    # Beside an obstacle an echo may come from that one: it takes two.
+    beside = seen(came, 3.0)
+    assert beside.states[2, 3] == Cell.EXPLORED
+    assert seen(beside, 3.0).states[2, 3] == Cell.FOUND
+
+
 @pytest.mark.parametrize("range_m", [0.1, 0.3, 0.499, 0.501])
 def test_an_obstacle_close_by_is_never_in_the_cell_that_the_vehicle_is_in(range_m: float) -> None:
     nothing = OccupancyGrid.from_blueprint(np.zeros((5, 5), dtype=bool), 1.0)

@@ -127,6 +127,11 @@ class Ground:
         leg = np.hypot(*(self.centre_m(cells) - origin_m).T)
         return float(np.min(self.metres(distance[cells[:, 0], cells[:, 1]]) + leg))
 
+    def reaches_m(self, origin_m: FloatArray) -> float:
+        """Return how far the farthest place is to which ways lead from a position (2,); 0 where none leads anywhere."""
+        far_m = self.metres(self.distances(self.beside(origin_m)))
+        return float(far_m.max(initial=0.0, where=np.isfinite(far_m)))
+
     def metres(self, fifths: FloatArray | NDArray[np.int32] | int) -> FloatArray:
         """Return distances in metres; inf where there is no way."""
         far = np.asarray(fifths, dtype=np.float64)

@@ -147,7 +147,7 @@ class ScanReport:
     """A look round: ranges along bearings, clockwise from true north, the first one and so much more for each.
 
     A range is infinite where nothing was met within ``reach_m``, NaN where a beam is left out. ``position`` is
-    where the vehicle was.
+    where the vehicle was. ``mates`` are the beams that ended on a vehicle of its team, once that was looked at.
     """
 
     vehicle: str
@@ -158,6 +158,7 @@ class ScanReport:
     reach_m: float
     ranges_m: tuple[float, ...]
     source: str
+    mates: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

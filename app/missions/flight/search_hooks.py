@@ -69,10 +69,12 @@ class SearchHooks:
         course, live = self._course, self._live
         if course is None:
             return
-        rest_s = asyncio.get_running_loop().time() + REST_S / self._time_scale
-        if course.idle:
-            version = course.search.version
-            await self._wait(lambda: course.search.version > version, rest_s)
+        if course.idle >= IDLE_STEPS:
+            if not await self._come_free(course):
+                await self._wait(lambda: False, self._in(course.rest_s))
+        elif course.idle:
+            await self._scanned(course)
+        rest_s = self._in(REST_S)
         if await self._wait(lambda: not course.unseen(live.team.present), rest_s):
             return
         blind = course.unseen(live.team.present)
@@ -81,17 +83,34 @@ class SearchHooks:
         await self._wait(lambda: not course.unseen(live.team.present), None)
         await live.journal.end([AlarmKind.NO_SCAN], "scans tell again what is around every vehicle")
 
+    async def _come_free(self, course: Course) -> bool:
+        """Wait while obstacles hold everybody and there is time; return whether that was so and is over."""
+        was_held = False
+        while course.held(self._live.team.present) and not course.little_left:
+            was_held = True
+            await self._scanned(course)
+        return was_held and not course.little_left
+
+    async def _scanned(self, course: Course) -> None:
+        """Wait for a scan, for a while."""
+        version = course.search.version
+        await self._wait(lambda: course.search.version > version, self._in(REST_S))
+
+    def _in(self, vehicle_s: float) -> float:
+        """Return the event loop's time after a time of the vehicles'."""
+        return asyncio.get_running_loop().time() + vehicle_s / self._time_scale
+
     async def tell_of(self, barred: list[Member]) -> None:
         """Write down why a step ends early."""
         names = [member.name for member in barred]
         message = f"something was seen on the way of {', '.join(names)}: another way is taken"
         await self._live.journal.log(Level.WARNING, "obstacle", message, step=self._live.header.step, vehicles=names)
 
-    async def is_over(self, decision: Decision, step_s: float) -> bool:
-        """Note how a step went that took ``step_s`` on the wall clock; tell whether it was a search's last one."""
+    async def why_over(self, decision: Decision, step_s: float) -> str:
+        """Note how a step went that took ``step_s`` on the wall clock; return why it was a search's last one, or ""."""
         course, live = self._course, self._live
         if course is None:
-            return False
+            return ""
         team = live.team.present
         legs = [np.hypot(*(leg.target_m[:2] - decision.origin_m[leg.vehicle])) for leg in decision.legs]
         course.note(np.array(legs), step_s * self._time_scale)
@@ -104,12 +123,31 @@ class SearchHooks:
             then = "the mission ends where they are" if last else "they go on to the entry"
             message = f"{why} and not everybody is back (from the entry: {far}): {then}"
             await live.journal.alarm(AlarmKind.SEARCH_LATE, message, vehicles=away)
-        if away and course.idle == IDLE_STEPS:
-            stand = "stands" if len(away) == 1 else "stand"
-            message = (
-                f"nobody can go anywhere from where {', '.join(away)} {stand}: no way that was looked at is wide "
-                "enough and leads on, or to the entry. Bring them there, or make search.safety_m smaller in a new "
-                "mission"
-            )
-            await live.journal.alarm(AlarmKind.SEARCH_STUCK, message, vehicles=away)
-        return course.over(team, int(decision.terms.get("homebound", 0)))
+        homebound, homewards = decision.terms.get("homebound", 0.0), decision.terms.get("homewards", 1.0)
+        over = course.over(team, int(homebound), homewards=bool(homewards))
+        if not over:
+            await self._tell_of_standstill(course, team, away)
+        return over
+
+    async def _tell_of_standstill(self, course: Course, team: list[Member], away: list[str]) -> None:
+        """Raise an alarm, once, where nobody can go anywhere, and end it when somebody goes again."""
+        alarms, stuck = self._live.journal, AlarmKind.SEARCH_STUCK
+        if course.idle < IDLE_STEPS:
+            if course.idle == 0 and alarms.alarms.standing([stuck]):
+                await alarms.end([stuck], "a vehicle goes on")
+            return
+        if course.told_stuck or not (away or course.held(team)):
+            return
+        course.told_stuck = True
+        names = away or [member.name for member in team]
+        stand = "stands" if len(names) == 1 else "stand"
+        leads, then = (
+            ("on, or to the entry", "Bring them there")
+            if away
+            else ("away from the entry", "The search waits for scans that show one. Look at what stands there")
+        )
+        message = (
+            f"nobody can go anywhere from where {', '.join(names)} {stand}: no way that was looked at is wide enough "
+            f"and leads {leads}. {then}, or make search.safety_m smaller in a new mission"
+        )
+        await alarms.alarm(stuck, message, vehicles=names)

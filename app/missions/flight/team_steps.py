@@ -91,9 +91,9 @@ class TeamSteps:
             # The map is made and its model refined while the vehicles travel.
             self._maps.begin()
             decision = await self._travel()
-            if await self._lookout.is_over(taken, asyncio.get_running_loop().time() - started_s):
+            if over := await self._lookout.why_over(taken, asyncio.get_running_loop().time() - started_s):
                 if not live.team.held:
-                    return "everybody is back at the entry"
+                    return over
                 # Those that are back have nothing to do; who is held is not left at sea.
                 await self._waiting.until(lambda: not live.team.held, None)
                 decision = None

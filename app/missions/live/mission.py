@@ -17,7 +17,7 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Pings, reach_m
 from app.missions.errors import ConflictError
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import FleetEvent
+from app.missions.fleet.interface import FleetEvent, VehicleReport
 from app.missions.flown import Phase
 from app.missions.live.boundaries import Boundaries
 from app.missions.live.header import Ending, MissionHeader, StoredMission
@@ -42,6 +42,7 @@ from app.missions.pings.gate import PingGate
 from app.missions.pings.store import PingStore
 from app.missions.recovery.energy import Energy
 from app.missions.recovery.failsafes import STRENGTH
+from app.missions.search.mates import Mates
 from app.missions.search.progress import progress_of
 from app.missions.search.scan_log import take
 from app.missions.search.state import Search
@@ -114,7 +115,12 @@ class LiveMission:
         self.pings = PingStore(database, row.id, PingGate(self.frame, self.gate.outside), ping_files)
         """All its pings."""
         self.builder.swath.place = corrections.beams
-        take_scans = None if self.search is None else partial(take, self.search, row.id, self.changed.set)
+        self._mates = None if search is None else Mates(self.team, lambda m: hub.info(m.key).report, spec, self.frame)
+        take_scans = (
+            None
+            if search is None or self._mates is None
+            else partial(take, search, self._mates, row.id, self.changed.set)
+        )
         self.journal = Journal(
             database,
             row.id,
@@ -312,6 +318,8 @@ class LiveMission:
     def receive(self, event: FleetEvent) -> None:
         """Take an event from one of this mission's vehicles; called from the event loop, never blocks."""
         self.reports.take(event, self.spec, running=self._counting, standing=bool(self.standstill))
+        if self._mates is not None and isinstance(event, VehicleReport):
+            self._mates.note(event.vehicle)
 
     def withdraw(
         self, member: Member, response: Response, why: str, *, asked: bool = False, done: bool = False

@@ -21,7 +21,7 @@ SCANS_AT_ONCE = 20
 async def scan(live: LiveMission, items: Sequence[Scan]) -> BatchVerdict:
     """Take in scans; what is counted accepted is stored for good and in the grid when this returns.
 
-    A scan is known by its vehicle and time: sent again, it is a duplicate.
+    A scan is known by its vehicle and time: sent again once it was accepted, it is a duplicate.
 
     Raises
     ------

@@ -84,6 +84,16 @@ def _ways(search: Search, spec: MissionSpec) -> CheckView:
             "vehicle gets away from it",
             remedy="Move search.entry, or make search.safety_m smaller",
         )
+    if not (task.in_goal & ~task.grid.blueprint).any():
+        radius_m = search.spec.goal_radius_m
+        why = "known obstacles cover it" if task.in_goal.any() else f"no cell's centre is within {radius_m:g} m of it"
+        return CheckView(
+            id=check,
+            title=title,
+            status=WARNING,
+            message=f"the goal area holds no open cell: {why}; nobody will look at it, and its share stays 0 %",
+            remedy=f"Move search.goal, or make search.goal_radius_m larger; cells are {task.grid.cell_m:g} m wide",
+        )
     goal_m = ground.metres(int(far[task.in_goal].min(initial=UNREACHED))).item()
     if not np.isfinite(goal_m):
         return CheckView(

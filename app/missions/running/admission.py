@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from shapely import Polygon, unary_union
 
+from app.exploration.pcao.planner import PcaoPlanner
 from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
 from app.missions.errors import InvalidRequestError
 from app.missions.flight.own_legs import least_way_m
@@ -25,6 +26,12 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
     if name not in there:
         what = f"{name!r} plans no missions of kind {spec.kind}" if name in PLANNERS | COVERERS else missing(name)
         raise InvalidRequestError("planner.name", what, use)
+    if spec.planner.options.model is not None and name != PcaoPlanner.name:
+        raise InvalidRequestError(
+            "planner.options.model",
+            f"a trained controller is given, and planner {name!r} does not fly with one",
+            f"only {PcaoPlanner.name} flies with a model: leave it out, or use that planner",
+        )
     if name in COVERERS and spec.limits.com_range_m is not None:
         raise InvalidRequestError(
             "limits.com_range_m",

@@ -27,7 +27,7 @@ STILL_M = 0.1
 LITTLE = 0.05
 """Part of the time window that is not worth going out again for once everybody is back."""
 IDLE_STEPS = 3
-"""Decisions in a row that send nobody anywhere while all are at the entry: nothing is left to do."""
+"""Decisions in a row that send nobody anywhere: the search stands still."""
 
 
 @dataclass
@@ -49,6 +49,7 @@ class Course:
     travelled_s: float = field(init=False)
     idle: int = 0
     told_late: bool = False
+    told_stuck: bool = False
 
     def __post_init__(self) -> None:
         self.travelled_m = FIRST_STEPS * self.spec.limits.max_step_m
@@ -86,6 +87,7 @@ class Course:
         longest_m = float(legs_m.max(initial=0.0))
         self.idle = 0 if longest_m > STILL_M else self.idle + 1
         if longest_m > STILL_M:
+            self.told_stuck = False
             self.travelled_m += longest_m
             self.travelled_s += vehicle_s
 
@@ -94,12 +96,47 @@ class Course:
         radius_m = self.search.home_radius_m(len(team))
         return [m.name for m in team if self.search.way_to_entry_m(m.place_m(self.frame)) > radius_m]
 
-    def over(self, team: Sequence[Member], homebound: int) -> bool:
-        """Return whether everybody is back and has nothing more to do, or no time for it."""
+    @property
+    def rest_s(self) -> float:
+        """Vehicle time from one decision to the next while nobody moves: no less than a step takes, or none is left."""
+        return max(REST_S, self.spec.limits.max_step_m / self.spec.speed_mps)
+
+    def held(self, team: Sequence[Member]) -> bool:
+        """Return whether nobody gets a step away from where it is by what is known now, though something is unseen."""
+        some = self.search.may_see_more and len(team) > 0
+        return some and not any(self.search.gets_away(member.place_m(self.frame)) for member in team)
+
+    @property
+    def little_left(self) -> bool:
+        """Whether the time that is left is not worth going out again."""
+        return self.search.left_s() <= LITTLE * self.search.spec.window_s
+
+    def over(self, team: Sequence[Member], homebound: int, *, homewards: bool) -> str:
+        """Return why a search is over: everybody is back and has nothing more to do, or no time for it; else "".
+
+        Parameters
+        ----------
+        homebound
+            Vehicles that its planner sends home for want of time, or of a way.
+        homewards
+            Whether no view is left to fly to, or its planner comes home by itself.
+        """
         if not team or self.away(team):
-            return False
-        little = LITTLE * self.search.spec.window_s
-        return homebound >= len(team) or self.idle >= IDLE_STEPS or self.search.left_s() <= little
+            return ""
+        back = "everybody is back at the entry"
+        if self.held(team):
+            return f"{back}, where obstacles held them: {self._unseen}" if self.little_left else ""
+        if self.idle >= IDLE_STEPS and homewards:
+            return back
+        if self.little_left:
+            return f"{back} and the time is up: {self._unseen}"
+        return back if homebound >= len(team) else ""
+
+    @property
+    def _unseen(self) -> str:
+        figures = self.search.figures
+        goal_pct, site_pct = 100.0 * (1.0 - figures.explored_goal_part), 100.0 * (1.0 - figures.explored_part)
+        return f"{goal_pct:.0f} % of the goal area and {site_pct:.0f} % of the site were not seen"
 
 
 def hold_before_hazards(

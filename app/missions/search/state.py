@@ -78,8 +78,10 @@ class Search:
             bearings = np.radians(scan.first_bearing_deg + scan.bearing_step_deg * np.arange(len(scan.ranges_m)))
             # As they are stored: a restart makes the same grid of them.
             ranges = np.array(scan.ranges_m, dtype=np.float32).astype(np.float64)
+            passing = np.zeros(len(ranges), dtype=np.bool_)
+            passing[list(scan.mates)] = True
             doubt_m = DOUBT_CELLS * self._grid.cell_m
-            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m, doubt_m=doubt_m)
+            self._grid = self._grid.seen_from(place, bearings, ranges, scan.reach_m, passing=passing, doubt_m=doubt_m)
             self.version += 1
         if scans:
             self._figures = self._ground = self._ways = None
@@ -179,6 +181,16 @@ class Search:
         """
         whole = self.way_m(here_m, end_m)
         return self._way_m(lambda ground: ground.way_towards(here_m, end_m)) if whole is None else whole
+
+    def gets_away(self, en_m: FloatArray) -> bool:
+        """Return whether a vehicle at a place (2,) gets a step away from there, by ways that are known now."""
+        grounds = (self._seen_ground, Ground.of(self.task(0.0)))
+        return any(ground.reaches_m(en_m) >= self._step_m for ground in grounds)
+
+    @property
+    def may_see_more(self) -> bool:
+        """Whether there are cells that nobody has looked at."""
+        return bool((self._grid.states == Cell.UNEXPLORED).any())
 
     def may_be_open(self, en_m: FloatArray) -> bool:
         """Return whether a place (2,) is on the site and keeps the safety distance from what is known to stand there.

@@ -81,7 +81,7 @@ class ScanRow(Base):
     """A look round by a vehicle of a search, in the order in which scans were judged.
 
     ``ranges`` holds little-endian float32 metres, compressed by zlib: infinite without an echo, NaN for a beam that is
-    left out.
+    left out, negative in an accepted scan for one that ended so far away on a vehicle of the team.
     """
 
     __tablename__ = "scans"

@@ -3,10 +3,13 @@
 from typing import Any
 
 import pytest
+from sqlalchemy import update
 
+from app.exploration.pcao.model import default_model
 from app.missions.errors import InvalidRequestError
 from app.missions.service import MissionService
-from tests.support.missions.harbour import sim_spec
+from app.storage.models import MissionRow
+from tests.support.missions.harbour import Harbour, sim_spec
 from tests.support.missions.specs import rectangle
 
 
@@ -38,6 +41,28 @@ async def test_limits_that_contradict_each_other_are_refused(
         await service.create(sim_spec("a", "b", **changes))
     assert caught.value.field == field
     assert await service.rows() == []
+
+
+@pytest.mark.parametrize("planner", ["cao", "lawnmower", "rollout"])
+async def test_a_trained_controller_is_refused_for_planners_that_do_not_fly_with_one(
+    service: MissionService, planner: str
+) -> None:
+    """It was taken, and the mission flown without it."""
+    options = {"model": default_model().model_dump(mode="json")}
+    with pytest.raises(InvalidRequestError, match=f"planner '{planner}' does not fly with one") as caught:
+        await service.create(sim_spec("a", planner={"name": planner, "options": options}))
+    assert (caught.value.field, "only pcao" in str(caught.value.remedy)) == ("planner.options.model", True)
+    assert (await service.create(sim_spec("a", planner={"name": "pcao", "options": options}))).state == "ready"
+
+
+async def test_a_mission_that_was_stored_with_a_controller_for_another_planner_opens(harbour: Harbour) -> None:
+    mission = await harbour.service.create(sim_spec("a", planner={"name": "cao"}))
+    spec = (await harbour.service.get(mission.id)).spec.model_dump(mode="json")
+    spec["planner"]["options"]["model"] = default_model().model_dump(mode="json")
+    async with harbour.database.writing() as session:
+        await session.execute(update(MissionRow).where(MissionRow.id == mission.id).values(spec=spec))
+    service = await harbour.reopen()
+    assert (await service.get(mission.id)).spec.planner.options.model is not None
 
 
 @pytest.mark.parametrize(

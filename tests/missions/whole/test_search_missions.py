@@ -140,6 +140,27 @@ async def test_scans_are_judged_one_by_one_and_stored_once(service: MissionServi
     assert view.version == 1
 
 
+async def test_a_scan_that_was_refused_can_be_sent_again_as_it_should_be(harbour: Harbour) -> None:
+    service = harbour.service
+    mission = await service.create(search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}]))
+    live = await service.get(mission.id)
+    wrong, right = all_round(-9, 5, 1.0), all_round(14, 5, 1.0)
+    for _ in range(2):
+        [refused] = (await scan(live, [wrong])).items
+        assert (refused.verdict, "outside of the site" in refused.reason) == (Verdict.REJECTED, True)
+    [corrected] = (await scan(live, [right])).items
+    assert corrected.verdict is Verdict.ACCEPTED
+    # In one batch just so; and what was accepted stays, whatever comes after it.
+    several = [all_round(-9, 5, 2.0), all_round(14, 5, 2.0), wrong]
+    verdicts = [item.verdict for item in (await scan(live, several)).items]
+    assert verdicts == [Verdict.REJECTED, Verdict.ACCEPTED, Verdict.DUPLICATE]
+    before = search_grid(live)
+    assert before is not None
+    assert before.version == 2
+    service = await harbour.reopen()
+    assert search_grid(await service.get(mission.id)) == before
+
+
 async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up(service: MissionService) -> None:
     mission = await service.create(
         search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}], search={"simulated_obstacles": []})
@@ -189,6 +210,18 @@ def test_no_leg_leads_closer_to_a_hazard_than_asked_whatever_a_planner_says() ->
     held, notes = hold_before_hazards(search.task(100.0), ("free", "unseen", "lost"), origin, wishes)
     np.testing.assert_array_equal(held[:2], [wishes[0], origin[1]])
     assert [note.partition(":")[0] for note in notes] == ["unseen"]
+
+
+def test_no_leg_leads_through_what_has_just_come_up_however_often_it_was_clear_there() -> None:
+    spec = search_spec()
+    assert spec.search is not None
+    search = Search(spec, spec.search, spec.frame(), 1.0)
+    search.see([report_of_posted(all_round(14, 5, float(k))) for k in range(10)])
+    here, end = np.array([14.0, 5.0]), np.array([14.0, 11.0])
+    assert search.clear(here, end)
+    came_up = {"first_bearing_deg": -20.0, "bearing_step_deg": 1.0, "ranges_m": [4.0] * 41}
+    search.see([report_of_posted(all_round(14, 5, 10.0, **came_up))])
+    assert not search.clear(here, end)
 
 
 async def test_what_a_search_lacks_is_told_field_by_field(service: MissionService) -> None:
@@ -244,6 +277,12 @@ async def test_the_checklist_says_when_nobody_could_leave_or_get_there(service: 
         ({"window_s": 60.0}, CheckStatus.WARNING, "there and back"),
         # All that a look round shows is nearer to what nobody has looked at than legs may be.
         ({"scanner": {"reach_m": 2.5}}, CheckStatus.WARNING, "the scanner reaches 2.5 m"),
+        ({"goal_radius_m": 0.1}, CheckStatus.WARNING, "holds no open cell: no cell's centre is within 0.1 m of it"),
+        (
+            {"goal": lon_lat(28.5, 15), "goal_radius_m": 1.0},
+            CheckStatus.WARNING,
+            "no open cell: known obstacles cover it",
+        ),
     ]
     for change, status, words in cases:
         mission = await service.create(search_spec(search=change))
