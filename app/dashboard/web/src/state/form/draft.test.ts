@@ -37,6 +37,18 @@ describe("a wrong value is named with what would be right", () => {
   });
 });
 
+describe("a trained controller", () => {
+  const options = { ...draft.options, model: { kind: "pcao" } } as unknown as typeof draft.options;
+
+  it.each([
+    ["pcao", true],
+    ["cao", false],
+  ] as const)("goes along with %s: %s", (planner, goes) => {
+    const mission = toMission({ ...draft, planner, options });
+    expect("model" in (mission.planner?.options ?? {})).toBe(goes);
+  });
+});
+
 describe("swath sonars", () => {
   const swath = { ...draft, sensor: "multibeam" as const, planner: "swath" };
 

@@ -421,7 +421,7 @@ export function toMission(described: Draft): NewMission {
       : {}),
     ...(draft.kind === "search"
       ? searchOf(draft, vehicles)
-      : { planner: { name: draft.planner, options: draft.options } }),
+      : { planner: { name: draft.planner, options: optionsOf(draft) } }),
   };
   const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
@@ -475,6 +475,12 @@ export interface Estimate {
 }
 
 /** How long a mission takes at most and how far its vehicles go; null while that is not said. */
+/** A planner's options: a trained controller, of a file, is of no use to any but `pcao`. */
+function optionsOf(draft: Draft): PlannerOptions {
+  const { model, ...others } = draft.options;
+  return draft.planner === "pcao" && model ? draft.options : others;
+}
+
 export function estimate(described: Draft, area_m2: number): Estimate | null {
   const draft = resolved(described);
   const shares = vehicleNames(draft).map((name): Share => {
