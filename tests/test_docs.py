@@ -1,5 +1,6 @@
 """The documentation says what is true: commands, options, paths, settings, examples and links exist as written."""
 
+import inspect
 import json
 import re
 import runpy
@@ -30,6 +31,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.planner.options import PlannerOptions
 from app.main import create_app
+from app.missions.fleet.interface import FleetEvent, FleetLink
 from app.missions.spec.limits import Limits
 from app.missions.spec.mission import MissionSpec
 from app.settings import Settings
@@ -312,3 +314,17 @@ def test_the_guides_name_every_problem_limit_and_field() -> None:
     assert set(re.findall(r"^\| `(\w+)` \|", guide.partition("## Describing")[2].partition("## Limits")[0], re.M)) <= (
         set(MissionSpec.model_fields)
     )
+
+
+def test_the_guide_to_vehicle_types_tells_of_every_method_and_event() -> None:
+    text = (PROJECT / "docs/adding-a-vehicle-type.md").read_text()
+    rows = re.findall(r"^\| (`[^|]*`) \|", text, re.MULTILINE)
+    told = [call for row in rows for call in re.findall(r"`(\w+)(?:\(([^)]*)\))?`", row)]
+    methods = {name: member for name, member in vars(FleetLink).items() if not name.startswith("_")}
+    for name, given in told:
+        member = methods.pop(name, None)
+        if inspect.isfunction(member):
+            parameters = list(inspect.signature(member).parameters)[1:]
+            assert [one.split("=")[0].strip() for one in given.split(",") if one.strip()] == parameters
+    assert not methods
+    assert {event.__name__ for event in get_args(FleetEvent)} <= {name for name, _ in told}
