@@ -518,7 +518,7 @@ class LiveMission:
         if self.reports.leg_s is None:
             return None
         committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
-        leg_m, flying = self.spec.limits.max_step_m, [*self.team.present, *self.team.held]
+        leg_m, flying = self.spec.limits.max_step_m, [*self.team.plannable, *self.team.held]
         legs = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
         return (max(0.0, *legs) + max(committed, default=0)) * self.reports.leg_s
 

@@ -306,7 +306,7 @@ def _names(batch: _Batch) -> set[str]:
 
 def _member(live: LiveMission, name: str) -> Member:
     # One that left meanwhile was still heard.
-    return live.team.get(name) or live.team.left[name]
+    return live.team.get(name) or live.team.departed[name]
 
 
 def _impossible_depth(item: Measurement) -> str:
