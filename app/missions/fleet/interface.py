@@ -401,7 +401,7 @@ class FleetLink(ABC):
     def deploy(self, deployment: Deployment) -> None:  # noqa: B027
         """Prepare a vehicle for the mission that takes it; harmless to repeat. Raises VehicleRefusedError."""
 
-    def withdraw(self, deployment: Deployment) -> None:  # noqa: B027
+    def end_deployment(self, deployment: Deployment) -> None:  # noqa: B027
         """Undo ``deploy``: the mission has ended."""
 
     @abstractmethod

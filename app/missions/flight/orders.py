@@ -35,7 +35,7 @@ from app.storage.models import VehicleOrderRow
 from app.storage.queries import orders as order_queries
 
 LEGS_SEEN = 400
-"""So many of a vehicle's last legs are looked at for its lines."""
+"""At most so many of a vehicle's last legs are looked at for its lines."""
 
 THERE_M = 1.0
 """A leg that ends so near the end of an order's way is its last."""

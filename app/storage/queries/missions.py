@@ -17,7 +17,7 @@ ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id
 
 
 CHUNK = 500
-"""So many ids are asked for at once."""
+"""At most so many ids are asked for in one query."""
 
 
 async def summaries(session: AsyncSession, mission_ids: Sequence[str]) -> Sequence[tuple[str, dict[str, Any]]]:
