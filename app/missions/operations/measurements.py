@@ -19,7 +19,7 @@ from app.missions.fleet.interface import BeamGeometry, PingReport, Position, Ran
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
 from app.missions.pings.store import BEAMS_PER_ITEM, JudgedBatch
-from app.missions.soundings.gate import impossible_place
+from app.missions.soundings.gate import impossible_coordinates, impossible_place
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.vehicle import Sensor
 from app.missions.states import MissionState
@@ -362,7 +362,7 @@ def _ranges(live: LiveMission, items: Sequence[Measurement], refusals: Mapping[i
 
 def _all_near(items: Sequence[Measurement], frame: LocalFrame) -> bool:
     """Tell whether every place is possible: at once, which costs far less than one by one."""
-    if not all(-90 <= item.lat_deg <= 90 and -180 <= item.lon_deg <= 180 for item in items):
+    if any(impossible_coordinates(item.lat_deg, item.lon_deg) for item in items):
         return False
     try:
         frame.to_local([item.lat_deg for item in items], [item.lon_deg for item in items])
@@ -372,10 +372,8 @@ def _all_near(items: Sequence[Measurement], frame: LocalFrame) -> bool:
 
 
 def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
-    if not -90 <= item.lat_deg <= 90:
-        return f"lat_deg: {item.lat_deg} is not between -90 and 90"
-    if not -180 <= item.lon_deg <= 180:
-        return f"lon_deg: {item.lon_deg} is not between -180 and 180"
+    if reason := impossible_coordinates(item.lat_deg, item.lon_deg):
+        return reason
     try:
         frame.to_local(item.lat_deg, item.lon_deg)
     except ValueError as error:
