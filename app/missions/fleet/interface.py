@@ -57,6 +57,11 @@ class Position:
     lon_deg: float
     depth_m: float
 
+    @property
+    def lat_lon(self) -> tuple[float, float]:
+        """Latitude and longitude, degrees."""
+        return self.lat_deg, self.lon_deg
+
 
 @dataclass(frozen=True, slots=True)
 class VehicleReport:
