@@ -188,9 +188,8 @@ class MapBuilder:
             self._building.release()
 
     def _new_model(self) -> GaussianProcessMap:
-        model = GaussianProcessMap(reject_outliers=False)  # outliers are judged by ``learn``
-        model.least_merge_m = FINEST_CELLS * self.grid.cell_m
-        return model
+        # Outliers are judged by ``learn``.
+        return GaussianProcessMap(reject_outliers=False, least_merge_m=FINEST_CELLS * self.grid.cell_m)
 
     @property
     def is_current(self) -> bool:
