@@ -196,12 +196,6 @@ async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | No
     return (await session.scalars(query)).first()
 
 
-async def waypoints_of_step(session: AsyncSession, mission_id: str, step: int) -> Sequence[WaypointRow]:
-    """Return the waypoints of one step."""
-    query = select(WaypointRow).where(WaypointRow.mission_id == mission_id, WaypointRow.step == step)
-    return (await session.scalars(query.order_by(WaypointRow.vehicle))).all()
-
-
 async def steps_after(session: AsyncSession, mission_id: str, after: int, limit: int) -> Sequence[StepRow]:
     """Return up to ``limit`` steps with a number above ``after``, without the planner's memory, first to last."""
     query = select(StepRow).where(StepRow.mission_id == mission_id, StepRow.number > after).order_by(StepRow.number)
