@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from imc_bridge.control.control import Phase
-from imc_bridge.control.controls import Crew
+from imc_bridge.control.controls import Controls
 from imc_bridge.control.depth_layers import ALONE, DepthLayer
 from imc_bridge.control.way_home import MOST_PLACES, guarded
 from imc_bridge.events import (
@@ -31,8 +31,8 @@ from imc_bridge.network.transport import Address, Transport
 from imc_bridge.nodes.node import Node
 from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.nodes.status import status_of
-from imc_bridge.receiver import Hearing
-from imc_bridge.sender import Speaker
+from imc_bridge.receiver import Receiver
+from imc_bridge.sender import Sender
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.views import view_of
 
@@ -90,27 +90,27 @@ class Bridge:
         self._on_event: EventCallback = lambda _event: None
         self._registry = NodeRegistry(settings)
         self.transport = Transport(settings, self.on_packet, self.on_announce)
-        self._speaker = Speaker(settings, self.transport, self._registry, commanding=commanding, wall_clock=wall_clock)
-        self._crew = Crew(settings, self._speaker.send, self._tell, wall_clock)
+        self._sender = Sender(settings, self.transport, self._registry, commanding=commanding, wall_clock=wall_clock)
+        self._controls = Controls(settings, self._sender.send, self._tell, wall_clock)
         self._links = Links(self._tell, wall_clock)
-        self._hearing = Hearing(
+        self._receiver = Receiver(
             settings,
             self._registry,
-            self._crew,
+            self._controls,
             self._links,
             self._tell,
             self._note_error,
             clock,
             wall_clock,
-            self._speaker,
+            self._sender,
         )
-        self._registry.capacity.in_use = self._crew.works_with
-        self._registry.left += [self._crew.forget, self._links.forget, self._hearing.forget]
-        self.board = self._speaker.board
+        self._registry.capacity.in_use = self._controls.works_with
+        self._registry.left += [self._controls.forget, self._links.forget, self._receiver.forget]
+        self.board = self._sender.board
         """What other consoles are shown."""
-        self.decoder, self.announces = self._hearing.decoder, self._hearing.announces
+        self.decoder, self.announces = self._receiver.decoder, self._receiver.announces
         """Count what arrived at the traffic and at the announce socket."""
-        self.admission = self._hearing.admission
+        self.admission = self._receiver.admission
         """Counts what was refused, and why."""
         self.drops = DropMeter(self.transport.dropped)
         """Counts what this machine threw away before we could read it."""
@@ -140,7 +140,7 @@ class Bridge:
         self._on_event = on_event
         self.transport.open()
         self._started_at = self._clock()
-        self._speaker.begin(self._now())
+        self._sender.begin(self._now())
         self._task = asyncio.create_task(self._run(), name="imc-bridge")
 
     @property
@@ -152,10 +152,10 @@ class Bridge:
         """Stop every engaged vehicle, restore rates, release the ports; safe to repeat."""
         if self._task is None:
             return
-        busy = [control.node for control in self._crew if control.engaged or control.phase is Phase.STOPPING]
+        busy = [control.node for control in self._controls if control.engaged or control.phase is Phase.STOPPING]
         # Nobody leads them from here on: their ways home stay armed.
         await asyncio.gather(*(self._stop(node, CLOSE_TIMEOUT_WALL_S) for node in busy))
-        self._crew.restore_rates()
+        self._controls.restore_rates()
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._task
@@ -175,15 +175,15 @@ class Bridge:
     @property
     def double(self) -> str:
         """Names of other systems that announce our own id; usually empty."""
-        return self._hearing.double
+        return self._receiver.double
 
     def on_packet(self, packet: bytes, address: Address) -> None:
         """Take a packet of the traffic socket; also the way to replay a recording."""
-        self._hearing.on_packet(packet, address)
+        self._receiver.on_packet(packet, address)
 
     def on_announce(self, packet: bytes, address: Address) -> None:
         """Take a packet of the announce socket; also the way to replay a recording."""
-        self._hearing.on_announce(packet, address)
+        self._receiver.on_announce(packet, address)
 
     # What the user asks
 
@@ -195,10 +195,10 @@ class Bridge:
                 node,
                 now,
                 self.settings.time_scale,
-                engaged=self._crew.engaged(node),
+                engaged=self._controls.engaged(node),
                 history=self._links.history(node),
-                rate_limiters=self._crew.rates_text(node),
-                way_home=way_home.text if (way_home := self._crew.way_home(node)) is not None else "",
+                rate_limiters=self._controls.rates_text(node),
+                way_home=way_home.text if (way_home := self._controls.way_home(node)) is not None else "",
             )
             for node in self._registry
             if name is None or node.name == name
@@ -210,7 +210,7 @@ class Bridge:
 
     def position_rad(self) -> tuple[float, float]:
         """The place that we announce as ours."""
-        return self._speaker.position_rad()
+        return self._sender.position_rad()
 
     async def engage(self, vehicle: str, guidance: Guidance = Guidance.FOLLOW, gateway: str = "") -> None:
         """Make the vehicle ours: with references it then holds its place at the surface, with legs it floats.
@@ -229,13 +229,13 @@ class Bridge:
         """
         node = self._commanded(vehicle)
         self.want(vehicle)
-        self._crew.guide(node, guidance)
-        control = self._crew.of(node)
+        self._controls.guide(node, guidance)
+        control = self._controls.of(node)
         if guidance is Guidance.ACOUSTIC:
-            self._crew.attach_sound(node, gateway, self._registry, self._now)
+            self._controls.attach_sound(node, gateway, self._registry, self._now)
         if not control.engaged and control.engage(self._now()):
-            self._crew.rates_of(node).begin()
-            way_home = self._crew.way_home(node)
+            self._controls.rates_of(node).begin()
+            way_home = self._controls.way_home(node)
             if way_home is not None:
                 way_home.engaged()
         while control.engaged and control.phase is not Phase.FOLLOWING:
@@ -270,19 +270,19 @@ class Bridge:
         node = self._commanded(vehicle)
         if not 0 < len(way) <= MOST_PLACES:
             raise RefusedError(vehicle, f"its way home has {len(way)} places", f"Give it 1 to {MOST_PLACES}")
-        self._crew.way_home_of(node).keep(guarded(way, self._crew.of(node).guard, node, self._now(), layer))
+        self._controls.way_home_of(node).keep(guarded(way, self._controls.of(node).guard, node, self._now(), layer))
         await self._confirmed(node)
 
     async def drop_way_home(self, vehicle: str) -> None:
         """Leave no way home on board; raises RefusedError when that is not confirmed."""
         node = self._commanded(vehicle)
-        self._crew.way_home_of(node).drop()
+        self._controls.way_home_of(node).drop()
         await self._confirmed(node)
 
     async def _confirmed(self, node: Node) -> None:
-        way_home = self._crew.way_home_of(node)
+        way_home = self._controls.way_home_of(node)
         while way_home.busy:
-            if not self._speaker.talks_to(node):
+            if not self._sender.talks_to(node):
                 raise RefusedError(node.name, "we do not talk to it", "See `imc.vehicles` in the settings")
             await self._turn.wait()
         if way_home.refusal is not None:
@@ -291,7 +291,7 @@ class Bridge:
     def intervention(self, vehicle: str) -> str:
         """Return why a vehicle left us of its own or another console's will, until :meth:`stop` is called; else ''."""
         node = self._registry.named(vehicle)
-        return self._crew.of(node).intervention if node is not None and self._commanding else ""
+        return self._controls.of(node).intervention if node is not None and self._commanding else ""
 
     def goto(self, vehicle: str, waypoint: Waypoint) -> None:
         """Replace the vehicle's waypoint; its progress is reported by events.
@@ -302,7 +302,7 @@ class Bridge:
             When the vehicle is not engaged.
         """
         node = self._registry.named(vehicle)
-        control = self._crew.get(node) if node is not None else None
+        control = self._controls.get(node) if node is not None else None
         if control is None or not control.engaged:
             refusal = control.refusal if control is not None else None
             raise RefusedError(
@@ -324,13 +324,13 @@ class Bridge:
             return StopResult(vehicle, False, "never heard of")
         if not self._commanding:
             return StopResult(vehicle, False, "this bridge only listens")
-        way_home = self._crew.way_home(node)
+        way_home = self._controls.way_home(node)
         if way_home is not None:
             way_home.stopped()
         return await self._stop(node, timeout_s)
 
     async def _stop(self, node: Node, timeout_s: float) -> StopResult:
-        vehicle, control = node.name, self._crew.of(node)
+        vehicle, control = node.name, self._controls.of(node)
         if status_of(node, self._now()).state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE):
             # It is out of reach, and is stopped when its packets arrive again.
             timeout_s = min(timeout_s, SILENT_STOP_WALL_S)
@@ -353,7 +353,7 @@ class Bridge:
                 await asyncio.wait_for(self._turn.wait(), timeout_s - waited)
         if control.engaged:
             return StopResult(vehicle, False, "engaged again while it was being stopped")
-        self._crew.rates_of(node).restore()
+        self._controls.rates_of(node).restore()
         self._links.check(node, control, self._now())
         return StopResult(vehicle, True, control.stop_detail or "stopped")
 
@@ -388,7 +388,7 @@ class Bridge:
             log.warning("The IMC bridge was held up for %.1f s", seconds / self.settings.time_scale)
         for node in self._registry:
             node.excuse(seconds, now)
-        for control in self._crew:
+        for control in self._controls:
             control.excuse(seconds, now)
 
     def pass_time(self) -> None:
@@ -399,16 +399,16 @@ class Bridge:
             self._note_error(error)
 
     def _tick(self, now: float) -> None:
-        self._speaker.tick(now)
+        self._sender.tick(now)
         lost = self.drops.look(self._clock())
         if lost:
             self._tell(PacketsDropped(lost))
         for node in self._registry:
-            if node.is_vehicle and self._speaker.talks_to(node):
-                self._alone(partial(self._crew.tick, node, now))
+            if node.is_vehicle and self._sender.talks_to(node):
+                self._alone(partial(self._controls.tick, node, now))
         self._registry.pass_time(now)
         for node in self._registry:
-            self._alone(partial(self._links.check, node, self._crew.get(node), now))
+            self._alone(partial(self._links.check, node, self._controls.get(node), now))
 
     def _alone(self, work: Callable[[], None]) -> None:
         """Do what concerns one vehicle: whatever goes wrong in it keeps the others' references from no tick."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import imcpy
 
 from imc_bridge.control.control import Control
-from imc_bridge.control.controls import Crew
+from imc_bridge.control.controls import Controls
 from imc_bridge.events import BridgeEvent, Fault, PingRefused, Restarted, Sounding, SoundingRefused, SwathPing
 from imc_bridge.links import Links
 from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
@@ -18,7 +18,7 @@ from imc_bridge.nodes.node import Node
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.nodes.vehicle_clock import Tick
-from imc_bridge.sender import Speaker
+from imc_bridge.sender import Sender
 from imc_bridge.settings import BridgeSettings
 from imc_bridge.telemetry.faults import is_leak_sensor
 from imc_bridge.telemetry.ranges import MESSAGES as RANGE_MESSAGES
@@ -52,13 +52,13 @@ MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 ANNOUNCE_AGAIN_S = 1.0
 
 
-class Hearing:
+class Receiver:
     """Takes packets in. Nothing that arrives can raise out of it.
 
     Parameters
     ----------
     settings
-    registry, crew, links
+    registry, controls, links
         Known nodes, controlled vehicles and their links; each is updated.
     tell
         Receives events for the bridge's user.
@@ -68,7 +68,7 @@ class Hearing:
         Seconds of the wall clock that never step back.
     wall_clock
         Unix seconds.
-    speaker
+    sender
         Answers newcomers.
     """
 
@@ -76,13 +76,13 @@ class Hearing:
         self,
         settings: BridgeSettings,
         registry: NodeRegistry,
-        crew: Crew,
+        controls: Controls,
         links: Links,
         tell: Callable[[BridgeEvent], None],
         failed: Callable[[Exception], None],
         clock: Callable[[], float],
         wall_clock: Callable[[], float],
-        speaker: Speaker,
+        sender: Sender,
     ) -> None:
         self.decoder = Decoder(WANTED)
         self.announces = Decoder(("Announce",))
@@ -90,13 +90,13 @@ class Hearing:
         """Names of other systems that announce our own id; usually empty."""
         self._settings = settings
         self._registry = registry
-        self._crew = crew
+        self._controls = controls
         self._links = links
         self._tell = tell
         self._note_error = failed
         self._clock = clock
         self._wall_clock = wall_clock
-        self._speaker = speaker
+        self._sender = sender
         self._state_reported: dict[int, float] = {}
         self.admission = Admission(settings, registry, clock)
 
@@ -137,13 +137,13 @@ class Hearing:
     def _greet(self, announcement: Announcement, address: Address, now: float) -> None:
         """Speak once to a system without a place: one that is there answers, and has shown thereby that it is."""
         self._registry.newcomers.note(announcement, address[0])
-        self._speaker.greet(announcement, address[0])
+        self._sender.greet(announcement, address[0])
         self._answer(now)
 
     def _answer(self, now: float) -> None:
         """Announce ourselves, so that a newcomer need not wait for our next announce."""
-        if now - self._speaker.announced_at > ANNOUNCE_AGAIN_S:
-            self._speaker.announce(now)
+        if now - self._sender.announced_at > ANNOUNCE_AGAIN_S:
+            self._sender.announce(now)
 
     def _take_up(self, announcement: Announcement, host: str, now: float) -> None:
         arrival = self._registry.announced(announcement, host, now)
@@ -152,8 +152,8 @@ class Hearing:
         node = arrival.node
         if announcement.is_vehicle:
             # Its guard learns the bottom from the first sounding on.
-            self._crew.of(node)
-        streams = self._speaker.transport.streams
+            self._controls.of(node)
+        streams = self._sender.transport.streams
         for stale in arrival.stale:
             streams.drop(stale)
         if node.address is not None and node.address in announcement.streams:
@@ -162,7 +162,7 @@ class Hearing:
             self._reboot(node, now)
         if arrival.first or arrival.rebooted:
             self._answer(now)
-        self._links.check(node, self._crew.get(node), now)
+        self._links.check(node, self._controls.get(node), now)
 
     def _counts(self, imc_id: int, timestamp: float, address: Address, now: float) -> bool:
         """Whether an announce may change where a node is: neither a stranger's, nor one that was recorded before."""
@@ -174,7 +174,7 @@ class Hearing:
 
     def _look_for_double(self, announcement: Announcement, address: Address) -> None:
         """Our own announces come back to us; those of another system under our id are trouble."""
-        ours = (*self._speaker.transport.own_addresses(), address[0])
+        ours = (*self._sender.transport.own_addresses(), address[0])
         if announcement.name == self._settings.name and any(
             host in ours and port == self._settings.port for host, port in announcement.addresses
         ):
@@ -183,13 +183,13 @@ class Hearing:
 
     def _reboot(self, node: Node, now: float) -> None:
         self._tell(Restarted(node.name, node.submerged))
-        control, way_home = self._crew.get(node), self._crew.way_home(node)
+        control, way_home = self._controls.get(node), self._controls.way_home(node)
         if way_home is not None:
             way_home.restarted()
         if control is not None:
             control.rebooted(now)
             if control.engaged:
-                self._crew.rates_of(node).begin()
+                self._controls.rates_of(node).begin()
 
     def on_packet(self, packet: bytes, address: Address) -> None:
         """Take a packet of the traffic socket; also the way to replay a recording."""
@@ -204,27 +204,27 @@ class Hearing:
         if header is None:
             return
         now = self._now()
-        sender = self._registry.speaker(header.src, address) or self._newcomer(header.src, address, now)
-        if sender is None:
+        node = self._registry.speaker(header.src, address) or self._newcomer(header.src, address, now)
+        if node is None:
             self._pass_on(header, packet, address, now)
             return
-        if sender.packets == 0:
-            if not self._registry.capacity.may_be_heard(sender, address[0]):
+        if node.packets == 0:
+            if not self._registry.capacity.may_be_heard(node, address[0]):
                 self.admission.refuse(Refused.CROWDED, address)
                 return
-            self._registry.first_heard(sender)
-        if header.msg_id != SIMULATED_STATE and not sender.clock.is_old(header.timestamp):
+            self._registry.first_heard(node)
+        if header.msg_id != SIMULATED_STATE and not node.clock.is_old(header.timestamp):
             # DUNE's simulation lets that one through where radio would not reach.
-            sender.heard(now, address)
+            node.heard(now, address)
         if not self.decoder.wants(header):
             return
-        if header.msg_id == ENTITY_STATE and not is_leak_sensor(sender.entity_name(header.src_ent)):
+        if header.msg_id == ENTITY_STATE and not is_leak_sensor(node.entity_name(header.src_ent)):
             # Dozens of entities tell how they are every second.
             self.decoder.unwanted["EntityState"] += 1
             return
         message = self.decoder.message(without_argument(packet))
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
-            self._take_message(sender, message, now, address)
+            self._take_message(node, message, now, address)
 
     def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
         """The system that had no place when it announced itself and now sends, if it gets one."""
@@ -267,7 +267,7 @@ class Hearing:
             node.heard_at = now
 
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
-        control = self._crew.get(via)
+        control = self._controls.get(via)
         message = self.decoder.message(without_argument(packet))
         if isinstance(message, imcpy.EstimatedState):
             self._heard_by_sound(via, message, now)
@@ -280,7 +280,7 @@ class Hearing:
 
     def _heard_by_sound(self, gateway: Node, message: Message, now: float) -> None:
         """Take a vehicle's report that its gateway has made an EstimatedState of."""
-        for control in self._crew.by_sound_through(gateway):
+        for control in self._controls.by_sound_through(gateway):
             if control.node.imc_id == int(message.src) and control.sound is not None:
                 report = control.sound.take_report(message)
                 if report is not None:
@@ -288,8 +288,8 @@ class Hearing:
 
     def _take_message(self, node: Node, message: Message, now: float, address: Address) -> None:
         name = type(message).__name__
-        control = self._crew.get(node)
-        rates, way_home = self._crew.asked_rates(node), self._crew.way_home(node)
+        control = self._controls.get(node)
+        rates, way_home = self._controls.asked_rates(node), self._controls.way_home(node)
         tick = node.take_time(message.timestamp, now, self._wall_clock())
         if tick is Tick.DOUBTFUL:
             self.admission.refuse(Refused.OLD, address)
@@ -330,7 +330,7 @@ class Hearing:
             case "VehicleMedium":
                 node.medium = int(message.medium)
             case "TransmissionStatus":
-                for other in self._crew.by_sound_through(node):
+                for other in self._controls.by_sound_through(node):
                     if other.sound is not None:
                         other.left_by_sound(other.sound.status(message), now)
             case "EstimatedStreamVelocity":

@@ -27,8 +27,8 @@ def entity_query() -> Message:
     return query
 
 
-class Speaker:
-    """Speaks to the network.
+class Sender:
+    """Sends announces, heartbeats and questions to the network, and messages to single nodes.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ THREADS = frozenset({"asyncio.futures", "aiosqlite.core"})
 
 
 class SimulatedTimeLoop(asyncio.SelectorEventLoop):
-    """See the module. Sockets work, but time does not wait for what may come over them."""
+    """Jumps to the next timer once nothing is left to do. Sockets work; time does not wait for what comes over them."""
 
     def __init__(self) -> None:
         self.now_s = BEGIN_S

@@ -28,7 +28,7 @@ API = "/api/v1"
 
 MAX_BATCH = 10_000
 MAX_FAULTS = 5
-"""Of one item so many are explained."""
+"""At most so many faults of one item are explained."""
 
 _suggestions = ContextVar("suggestions", default=MAX_ERRORS)
 """For how many more faults of a batch a field is looked for that may have been meant."""

@@ -17,6 +17,14 @@ Floor = Callable[[FloatArray], FloatArray]
 BISECTIONS = 20
 
 
+def noisy_ranges(
+    position: FloatArray, landmarks: FloatArray, relative_noise: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return ranges (n,) from ``position`` (3,) to ``landmarks`` (n, 3) with multiplicative noise (AURO15 eq. 5)."""
+    ranges = np.linalg.norm(landmarks - position, axis=1)
+    return np.asarray(ranges * (1.0 + relative_noise * rng.standard_normal(len(ranges))), dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class Attitude:
     """How a vehicle lies in the water."""
@@ -111,8 +119,7 @@ class BeamSonar(ABC):
 
     def measure(self, position: FloatArray, landmarks: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return noisy ranges (n,) to landmarks (n, 3) that the beams meet."""
-        ranges = np.linalg.norm(landmarks - position, axis=1)
-        return np.asarray(ranges * (1.0 + self.relative_noise * rng.standard_normal(len(ranges))), dtype=np.float64)
+        return noisy_ranges(position, landmarks, self.relative_noise, rng)
 
 
 @dataclass(frozen=True)

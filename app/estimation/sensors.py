@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from app.arrays import BoolArray, FloatArray
-from app.estimation.beams import BeamSonar
+from app.estimation.beams import BeamSonar, noisy_ranges
 from app.estimation.occupancy import Scanner
 
 
@@ -34,8 +34,7 @@ class RangeSensor:
 
     def measure(self, position: FloatArray, landmarks: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return noisy ranges (n_landmarks,) from ``position`` (3,) to ``landmarks`` (n_landmarks, 3)."""
-        ranges = np.linalg.norm(landmarks - position, axis=1)
-        return np.asarray(ranges * (1.0 + self.relative_noise * rng.standard_normal(len(ranges))), dtype=np.float64)
+        return noisy_ranges(position, landmarks, self.relative_noise, rng)
 
 
 @dataclass(frozen=True)

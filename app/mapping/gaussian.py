@@ -24,7 +24,7 @@ MANY_SOUNDINGS = 20_000
 MODEL = "Gaussian interpolation"
 
 AT_ONCE = 500_000
-"""So many soundings are taken in at a time: bounds the memory."""
+"""At most so many soundings are taken in at a time: bounds the memory."""
 
 BANDS = 8
 BLOCK_CELLS = 16

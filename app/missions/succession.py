@@ -160,7 +160,7 @@ def _unfit(live: LiveMission, before: LiveMission) -> str:
     if grave:
         return f"nobody has acknowledged: {grave[0].message}"
     for member in live.team:
-        earlier = before.team.get(member.name) or before.team.left.get(member.name)
+        earlier = before.team.get(member.name) or before.team.departed.get(member.name)
         if earlier is None:
             continue
         if earlier.left_at is not None:

@@ -217,8 +217,8 @@ class Member:
         return self.spec.kind, self.spec.name
 
     @property
-    def present(self) -> bool:
-        """Whether it can be planned for: it follows us and we know where it is."""
+    def controllable(self) -> bool:
+        """Whether it can be given orders now: it follows us, told where it is, and is in reach; withdrawn or not."""
         return self.engaged and self.report is not None and self.link not in OUT_OF_REACH
 
     @property
@@ -242,9 +242,9 @@ class Member:
         return self.order is not None and self.status is WaypointStatus.PLANNED
 
     @property
-    def surveys(self) -> bool:
-        """Whether it can be planned for, and is not on its way home or out of action."""
-        return self.present and self.withdrawal is None
+    def plannable(self) -> bool:
+        """Whether the survey can be planned for it: it is controllable, and not withdrawn for now or for good."""
+        return self.controllable and self.withdrawal is None
 
     @property
     def flies_survey(self) -> bool:
@@ -328,12 +328,12 @@ class Team:
     energy_of: Callable[[VehicleSpec], Energy] = lambda _spec: Energy(1.0)
     """Returns the count of what a vehicle uses, which has seen nothing yet."""
     members: dict[str, Member] = field(default_factory=dict)
-    left: dict[str, Member] = field(default_factory=dict)
+    departed: dict[str, Member] = field(default_factory=dict)
     """Those that took part and do not any more, as they were last."""
 
     def join(self, spec: VehicleSpec, slot: int) -> Member:
         """Add a vehicle, or take one back."""
-        before = self.left.pop(spec.name, None)
+        before = self.departed.pop(spec.name, None)
         member = Member(spec, slot, self.capabilities_of(spec.kind), energy=self.energy_of(spec))
         if before is not None and before.key == member.key:
             member.report, member.heard_s, member.risings = before.report, before.heard_s, before.risings
@@ -354,7 +354,7 @@ class Team:
             member.set_order(None)
             member.ahead.clear()
             member.engaged = member.surfacing = False
-            self.left[name] = member
+            self.departed[name] = member
 
     def __iter__(self) -> Iterator[Member]:
         return iter(list(self.members.values()))
@@ -384,9 +384,9 @@ class Team:
         return float(east), float(north)
 
     @property
-    def present(self) -> list[Member]:
-        """Those that can be planned for."""
-        return [m for m in self.members.values() if m.surveys]
+    def plannable(self) -> list[Member]:
+        """Those that the survey can be planned for: controllable, and not withdrawn."""
+        return [m for m in self.members.values() if m.plannable]
 
     @property
     def surveying(self) -> list[Member]:

@@ -36,7 +36,7 @@ from app.missions.settings import ImcSettings, ServiceSettings
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import ENDED, Action
 from app.storage.database import Database
-from app.storage.queries.missions import waypoints_of_step
+from app.storage.queries.missions import waypoints_between
 from app.storage.upkeep.prepare import prepare_database
 from benchmarks.common.report import IMC, make_parser, write_section
 from imc_bridge import BridgeSettings, NodeState, Sounding, StateReport
@@ -201,9 +201,8 @@ async def summary(
     view = mission_view(await service.get(identity))
     statuses: dict[str, int] = {}
     async with database.reading() as session:
-        for step in range(1, view.progress.step + 1):
-            for row in await waypoints_of_step(session, identity, step):
-                statuses[row.status] = statuses.get(row.status, 0) + 1
+        for row in await waypoints_between(session, identity, 1, view.progress.step):
+            statuses[row.status] = statuses.get(row.status, 0) + 1
     errors, rejected = await errors_m(service, identity, floor)
     log = await events_after(await service.get(identity), limit=1000)
     details = {view.name: view.reason for view in await service.vehicles()}

@@ -146,7 +146,7 @@ async def _flown(spec: MissionSpec, floor: Floor, service: MissionService) -> tu
     await service.act(live, Action.START, actor="benchmark")
     ways: dict[str, Way] = {vehicle.name: [] for vehicle in spec.vehicles}
     while (view := mission_view(live)).state not in ENDED:
-        for member in live.team.present:
+        for member in live.team.plannable:
             if member.report is not None:
                 east_m, north_m = member.place_m(live.frame)
                 ways[member.name].append((float(east_m), float(north_m)))

@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imc_bridge.control.distances import Place, distance_m, offset_m
 from imc_bridge.control.seabed import Seabed
+from imc_bridge.distances import Place, distance_m, offset_m
 from imc_bridge.events import BottomPoint
 
 MAX_KEPT = 120

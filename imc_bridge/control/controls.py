@@ -21,8 +21,8 @@ from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.settings import BridgeSettings
 
 
-class Crew:
-    """One control per vehicle.
+class Controls:
+    """How every vehicle is led: one control each, with its rates and its way home.
 
     Parameters
     ----------

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 from imc_bridge.control.acoustics import SoundPath, SoundReport
 from imc_bridge.control.control import Control, Phase
-from imc_bridge.control.distances import Place, distance_m
 from imc_bridge.control.orders import Order
 from imc_bridge.control.plans import (
     NEARNESS_S,
@@ -28,6 +27,7 @@ from imc_bridge.control.plans import (
     leg_time_s,
     plan_control,
 )
+from imc_bridge.distances import Place, distance_m
 from imc_bridge.events import StateReport, Waypoint, WaypointStatus
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from imc_bridge.control.distances import Place, distance_m, offset_m
 from imc_bridge.control.references import SentReference
+from imc_bridge.distances import Place, distance_m, offset_m
 from imc_bridge.events import StateReport, Waypoint, WaypointStatus
 
 STATE_LOITER = 3

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import imcpy
 
-from imc_bridge.control.distances import Place
+from imc_bridge.distances import Place
 from imc_bridge.events import Waypoint
 from imc_bridge.network.codec import ANY_ENTITY, Message
 from imc_bridge.settings import BridgeSettings

@@ -9,7 +9,7 @@ import math
 from collections import deque
 from collections.abc import Iterator
 
-from imc_bridge.control.distances import distance_m
+from imc_bridge.distances import distance_m
 
 EARTH_RADIUS_M = 6_371_000.0
 CELL_M = 5.0

@@ -22,8 +22,8 @@ import imcpy
 from imc_bridge.control.altitude_guard import FARTHEST_M, AltitudeGuard
 from imc_bridge.control.control import Refusal
 from imc_bridge.control.depth_layers import ALONE, DepthLayer
-from imc_bridge.control.distances import Place, distance_m
 from imc_bridge.control.plans import HOME_RADIUS_M, goto_maneuver, goto_plan, station_maneuver
+from imc_bridge.distances import Place, distance_m
 from imc_bridge.events import NodeState, Waypoint
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from imc_bridge.distances import Place, distance_m
 from imc_bridge.telemetry.soundings import StateSample
 
 FASTEST_MPS = 10.0
@@ -14,7 +15,6 @@ ALLOWANCE_M = 20.0
 CONFIRMATIONS = 4
 CONFIRM_S = 1.0
 """A position far away is believed when enough states over at least this time agree, and none came from the old one."""
-EARTH_M = 6_371_000.0
 
 
 class Step(Enum):
@@ -61,12 +61,13 @@ class PlausiblePlace:
         self._odd.clear()
 
 
-def distance_m(before: StateSample, after: StateSample) -> float:
+def moved_m(before: StateSample, after: StateSample) -> float:
     """Return how far two positions are from each other, depth included."""
-    north = (after.lat_rad - before.lat_rad) * EARTH_M
-    east = math.remainder(after.lon_rad - before.lon_rad, math.tau) * EARTH_M * math.cos(before.lat_rad)
-    down = after.depth_m - before.depth_m
-    return math.hypot(north, east, down)
+    return math.hypot(distance_m(_place(before), _place(after)), after.depth_m - before.depth_m)
+
+
+def _place(sample: StateSample) -> Place:
+    return math.degrees(sample.lat_rad), math.degrees(sample.lon_rad)
 
 
 def reach_m(before: StateSample, after: StateSample) -> float:
@@ -75,4 +76,4 @@ def reach_m(before: StateSample, after: StateSample) -> float:
 
 
 def _within_reach(before: StateSample, after: StateSample) -> bool:
-    return distance_m(before, after) <= reach_m(before, after)
+    return moved_m(before, after) <= reach_m(before, after)

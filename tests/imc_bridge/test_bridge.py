@@ -8,7 +8,7 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, Guidance, LinkChange, NodeState, RefusedError, Sounding, WaypointChange, WaypointStatus
-from imc_bridge.control.controls import Crew
+from imc_bridge.control.controls import Controls
 from imc_bridge.control.plans import OPERATION_START, plan_control
 from imc_bridge.control.rates import DUNE_DEFAULTS
 from imc_bridge.network.codec import encode
@@ -80,14 +80,14 @@ async def test_what_goes_wrong_for_one_vehicle_keeps_no_reference_from_another(m
     async with open_sea(vehicles=2) as sea:
         first, second = await sea.ready()
         await sea.bridge.engage(second)
-        tick = Crew.tick
+        tick = Controls.tick
 
-        def failing(crew: Crew, node: Node, now: float) -> None:
+        def failing(controls: Controls, node: Node, now: float) -> None:
             if node.name == first:
                 raise ValueError("a figure that nobody expected")
-            tick(crew, node, now)
+            tick(controls, node, now)
 
-        monkeypatch.setattr(Crew, "tick", failing)
+        monkeypatch.setattr(Controls, "tick", failing)
         sea.bridge.goto(second, sea.waypoint(0, 50, 50, 1.0))
         await sea.reached(second, 0)
         assert set(sea.bridge.handler_errors) == {"ValueError"}
@@ -320,7 +320,7 @@ async def test_rates_are_sent_until_the_vehicle_reports_them() -> None:
         await until(lambda: node._rate_text == former, "the rates are as before")
         known = sea.bridge._registry.named(name)
         assert known is not None
-        request = sea.bridge._crew.asked_rates(known)
+        request = sea.bridge._controls.asked_rates(known)
         assert request is not None
         await until(lambda: not request.restoring, "it has heard so and sends no more")
         assert len(lost) == 8

@@ -1,6 +1,5 @@
 """How often somebody may ask: every client has a bucket of requests, every address one of wrong tokens."""
 
-import hashlib
 import ipaddress
 import math
 import time
@@ -13,6 +12,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.accounts.processes import comes_from_peer
 from app.api.accounts.sessions import session_of
+from app.api.accounts.tokens import token_hash
 from app.api.http.problems import instance_of, make_problem, problem_response
 
 MAX_CLIENTS = 10_000
@@ -82,19 +82,19 @@ class RequestLimits:
     def wait_s(self, token: str | None, host: str) -> tuple[float, str]:
         """Return how long a request has to wait, and why; (0, "") when it may go on."""
         address = network_of(host)
-        known = token is not None and _digest(token) in self._known
+        known = token is not None and token_hash(token) in self._known
         if token is not None and not known:
             wait_s = self._failures.wait_s(address)
             if wait_s > 0.0:
                 return wait_s, "too many wrong access tokens came from this address"
         if self._requests is None:
             return 0.0, ""
-        wait_s = self._requests.take(_digest(token) if token is not None and known else address)
+        wait_s = self._requests.take(token_hash(token) if token is not None and known else address)
         return wait_s, "more requests came than max_requests_per_s allows" if wait_s > 0.0 else ""
 
     def log_in(self, token: str, host: str, *, good: bool) -> None:
         """Note whether a token that came from ``host`` was good."""
-        digest = _digest(token)
+        digest = token_hash(token)
         if not good:
             self._known.pop(digest, None)
             self._failures.take(network_of(host))
@@ -139,10 +139,6 @@ def host_of(scope: Scope) -> str:
     """Return the address of whoever asks; empty for a Unix socket."""
     client = scope.get("client")
     return client[0] if client else ""
-
-
-def _digest(token: str) -> str:
-    return hashlib.sha256(token.encode(errors="surrogateescape")).hexdigest()
 
 
 class LimitMiddleware:

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.evaluation.explore.run import OSARSES
 from app.evaluation.explore.setups import ReportSection, Setup, run_key
-from app.evaluation.runs.summary import spread
+from app.evaluation.runs.summary import mean_text, spread
 
 Runs = Mapping[str, Mapping[str, Any]]
 
@@ -124,11 +124,11 @@ def _improvement(ours: Sequence[Mapping[str, Any]], theirs: Sequence[Mapping[str
 
 
 def _remaining(runs: Sequence[Mapping[str, Any]]) -> str:
-    return _mean([float(run["remaining_pct"]) for run in runs], 2)
+    return mean_text([float(run["remaining_pct"]) for run in runs], 2)
 
 
 def _broken(runs: Sequence[Mapping[str, Any]]) -> str:
-    return _mean([float(run["broken_constraints"]) for run in runs], 1)
+    return mean_text([float(run["broken_constraints"]) for run in runs], 1)
 
 
 def _t99(runs: Sequence[Mapping[str, Any]]) -> str:
@@ -136,14 +136,7 @@ def _t99(runs: Sequence[Mapping[str, Any]]) -> str:
     if not reached:
         return "never" if runs else "–"
     number = "" if len(reached) == len(runs) else f" ({len(reached)} of {len(runs)})"
-    return _mean(reached, 0) + number
-
-
-def _mean(values: Sequence[float], digits: int) -> str:
-    if not values:
-        return "–"
-    s = spread(values)
-    return f"{s.mean:.{digits}f}" + (f" ± {s.ci95:.{digits}f}" if len(values) > 1 else "")
+    return mean_text(reached, 0) + number
 
 
 def _seeds_of(report: Report, section: ReportSection) -> str:

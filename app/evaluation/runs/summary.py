@@ -30,6 +30,14 @@ def spread(values: Sequence[float]) -> Spread:
     return Spread(float(x.mean()), half, float(x.min()), float(x.max()))
 
 
+def mean_text(values: Sequence[float], digits: int) -> str:
+    """Return the mean and the half width of its interval as a table shows them; a dash without values."""
+    if not values:
+        return "–"
+    s = spread(values)
+    return f"{s.mean:.{digits}f}" + (f" ± {s.ci95:.{digits}f}" if len(values) > 1 else "")
+
+
 def first_step(history_pct: Sequence[float], most_pct: float = 1.0) -> int | None:
     """Return the step, counted from 1, after which no more than ``most_pct`` is left; None where that never happens."""
     reached = np.flatnonzero(np.asarray(history_pct, dtype=np.float64) <= most_pct + ROUNDING_PCT)

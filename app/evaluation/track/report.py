@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from app.evaluation.runs.summary import spread
+from app.evaluation.runs.summary import mean_text
 from app.evaluation.track.consistency import Consistency
 from app.evaluation.track.setups import HISTORY_EVERY, Experiment, TrackReportJob
 
@@ -81,7 +81,7 @@ def _table(of: Mapping[str, Sequence[Run]]) -> list[str]:
     lines = ["| planner | seeds | " + " | ".join(title for _, title, _ in there) + " |"]
     lines.append("|" + " --- |" * (2 + len(there)))
     for planner, rows in of.items():
-        cells = [_mean([run[name] for run in rows if run[name] is not None], digits) for name, _, digits in there]
+        cells = [mean_text([run[name] for run in rows if run[name] is not None], digits) for name, _, digits in there]
         lines.append(f"| {planner} | {len(rows)} | " + " | ".join(cells) + " |")
     return [*lines, ""]
 
@@ -116,7 +116,7 @@ def _errors(of: Mapping[str, Sequence[Run]]) -> list[str]:
     lines = ["| norm of the landmarks' error at t | " + " | ".join(str(HISTORY_EVERY * (k + 1)) for k in at) + " |"]
     lines.append("|" + " --- |" * (1 + len(at)))
     for planner, rows in rows_of.items():
-        lines.append(f"| {planner} | " + " | ".join(_mean([run["error"][k] for run in rows], 2) for k in at) + " |")
+        lines.append(f"| {planner} | " + " | ".join(mean_text([run["error"][k] for run in rows], 2) for k in at) + " |")
     return [*lines, ""]
 
 
@@ -136,10 +136,3 @@ def _consistency(filters: Sequence[Consistency]) -> list[str]:
         for c in filters
     ]
     return lines
-
-
-def _mean(values: Sequence[float], digits: int) -> str:
-    if not values:
-        return "–"
-    s = spread(values)
-    return f"{s.mean:.{digits}f}" + (f" ± {s.ci95:.{digits}f}" if len(values) > 1 else "")

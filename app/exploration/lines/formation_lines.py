@@ -16,6 +16,7 @@ from shapely.prepared import PreparedGeometry, prep
 from app.arrays import BoolArray, FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.routes import FreeSpace
+from app.exploration.lines.lattice import axes_of
 
 EDGE = 0.01
 """How far from a zone a vehicle stays at least, as a fraction of the visibility."""
@@ -73,8 +74,7 @@ class RowSpace:
     @property
     def axes(self) -> FloatArray:
         """Unit vectors across and along the lines, (2, 2)."""
-        along = np.array([np.cos(self.direction_rad), np.sin(self.direction_rad)])
-        return np.stack([np.array([along[1], -along[0]]), along])
+        return axes_of(self.direction_rad)
 
     def to_uv(self, en_m: FloatArray) -> FloatArray:
         """Turn local positions (..., 2) into (u, v)."""

@@ -33,6 +33,12 @@ def longer_axis_rad(area: FloatArray) -> float:
     return float(angles[np.argmax(lengths)])
 
 
+def axes_of(direction_rad: float) -> FloatArray:
+    """Return unit vectors (2, 2) across and along lines of a direction, anticlockwise from east."""
+    along = np.array([np.cos(direction_rad), np.sin(direction_rad)])
+    return np.stack([np.array([along[1], -along[0]]), along])
+
+
 @dataclass(frozen=True)
 class Sweep:
     """A direction of survey lines: ``v`` runs along the lines, ``u`` across them.
@@ -47,8 +53,7 @@ class Sweep:
 
     @property
     def _axes(self) -> FloatArray:
-        along = np.array([np.cos(self.direction_rad), np.sin(self.direction_rad)])
-        return np.stack([np.array([along[1], -along[0]]), along])
+        return axes_of(self.direction_rad)
 
     def to_uv(self, en_m: FloatArray) -> FloatArray:
         """Turn local positions (..., 2) into (u, v)."""

@@ -12,7 +12,7 @@ from app.exploration.swath.raster import Flying, LineRaster
 
 HEADINGS = 16
 MOST_PIECES, MOST_TOURED = 30, 5
-"""So many pieces of missed ground, the nearest, are shared out, and so many of a vehicle's own toured at a time."""
+"""At most so many pieces of missed ground, the nearest, are shared out, and so many of one's own toured at a time."""
 
 BUSY = 0.25
 """A piece is left to a vehicle though its way is longer by this part of what another has still to fly before."""

@@ -100,9 +100,9 @@ class GaussianProcessMap:
     suggest; where they do not surround a place, Matern 3/2). Length,
     amplitude and the factor on the stated noise variances are learned by restricted maximum likelihood on some
     of the soundings. Then the process becomes nonstationary (Paciorek and Schervish 2006)
-    in two ways. Every sounding is predicted across a hole of ``hole_m``; how far these predictions miss,
-    place by place, is the local roughness: correlation gets shorter where the bottom is rough, longer where
-    it is smooth. And a first, stationary map shows along which direction the sea floor varies least;
+    in two ways. Every sounding is predicted across a hole, eight sides of the merged squares in radius; how far these
+    predictions miss, place by place, is the local roughness: correlation gets shorter where the bottom is rough,
+    longer where it is smooth. And a first, stationary map shows along which direction the sea floor varies least;
     correlation gets longer in that direction and shorter across, so that an edge seen on two survey lines is
     continued between them.
 
@@ -120,23 +120,22 @@ class GaussianProcessMap:
     learning_points
         Bound on the soundings used to learn the hyperparameters; twice as many where the relief is smaller than
         their noise.
-    hole_points
-        Bound on the soundings predicted across holes.
     merge_m
         Side of the squares whose soundings are merged into one; by default 1/100 of the extent of the
         soundings, less where there are many.
     reject_outliers
         Leave out soundings that ``flag_outliers`` rejects.
-    hole_m
-        Radius of the cross-validation holes; by default 8/100 of the extent of the soundings.
+    least_merge_m
+        The squares of merged soundings do not get smaller than that however many soundings there are, unless 1/100 of
+        the extent is; 0: no bound.
+    calibrate
+        False leaves depths and deviations as the process alone predicts them: they are not checked against soundings
+        that were held out.
     claims
         False saves the checks that only ``claim_sd_m`` needs, which is infinite then; nothing else depends on them.
 
     Attributes
     ----------
-    least_merge_m : float
-        May be set before ``fit``: the squares of merged soundings do not get smaller than that however many soundings
-        there are, unless 1/100 of the extent is.
     hyperparameters_ : Hyperparameters
         As used in the prediction.
     stationary_hyperparameters_ : Hyperparameters
@@ -156,9 +155,8 @@ class GaussianProcessMap:
         nonstationary: bool = True,
         neighbours: tuple[int, int] | None = None,
         learning_points: int = 350,
-        hole_points: int | None = None,
         merge_m: float | None = None,
-        hole_m: float | None = None,
+        least_merge_m: float = 0.0,
         reject_outliers: bool = True,
         calibrate: bool = True,
         claims: bool = True,
@@ -169,10 +167,8 @@ class GaussianProcessMap:
         self.nonstationary = nonstationary
         self.neighbours = neighbours
         self.learning_points = learning_points
-        self.hole_points = hole_points
         self.merge_m = merge_m
-        self.least_merge_m = 0.0
-        self.hole_m = hole_m
+        self.least_merge_m = least_merge_m
         self.reject_outliers = reject_outliers
         self.calibrate = calibrate
         self.claims = claims
@@ -301,7 +297,7 @@ class GaussianProcessMap:
         """How variable the sea floor is, place by place, from predicting soundings across holes."""
         hyper = self.stationary_hyperparameters_
         fine, n = self._levels.fine, self._levels.n_fine
-        count = self.hole_points or min(max(LEAST_HOLES, n // SOUNDINGS_PER_HOLE), MOST_HOLES)
+        count = min(max(LEAST_HOLES, n // SOUNDINGS_PER_HOLE), MOST_HOLES)
         errors = hole_errors(
             KERNEL_CODES[self.kernel_],
             self._levels.fine_tree,
@@ -310,14 +306,14 @@ class GaussianProcessMap:
             uniform_scales(n).scaled_metric(hyper.length_m),
             np.full(n, hyper.amplitude_m),
             np.unique(np.linspace(0, n - 1, min(n, count)).astype(np.int64)),
-            self.hole_m or HOLE_UNITS * self._unit_m,
+            HOLE_UNITS * self._unit_m,
         )
-        reach = REACH_UNITS * self._unit_m
+        carried_m = REACH_UNITS * self._unit_m
         low, high = self._levels.fine_tree.mins, self._levels.fine_tree.maxes
-        margin = 4.0 * reach  # beyond it the ratio has returned to what holds without soundings
+        margin = 4.0 * carried_m  # beyond it the ratio has returned to what holds without soundings
         cell = max(RELIEF_UNITS * self._unit_m, float((high - low).max()) / MOST_RATIO_CELLS)
         grid = coarse_grid(low - margin, high + margin, cell)
-        return Field(grid, local_ratio(errors, grid.centres_m, reach).reshape(1, grid.rows, grid.cols))
+        return Field(grid, local_ratio(errors, grid.centres_m, carried_m).reshape(1, grid.rows, grid.cols))
 
     def _check(self) -> None:
         """Hold soundings out: how far to trust the nonstationary process, and the factors on deviations."""

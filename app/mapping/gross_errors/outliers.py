@@ -34,7 +34,7 @@ EXCUSE_PRIOR_WEIGHT = 2.0
 LEAST_EXCUSE = 1e-4
 NORMAL_99 = 2.576
 CHUNK = 30_000
-"""Planes are fitted to so many soundings at a time: bounds the memory, and threads share the chunks."""
+"""Planes are fitted to at most so many soundings at a time: bounds the memory, and threads share the chunks."""
 
 MANY = 50_000
 """From so many soundings on, those of one square share a plane: each a plane of its own would take minutes."""

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from app.arrays import FloatArray, IntArray
 
 MANY_PAIRS = 500_000
-"""From so many on, all cores search."""
+"""From so many pairs of places and neighbours on, all cores search."""
 
 
 def nearest(tree: cKDTree, at: FloatArray, k: int) -> tuple[FloatArray, IntArray]:

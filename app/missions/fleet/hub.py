@@ -131,11 +131,11 @@ class FleetHub:
         if link is not None:
             link.deploy(deployment)
 
-    def withdraw(self, deployment: Deployment) -> None:
+    def end_deployment(self, deployment: Deployment) -> None:
         """Undo ``deploy`` at the mission's end."""
         link = self._links.get(deployment.vehicle.kind)
         if link is not None:
-            link.withdraw(deployment)
+            link.end_deployment(deployment)
 
     async def engage(self, key: VehicleKey) -> None:
         """Make a vehicle ready to follow. Raises VehicleRefusedError."""

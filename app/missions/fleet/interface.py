@@ -57,6 +57,11 @@ class Position:
     lon_deg: float
     depth_m: float
 
+    @property
+    def lat_lon(self) -> tuple[float, float]:
+        """Latitude and longitude, degrees."""
+        return self.lat_deg, self.lon_deg
+
 
 @dataclass(frozen=True, slots=True)
 class VehicleReport:
@@ -401,7 +406,7 @@ class FleetLink(ABC):
     def deploy(self, deployment: Deployment) -> None:  # noqa: B027
         """Prepare a vehicle for the mission that takes it; harmless to repeat. Raises VehicleRefusedError."""
 
-    def withdraw(self, deployment: Deployment) -> None:  # noqa: B027
+    def end_deployment(self, deployment: Deployment) -> None:  # noqa: B027
         """Undo ``deploy``: the mission has ended."""
 
     @abstractmethod

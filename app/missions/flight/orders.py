@@ -35,7 +35,7 @@ from app.storage.models import VehicleOrderRow
 from app.storage.queries import orders as order_queries
 
 LEGS_SEEN = 400
-"""So many of a vehicle's last legs are looked at for its lines."""
+"""At most so many of a vehicle's last legs are looked at for its lines."""
 
 THERE_M = 1.0
 """A leg that ends so near the end of an order's way is its last."""
@@ -135,7 +135,7 @@ class OrderBook:
             )
         if member.withdrawal is not None:
             raise ConflictError(f"vehicle {name!r} surveys no more: {member.withdrawal.why}", "resume its survey first")
-        if not member.present:
+        if not member.controllable:
             raise ConflictError(f"vehicle {name!r} cannot be reached now", "wait until it is heard, or abort it")
         return member, self._flight
 
@@ -258,7 +258,7 @@ class OrderBook:
             m.name in flight.dispatch.given_up
             or m.name in flight.dispatch.dropped
             or (m.asked is None and flight.planner.is_ordered(m.name))
-            or (m.asked is not None and m.asked.state is OrderState.ACCEPTED and m.surveys)
+            or (m.asked is not None and m.asked.state is OrderState.ACCEPTED and m.plannable)
             for m in self._live.team
         )
 
@@ -276,7 +276,7 @@ class OrderBook:
         for name in list(flight.dispatch.dropped):
             planner.go_round(name, np.array(flight.dispatch.dropped.pop(name)).reshape(-1, 2))
             taken.append(name)
-        for member in [*self._live.team, *self._live.team.left.values()]:
+        for member in [*self._live.team, *self._live.team.departed.values()]:
             order = member.asked
             if order is None:
                 if planner.is_ordered(member.name):
@@ -289,7 +289,7 @@ class OrderBook:
                 why = "it left the mission" if member.withdrawal is None else member.withdrawal.why
                 await self._over(member, order, OrderState.CANCELLED, why)
             elif order.state is OrderState.ACCEPTED:
-                if member.surveys:
+                if member.plannable:
                     await self._take(member, order, flight)
                     taken.append(member.name)
             else:

@@ -235,10 +235,10 @@ class OwnLegs:
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         at_rest = {member.name for member in getting if not member.ordered and not member.ahead} & self._idle
-        places = [self._place(member, moving=member.name in names) for member in live.team.present]
+        places = [self._place(member, moving=member.name in names) for member in live.team.plannable]
         places = [replace(place, at_rest=place.vehicle in at_rest) for place in places]
         # What vehicles measure on legs that they are still to fly may leave something to do.
-        all_flown = not any((m.ordered or m.ahead) and not m.misses for m in live.team.present)
+        all_flown = not any((m.ordered or m.ahead) and not m.misses for m in live.team.plannable)
         planner = self._decider.planner
         memory, committed = planner.snapshot(), False
         not_given: dict[str, list[FloatArray]] = {}
@@ -296,7 +296,7 @@ class OwnLegs:
             for leg in decision.legs
             if leg.vehicle in numbers
             and (member := live.team.get(leg.vehicle)) is not None
-            and member.present
+            and member.controllable
             and member.legs < numbers[leg.vehicle]
             and self._wants_legs(member)
             and leg.vehicle not in self._dispatch.dropped
@@ -330,7 +330,7 @@ class OwnLegs:
 
     def _call_home(self, done: frozenset[str] | set[str]) -> None:
         """Send vehicles home that have flown all that is planned for them and can fly no further line."""
-        for member in self._live.team.present:
+        for member in self._live.team.plannable:
             idle = not member.ahead and not member.ordered
             if member.name in done and idle and self._spec.ends_at_home(member.spec):
                 energy_m = self._range.beyond_m(member)
@@ -343,7 +343,7 @@ class OwnLegs:
         """Return the vehicles that have flown their way and go home: none of them waits at sea for the others."""
         return [
             member
-            for member in self._live.team.present
+            for member in self._live.team.plannable
             if not self._has_way(member)
             and not member.ahead
             and not member.ordered
@@ -429,17 +429,17 @@ class OwnLegs:
         """Return the number of a vehicle's next leg: one that joins or comes back goes on with what others fly."""
         if member.name in self._taking_part or member.ordered or member.ahead:
             return member.legs + 1
-        others = [m.legs - len(m.ahead) for m in self._live.team.present if m is not member]
+        others = [m.legs - len(m.ahead) for m in self._live.team.plannable if m is not member]
         reached = min(others, default=self._live.header.step)
         return max(member.legs, min(reached, self._live.header.step)) + 1
 
     def _who_gets_legs(self) -> list[Member]:
         """Return the vehicles to decide for now: none, or those that need a leg, with others that soon will."""
         now_s = asyncio.get_running_loop().time()
-        self._taking_part &= {member.name for member in self._live.team if member.present}
+        self._taking_part &= {member.name for member in self._live.team if member.controllable}
         able = [
             member
-            for member in self._live.team.present
+            for member in self._live.team.plannable
             if self._wants_legs(member)
             and self._again_at_s.get(member.name, -math.inf) <= now_s
             and len(member.ahead) < MOST_AHEAD
@@ -468,7 +468,7 @@ class OwnLegs:
         if self._measured:
             return self._lasts_s(member) < SOON * self._lead_s
         # Where decisions are slow one for everybody takes the time of one for somebody.
-        others_s = len(self._live.team.present) * self._decider.takes_s
+        others_s = len(self._live.team.plannable) * self._decider.takes_s
         if not self._watched and self._lasts_s(member) < DECISIONS_AHEAD * self._decider.takes_s + others_s:
             return True
         left_m = self._left_of_leg_m(member)
@@ -499,13 +499,13 @@ class OwnLegs:
             held = any(self._has_way(m) for m in self._live.team.held)
             return bool(list(self._live.team)) and not held and not self._awaits_batteries
         names = {m.name for m in left}
-        somebody_is_done = self._somebody_is_home or any(m.present for m in team if m.name not in names)
-        if any(m.present and not (somebody_is_done and m.misses >= NOT_WAITED_FOR) for m in left):
+        somebody_is_done = self._somebody_is_home or any(m.controllable for m in team if m.name not in names)
+        if any(m.controllable and not (somebody_is_done and m.misses >= NOT_WAITED_FOR) for m in left):
             return False
         if not somebody_is_done and any(self._wants_legs(m) for m in left):
             return False
         patience_s = self._spec.step_deadline_s / self._time_scale
-        return all(m.present or self._absent_s(m) >= patience_s for m in left)
+        return all(m.controllable or self._absent_s(m) >= patience_s for m in left)
 
     @property
     def _awaits_batteries(self) -> bool:
@@ -525,7 +525,7 @@ class OwnLegs:
     def _absent_s(self, member: Member) -> float:
         """Return for how long a vehicle has been out of reach, as far as anybody looked, on the wall clock."""
         now_s = asyncio.get_running_loop().time()
-        if member.present:
+        if member.controllable:
             self._absent_since_s.pop(member.name, None)
             return 0.0
         return now_s - self._absent_since_s.setdefault(member.name, now_s)
@@ -544,4 +544,4 @@ class OwnLegs:
         if not list(team):
             return True
         somebody_wants_legs = any(self._wants_legs(member) for member in team.surveying)
-        return not team.present and not self._somebody_is_home and somebody_wants_legs
+        return not team.plannable and not self._somebody_is_home and somebody_wants_legs

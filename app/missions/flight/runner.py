@@ -203,7 +203,7 @@ class Runner:
         came_to_m = {
             row.vehicle: np.array([row.east_m, row.north_m]) for row in ended if row.status == WaypointStatus.REACHED
         }
-        for member in live.team.left.values():
+        for member in live.team.departed.values():
             # It may come back, and goes on with its own numbers.
             self._count_legs(member, last, way_m, spared)
         for member in live.team:

@@ -75,18 +75,18 @@ class SearchHooks:
         elif course.idle:
             await self._scanned(course)
         rest_s = self._in(REST_S)
-        if await self._wait(lambda: not course.unseen(live.team.present), rest_s):
+        if await self._wait(lambda: not course.unseen(live.team.plannable), rest_s):
             return
-        blind = course.unseen(live.team.present)
+        blind = course.unseen(live.team.plannable)
         message = f"no scan tells what is around {', '.join(blind)}: the search waits for one"
         await live.journal.alarm(AlarmKind.NO_SCAN, message, vehicles=blind)
-        await self._wait(lambda: not course.unseen(live.team.present), None)
+        await self._wait(lambda: not course.unseen(live.team.plannable), None)
         await live.journal.end([AlarmKind.NO_SCAN], "scans tell again what is around every vehicle")
 
     async def _come_free(self, course: Course) -> bool:
         """Wait while obstacles hold everybody and there is time; return whether that was so and is over."""
         was_held = False
-        while course.held(self._live.team.present) and not course.little_left:
+        while course.held(self._live.team.plannable) and not course.little_left:
             was_held = True
             await self._scanned(course)
         return was_held and not course.little_left
@@ -111,7 +111,7 @@ class SearchHooks:
         course, live = self._course, self._live
         if course is None:
             return ""
-        team = live.team.present
+        team = live.team.plannable
         legs = [np.hypot(*(leg.target_m[:2] - decision.origin_m[leg.vehicle])) for leg in decision.legs]
         course.note(np.array(legs), step_s * self._time_scale)
         away, last = course.away(team), live.header.step >= live.spec.steps

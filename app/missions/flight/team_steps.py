@@ -106,7 +106,7 @@ class TeamSteps:
 
         None where nobody is there to fly any more.
         """
-        while self._live.team.present:
+        while self._live.team.plannable:
             number = self._live.header.step + 1
             decision = await self._decider.decide_to_fly(number, self._places(), self._lookout.task(number))
             if decision:
@@ -129,12 +129,12 @@ class TeamSteps:
             deadline_s,
         )
         last = live.header.step >= self._spec.steps
-        if not close or last or not live.team.present or self._lookout.barred():
+        if not close or last or not live.team.plannable or self._lookout.barred():
             await self._arrive(deadline_s)
             return None
         planner = self._decider.planner
         memory, number = planner.snapshot(), live.header.step + 1
-        expected = [place_ahead(member, live) for member in live.team.present]
+        expected = [place_ahead(member, live) for member in live.team.plannable]
         deciding = asyncio.create_task(self._decider.decide(number, expected, self._lookout.task(number)))
         try:
             await self._arrive(deadline_s)
@@ -156,7 +156,7 @@ class TeamSteps:
         return left_m <= self._spec.arrival_radius_m + self._spec.speed_of(member.spec) * ahead_s
 
     def _places(self) -> list[Place]:
-        return [place_of(member, self._live) for member in self._live.team.present]
+        return [place_of(member, self._live) for member in self._live.team.plannable]
 
     def _came_true(self, expected: list[Place]) -> bool:
         """Tell whether the vehicles are the expected ones at the expected places."""
@@ -175,7 +175,7 @@ class TeamSteps:
                 return
             await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
             await self._waiting.for_team()
-            for member in live.team.present:
+            for member in live.team.plannable:
                 if member.order is not None:
                     member.status = WaypointStatus.PLANNED
                     turned_down.pop(member.name, None)

@@ -83,7 +83,7 @@ async def take_up(
         await loop.run_in_executor(threads.planning, tracking_warm_up)
         async with database.reading() as session:
             await live.ranges.load(session, step)
-    await live.whole.show(stored, imported, imported=prior, ended=live.header.state in ENDED)
+    await live.stored_soundings.show(stored, imported, imported=prior, ended=live.header.state in ENDED)
     if search is not None:
         await _take_up_search(live, search)
     live.show_reference(reference)

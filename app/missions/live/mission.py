@@ -135,7 +135,7 @@ class LiveMission:
         )
         self.swath = SwathIntake(self.builder.swath, self.pings, self.journal)
         """Pings on their way into the map."""
-        self.whole = SoundingStore(database, row.id, self.builder, self.journal)
+        self.stored_soundings = SoundingStore(database, row.id, self.builder, self.journal)
         """All its soundings, and its map as it is stored."""
         self.ranges = RangeJournal(database, row.id, TargetFilters(spec, self.frame), self.journal, time_scale)
         """Ranges to moving targets, and what they tell."""
@@ -171,7 +171,7 @@ class LiveMission:
         self._measured_late: Callable[[], None] = _nothing
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
         """Ships near the mission."""
-        self.telling = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ships.message)
+        self.feed = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ships.message)
         self._time_scale = time_scale
         self._threads = threads
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
@@ -195,14 +195,14 @@ class LiveMission:
     async def _notice_imports(self) -> None:
         async with self.database.reading() as session:
             newest = await event_queries.last_event_id(session, self.id, kind="import")
-        if newest <= self.whole.imports_noticed:
+        if newest <= self.stored_soundings.imports_noticed:
             return
 
         async def read() -> Counts:
             async with self.database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
                 pinged = await self.pings.open(session)
-            self.whole.changed(newest_import=newest)
+            self.stored_soundings.changed(newest_import=newest)
             self.swath.correct(self.gate.corrections)
             return Counts(
                 counted.get("accepted", 0), counted.get("rejected", 0), pinged.pings, pinged.beams, pinged.rejected
@@ -293,7 +293,7 @@ class LiveMission:
     def recount(self, counts: Counts) -> None:
         """Note that stored soundings changed, of which there are so many now."""
         self.journal.counts = counts
-        self.whole.changed()
+        self.stored_soundings.changed()
         self._note_late_change()
 
     def halt(self) -> None:
@@ -357,7 +357,7 @@ class LiveMission:
 
     async def build_map(self) -> BuiltMap | None:
         """Make the map of everything accepted so far as thoroughly as for a product, in a worker thread."""
-        await self.whole.complete()
+        await self.stored_soundings.complete()
         await self.swath.complete()
         before = self.builder.newest
         built = await self.mapped(partial(self.builder.build, thorough=True))
@@ -376,7 +376,7 @@ class LiveMission:
         """Make the map of a mission that was just taken up, and tell everyone who watches how far it has come."""
         if self.map_is_missing:
             await self.build_map()
-            await self.whole.keep(self.header.step, ended=self.header.state in ENDED)
+            await self.stored_soundings.keep(self.header.step, ended=self.header.state in ENDED)
 
     def compute_by(self, compute: Compute) -> None:
         """Have heavy work done by a cluster, where there is one."""
@@ -414,7 +414,7 @@ class LiveMission:
 
     def snapshot(self, built: BuiltMap) -> MapSnapshot:
         """Return a map with what is needed to understand it."""
-        step = self.whole.step_of(built, self.header.step)
+        step = self.stored_soundings.step_of(built, self.header.step)
         return MapSnapshot(self.facts, built, step, self.reference_m, self.revision, interpolation=self.builder.live)
 
     def live_snapshot(self) -> MapSnapshot | None:
@@ -432,7 +432,7 @@ class LiveMission:
     def _take_soundings(self, soundings: FloatArray) -> None:
         """Take in committed soundings, shape (n, 4): east, north, depth, standard deviation."""
         self.builder.add(soundings)
-        self.telling.of_soundings(len(soundings), self.header.step)
+        self.feed.of_soundings(len(soundings), self.header.step)
         self._note_late_change()
 
     def _take_pings(self, pings: Mapping[str, Pings]) -> None:
@@ -441,7 +441,7 @@ class LiveMission:
         self._note_late_change()
         if not self.running:
             # No flight makes maps: one is made for who asks.
-            self.telling.of_soundings(sum(some.beams for some in pings.values()), self.header.step)
+            self.feed.of_soundings(sum(some.beams for some in pings.values()), self.header.step)
         for vehicle, some in pings.items():
             member, last = self.team.get(vehicle), some.take(slice(-1, None))
             reached = reach_m(last)
@@ -450,7 +450,7 @@ class LiveMission:
 
     def publish_map(self, built: BuiltMap) -> None:
         """Tell everyone who watches that there is a new map."""
-        self.telling.of_map(built, self.header.step)
+        self.feed.of_map(built, self.header.step)
 
     def figures(self) -> dict[str, float]:
         """Return how far the mission has come, as each step keeps it."""
@@ -518,7 +518,7 @@ class LiveMission:
         if self.reports.leg_s is None:
             return None
         committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
-        leg_m, flying = self.spec.limits.max_step_m, [*self.team.present, *self.team.held]
+        leg_m, flying = self.spec.limits.max_step_m, [*self.team.plannable, *self.team.held]
         legs = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
         return (max(0.0, *legs) + max(committed, default=0)) * self.reports.leg_s
 
@@ -556,7 +556,7 @@ class LiveMission:
 
     def abandon(self, why: str = "another process has the mission now") -> None:
         """Write nothing any more, and let everyone who watches ask again."""
-        self.telling.stop()
+        self.feed.stop()
         self.ranges.abandon()
         self.journal.abandon()
         self.pings.abandon()
@@ -564,11 +564,11 @@ class LiveMission:
 
     async def close(self) -> None:
         """Write what is left."""
-        await self.telling.close()
+        await self.feed.close()
         await self.ranges.close()
         await self.journal.close()
         await self.pings.close()
-        await self.whole.close(self.header.step)
+        await self.stored_soundings.close(self.header.step)
 
 
 def _nothing() -> None:

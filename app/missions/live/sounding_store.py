@@ -28,7 +28,7 @@ GROWTH = 1.2
 """It is stored again when the soundings grew by this factor: the map of five million is stored thirty times."""
 
 TOO_MANY_TO_HOLD = 200_000
-"""So many soundings leave memory when the mission has ended and its last map is stored."""
+"""Where there are at least so many, soundings leave memory once the mission has ended and its last map is stored."""
 
 log = structlog.get_logger(__name__)
 
@@ -118,7 +118,7 @@ class SoundingStore:
             return
         content = await asyncio.to_thread(pack, built.map, self._builder.doubted())
         async with self._journal.writing:
-            if built is not self._builder.newest or not self._builder.true:
+            if built is not self._builder.newest or not self._builder.is_current:
                 return  # something else is the case by now
             await to_the_end(self._store(built, step, content))
         self._kept = built

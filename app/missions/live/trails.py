@@ -9,8 +9,8 @@ import shapely
 from numpy.typing import NDArray
 
 from app.arrays import FloatArray
+from app.mapping.coordinates.distances import leg_lengths_m
 from app.missions.flown import is_flown
-from app.missions.live.journals.journal import METRES_PER_DEGREE
 from app.storage.bulk import read_in_pieces
 from app.storage.database import Database
 from app.storage.queries import missions as mission_queries
@@ -18,6 +18,7 @@ from app.storage.queries import missions as mission_queries
 TOLERANCE_M = 0.2
 """What is left out lies so near to what is drawn; vehicles know where they are less well than that."""
 
+METRES_PER_DEGREE = 111_320.0
 FEWEST_TO_THIN = 3
 DIGITS = 7
 """Decimals of a degree: about a centimetre."""
@@ -106,9 +107,8 @@ def in_order(heard: FloatArray, imported: FloatArray) -> FloatArray:
 
 def _length_m(points: FloatArray) -> float:
     """Return how far was flown of a way, shape (n, 4): time, longitude, latitude, depth."""
-    passed_s, east, north = np.diff(points[:, :3], axis=0).T
-    legs_m = METRES_PER_DEGREE * np.hypot(east * np.cos(np.radians(points[:-1, 2])), north)
-    return float(legs_m[is_flown(legs_m, passed_s)].sum())
+    legs_m = leg_lengths_m(points[:, 2], points[:, 1])
+    return float(legs_m[is_flown(legs_m, np.diff(points[:, 0]))].sum())
 
 
 def worth_drawing(places: FloatArray, tolerance_m: float = TOLERANCE_M) -> NDArray[np.intp]:

@@ -39,7 +39,7 @@ Doubted = list[tuple[FloatArray, str]]
 """Soundings, rows of shape (4,), that a map leaves out, each with the reason."""
 
 HEAVY = 20_000
-"""Of so many soundings on maps are made elsewhere, where that is possible: of fewer it would hardly be quicker."""
+"""Maps of at least so many soundings are made elsewhere, where that is possible: of fewer it is hardly quicker."""
 
 FINEST_CELLS = 0.5
 """Soundings that lie in one square of this part of a cell count as one, where there are so many."""
@@ -188,12 +188,11 @@ class MapBuilder:
             self._building.release()
 
     def _new_model(self) -> GaussianProcessMap:
-        model = GaussianProcessMap(reject_outliers=False)  # outliers are judged by ``learn``
-        model.least_merge_m = FINEST_CELLS * self.grid.cell_m
-        return model
+        # Outliers are judged by ``learn``.
+        return GaussianProcessMap(reject_outliers=False, least_merge_m=FINEST_CELLS * self.grid.cell_m)
 
     @property
-    def true(self) -> bool:
+    def is_current(self) -> bool:
         """Whether nothing that the newest map was made of was changed since; more may have come."""
         return self.arrivals.replaced == self._replaced_mapped
 
@@ -222,7 +221,7 @@ class MapBuilder:
             self._building.release()
 
     def _make(self, *, thorough: bool) -> BuiltMap | None:
-        """Do so, alone."""
+        """Make the map; the caller holds ``_building``."""
         came = self.arrivals.take()
         if came is None:
             return self._newest
@@ -330,7 +329,10 @@ class MapBuilder:
         self._learn(_here, always=always)
 
     def _learn(self, compute: Callable[..., Any], *, always: bool, mapping: bool = False) -> BathymetricMap | None:
-        """Do so; with ``mapping`` return the map of what is no outlier, None where nothing was learned."""
+        """Judge outliers and learn the model; with ``mapping`` return the map of what is no outlier.
+
+        None where nothing was learned.
+        """
         if not self._learning.acquire(blocking=always):
             return None  # somebody is at it
         try:

@@ -22,6 +22,7 @@ from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
 from app.missions.errors import MapNotReadyError
 from app.missions.maps.file_content import FileContent
 from app.missions.maps.products import CSV, Product, slug
+from app.missions.maps.snapshot import nullable
 from app.missions.views.maps.sites import ChangesView, SiteMapView, SurveyName, VolumeView
 from imc_bridge.printable import printable
 
@@ -115,8 +116,8 @@ class SiteMap:
             min_depth_m=_rounded(np.min, model.depth_m[known]),
             max_depth_m=_rounded(np.max, model.depth_m[known]),
             surveys=[survey.view for survey in self.surveys],
-            depth_m=_nullable(model.depth_m),
-            sd_m=_nullable(model.sd_m),
+            depth_m=nullable(model.depth_m),
+            sd_m=nullable(model.sd_m),
             survey=newest.tolist(),
             count=model.surveys.tolist(),
             sounded=model.sounded.tolist(),
@@ -298,9 +299,3 @@ def _volume(volume: Volume) -> VolumeView:
 
 def _rounded(figure: Callable[[FloatArray], Any], values: FloatArray) -> float | None:
     return round(float(figure(values)), 3) if values.size else None
-
-
-def _nullable(layer: FloatArray) -> list[list[float | None]]:
-    rounded = np.round(layer, 3).astype(object)
-    rounded[~np.isfinite(layer)] = None
-    return rounded.tolist()  # type: ignore[no-any-return]

@@ -133,15 +133,16 @@ class MapSnapshot:
         return MapView.model_construct(
             mission_id=self.facts.mission_id,
             **self.header(),
-            depth_m=_nullable(bathymetry.depth_m),
-            sd_m=_nullable(bathymetry.sd_m),
+            depth_m=nullable(bathymetry.depth_m),
+            sd_m=nullable(bathymetry.sd_m),
             count=bathymetry.count.tolist(),
             sounded=bathymetry.sounded.tolist(),
-            layers={layer.name: _nullable(layer.values) for layer in layers},
+            layers={layer.name: nullable(layer.values) for layer in layers},
         )
 
 
-def _nullable(layer: FloatArray) -> list[list[float | None]]:
+def nullable(layer: FloatArray) -> list[list[float | None]]:
+    """Return a layer (rows, cols) in metres as JSON has it: to the millimetre, null where nothing is known."""
     rounded = np.round(layer, 3).astype(object)
     rounded[~np.isfinite(layer)] = None
     return rounded.tolist()  # type: ignore[no-any-return]

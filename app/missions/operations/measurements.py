@@ -19,7 +19,7 @@ from app.missions.fleet.interface import BeamGeometry, PingReport, Position, Ran
 from app.missions.large_batches import each_of, made_of
 from app.missions.live.mission import LiveMission
 from app.missions.pings.store import BEAMS_PER_ITEM, JudgedBatch
-from app.missions.soundings.gate import impossible_place
+from app.missions.soundings.gate import impossible_coordinates, impossible_place
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.vehicle import Sensor
 from app.missions.states import MissionState
@@ -68,10 +68,10 @@ async def measure(
     if beams > MAX_BATCH_BEAMS:
         raise InvalidRequestError("items", f"{beams} beams are too many", f"send at most {MAX_BATCH_BEAMS} at once")
     work = range(len(items) + beams // BEAMS_PER_ITEM)
-    digest, strangers, reports, pings = await made_of(work, _looked_through, live, items)
-    ranges = _ranges(live, items, strangers)
+    digest, refusals, reports, pings = await made_of(work, _looked_through, live, items)
+    ranges = _ranges(live, items, refusals)
     key = _Key.of(sender, idempotency_key) if idempotency_key is not None else None
-    batch = _Batch(items, key, digest, strangers, reports, pings, ranges)
+    batch = _Batch(items, key, digest, refusals, reports, pings, ranges)
     return await live.part(_Intake).group(batch)
 
 
@@ -83,11 +83,11 @@ def _looked_through(
     dumped = [item.model_dump(exclude={"beams"} if item.beams is None else None) for item in items]
     digest = hashlib.sha256(orjson.dumps(dumped)).hexdigest()
     near = _all_near(items, live.frame)
-    strangers = {i: _stranger(live, item, near=near) for i, item in enumerate(items)}
-    reports = {i: report for i, item in enumerate(items) if not strangers[i] and (report := _sounding(item))}
-    pings = {i: ping for i, item in enumerate(items) if not strangers[i] and (ping := _ping(item))}
+    refusals = {i: _refusal(live, item, near=near) for i, item in enumerate(items)}
+    reports = {i: report for i, item in enumerate(items) if not refusals[i] and (report := _sounding(item))}
+    pings = {i: ping for i, item in enumerate(items) if not refusals[i] and (ping := _ping(item))}
     judged = live.pings.judge_here(list(pings.values()))
-    return digest, strangers, reports, _Pings(list(pings), judged)
+    return digest, refusals, reports, _Pings(list(pings), judged)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class _Batch:
     items: Sequence[Measurement]
     key: _Key | None
     digest: str
-    strangers: Mapping[int, str]
+    refusals: Mapping[int, str]
     reports: Mapping[int, SoundingReport]
     pings: _Pings
     ranges: Mapping[int, Arrived]
@@ -130,7 +130,7 @@ class _Batch:
     @property
     def known(self) -> dict[int, Measurement]:
         """The items that are not refused."""
-        return {i: item for i, item in enumerate(self.items) if not self.strangers[i]}
+        return {i: item for i, item in enumerate(self.items) if not self.refusals[i]}
 
 
 class _Intake:
@@ -267,7 +267,7 @@ async def _store(
             on_ranges, used = await live.ranges.take(list(batch.ranges.values()), session)
             taken |= dict(zip(batch.ranges, on_ranges, strict=True))
             then.append(used)
-        reasons = {**batch.strangers, **refused}
+        reasons = {**batch.refusals, **refused}
         answers.append(await made_of(batch.items, _batch_verdict, len(batch.items), taken, reasons))
     moment = now()
     written = [await made_of(answer.items, partial(answer.model_dump, mode="json")) for answer in answers]
@@ -306,14 +306,14 @@ def _names(batch: _Batch) -> set[str]:
 
 def _member(live: LiveMission, name: str) -> Member:
     # One that left meanwhile was still heard.
-    return live.team.get(name) or live.team.left[name]
+    return live.team.get(name) or live.team.departed[name]
 
 
 def _impossible_depth(item: Measurement) -> str:
     return impossible_place(item.lat_deg, item.lon_deg, item.depth_m).removeprefix("vehicle_")
 
 
-def _stranger(live: LiveMission, item: Measurement, *, near: bool) -> str:
+def _refusal(live: LiveMission, item: Measurement, *, near: bool) -> str:
     member = live.team.get(item.vehicle)
     if member is None:
         return f"vehicle: {item.vehicle!r} takes no part in this mission"
@@ -337,7 +337,7 @@ def _useless_range(item: Measurement, live: LiveMission) -> str:
     return live.ranges.tracking.stranger(item.target) or live.ranges.not_yet(item.time_s)
 
 
-def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[int, str]) -> dict[int, Arrived]:
+def _ranges(live: LiveMission, items: Sequence[Measurement], refusals: Mapping[int, str]) -> dict[int, Arrived]:
     """Return the ranges to targets by their item; each is as old as its vehicle's newest item says."""
     newest: dict[str, float] = {}
     for item in items:
@@ -356,13 +356,13 @@ def _ranges(live: LiveMission, items: Sequence[Measurement], strangers: Mapping[
             newest[item.vehicle],
         )
         for i, item in enumerate(items)
-        if item.target is not None and item.target_range_m is not None and not strangers[i]
+        if item.target is not None and item.target_range_m is not None and not refusals[i]
     }
 
 
 def _all_near(items: Sequence[Measurement], frame: LocalFrame) -> bool:
     """Tell whether every place is possible: at once, which costs far less than one by one."""
-    if not all(-90 <= item.lat_deg <= 90 and -180 <= item.lon_deg <= 180 for item in items):
+    if any(impossible_coordinates(item.lat_deg, item.lon_deg) for item in items):
         return False
     try:
         frame.to_local([item.lat_deg for item in items], [item.lon_deg for item in items])
@@ -372,10 +372,8 @@ def _all_near(items: Sequence[Measurement], frame: LocalFrame) -> bool:
 
 
 def _impossible_place(item: Measurement, frame: LocalFrame) -> str:
-    if not -90 <= item.lat_deg <= 90:
-        return f"lat_deg: {item.lat_deg} is not between -90 and 90"
-    if not -180 <= item.lon_deg <= 180:
-        return f"lon_deg: {item.lon_deg} is not between -180 and 180"
+    if reason := impossible_coordinates(item.lat_deg, item.lon_deg):
+        return reason
     try:
         frame.to_local(item.lat_deg, item.lon_deg)
     except ValueError as error:
@@ -481,13 +479,13 @@ def _vehicle_report(item: Measurement) -> VehicleReport:
     )
 
 
-def _batch_verdict(count: int, taken: Mapping[int, ItemVerdict], strangers: Mapping[int, str]) -> BatchVerdict:
+def _batch_verdict(count: int, taken: Mapping[int, ItemVerdict], refusals: Mapping[int, str]) -> BatchVerdict:
     items = []
     for index in range(count):
         if index in taken:
             items.append(taken[index].model_copy(update={"index": index}))
-        elif strangers[index]:
-            items.append(ItemVerdict(index=index, verdict=Verdict.REJECTED, reason=strangers[index]))
+        elif refusals[index]:
+            items.append(ItemVerdict(index=index, verdict=Verdict.REJECTED, reason=refusals[index]))
         else:
             items.append(ItemVerdict(index=index, verdict=Verdict.ACCEPTED, reason="position report"))
     return batch_verdict(items)

@@ -15,7 +15,7 @@ from app.missions.views.search import SearchGridView
 
 MAX_SCANS = 1000
 SCANS_AT_ONCE = 20
-"""So many are stored in one transaction."""
+"""At most so many scans are stored in one transaction."""
 
 
 async def scan(live: LiveMission, items: Sequence[Scan]) -> BatchVerdict:

@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from pyproj import Geod
 from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.ops import unary_union
 
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState, Position
 from app.missions.flight.decisions.decision import (
@@ -189,9 +189,7 @@ def _en_m(place: Point) -> FloatArray:
 def _far_away(live: LiveMission, position: Position, name: str, title: str) -> CheckView:
     """Return what is told of a vehicle so far away that the mission's flat frame does not reach it."""
     frame = live.frame
-    _, _, away_m = Geod(ellps="WGS84").inv(
-        frame.origin_lon_deg, frame.origin_lat_deg, position.lon_deg, position.lat_deg
-    )
+    away_m = horizontal_distance_m((frame.origin_lat_deg, frame.origin_lon_deg), position.lat_lon)
     return CheckView(
         id=name,
         title=title,

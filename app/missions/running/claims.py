@@ -93,13 +93,13 @@ class Claims:
         """Leave one vehicle of a mission that goes on to others; a simulated one is put away."""
         self._hub.release((vehicle.kind, vehicle.name), live.id)
         if self._hub.capabilities(vehicle.kind).simulated:
-            self._hub.withdraw(_deployment(live, vehicle))
+            self._hub.end_deployment(_deployment(live, vehicle))
 
     def release_team(self, live: LiveMission) -> None:
         """Give every vehicle of a mission up."""
-        for member in [*live.team, *live.team.left.values()]:
+        for member in [*live.team, *live.team.departed.values()]:
             self._hub.release(member.key, live.id)
-            self._hub.withdraw(_deployment(live, member.spec))
+            self._hub.end_deployment(_deployment(live, member.spec))
 
 
 def _deployment(live: LiveMission, vehicle: VehicleSpec) -> Deployment:
@@ -124,7 +124,7 @@ def _deployment(live: LiveMission, vehicle: VehicleSpec) -> Deployment:
 
 def _last_heard(live: LiveMission, name: str) -> VehicleReport | None:
     """Return what was heard last of a vehicle of a mission at sea; another process may have heard it."""
-    member = live.team.get(name) or live.team.left.get(name)
+    member = live.team.get(name) or live.team.departed.get(name)
     if live.header.state not in AT_SEA or member is None or member.report is None:
         return None
     battery_pct = member.report.battery_pct

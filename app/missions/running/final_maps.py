@@ -88,7 +88,7 @@ class FinalMaps:
             async with self._one_at_a_time:
                 if belongs_to_a_site(live) and not await is_kept(live):
                     await keep_survey(live)
-                    await live.whole.keep(live.header.step, ended=True)
+                    await live.stored_soundings.keep(live.header.step, ended=True)
 
     def _begin(self, tasks: dict[str, asyncio.Task[None]], live: LiveMission, work: Coroutine[Any, Any, None]) -> None:
         def done(ended: asyncio.Task[None]) -> None:
@@ -110,4 +110,4 @@ async def _map_all(live: LiveMission) -> None:
     if belongs_to_a_site(live):
         # Before the soundings leave memory.
         await keep_survey(live)
-    await live.whole.keep(live.header.step, ended=True)
+    await live.stored_soundings.keep(live.header.step, ended=True)

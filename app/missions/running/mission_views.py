@@ -40,7 +40,7 @@ def action_view(live: LiveMission, stops: Sequence[StopReceipt]) -> ActionView:
 async def watched(live: LiveMission) -> AsyncIterator[AsyncIterator[LiveMessage]]:
     """Yield live messages, the first of them a snapshot. A watcher that is too slow loses only positions."""
     with live.broadcaster.subscribe() as subscription:
-        live.telling.start()
+        live.feed.start()
         yield _beginning_with(await _snapshot_message(live), subscription)
 
 
@@ -48,7 +48,7 @@ async def watched(live: LiveMission) -> AsyncIterator[AsyncIterator[LiveMessage]
 async def followed(live: LiveMission) -> AsyncIterator[tuple[int, Subscription]]:
     """Yield the id of the newest log entry, 0 without one, and the live messages that come after it."""
     with live.broadcaster.subscribe() as subscription:
-        live.telling.start()
+        live.feed.start()
         yield await _last_event_id(live), subscription
 
 

@@ -87,7 +87,7 @@ async def _store(live: LiveMission, survey: Survey | None, content: bytes, perio
             "content": content,
         }
         # Soundings that another process imported since are in the log, and not in the survey.
-        marks = (await site_queries.marks(session, live.id))._replace(last_import=live.whole.imports_noticed)
+        marks = (await site_queries.marks(session, live.id))._replace(last_import=live.stored_soundings.imports_noticed)
         if survey is None and not (marks.last_sounding or marks.last_block):
             return
         await site_queries.keep_survey(session, values | marks._asdict())

@@ -54,9 +54,9 @@ class TeamChanges:
 
     async def rejoin(self, live: LiveMission, name: str, actor: str) -> None:
         """Let a vehicle that left take part again, described as it was. Raises VehicleNotFoundError, ConflictError."""
-        member = live.team.left.get(name)
+        member = live.team.departed.get(name)
         if member is None:
-            gone = ", ".join(live.team.left) or "none"
+            gone = ", ".join(live.team.departed) or "none"
             raise VehicleNotFoundError(f"vehicle {name!r} has not left this mission", f"those that have: {gone}")
         await self.join(live, member.spec, actor)
 

@@ -111,7 +111,7 @@ def _nearest_first(live: LiveMission, part: Polygon) -> list[str]:
         away_m = float(np.hypot(*(member.last_end_m(live.frame) - middle)))
         return member.asked is not None, away_m, member.name
 
-    found = [member.name for member in sorted(live.team.present, key=far)]
+    found = [member.name for member in sorted(live.team.plannable, key=far)]
     return found or [member.name for member in live.team]
 
 

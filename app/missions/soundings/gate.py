@@ -126,12 +126,19 @@ def not_finite(values: Mapping[str, float]) -> str:
     return ""
 
 
-def impossible_place(lat_deg: float, lon_deg: float, vehicle_depth_m: float) -> str:
-    """Return why no vehicle can be at a place; empty when one can."""
+def impossible_coordinates(lat_deg: float, lon_deg: float) -> str:
+    """Return why there is no such place on the Earth; empty when there is."""
     if not -90 <= lat_deg <= 90:
         return f"lat_deg: {lat_deg} is not between -90 and 90"
     if not -180 <= lon_deg <= 180:
         return f"lon_deg: {lon_deg} is not between -180 and 180"
+    return ""
+
+
+def impossible_place(lat_deg: float, lon_deg: float, vehicle_depth_m: float) -> str:
+    """Return why no vehicle can be at a place; empty when one can."""
+    if reason := impossible_coordinates(lat_deg, lon_deg):
+        return reason
     if not -2 <= vehicle_depth_m <= MAX_OCEAN_DEPTH_M:
         return f"vehicle_depth_m: {vehicle_depth_m:g} is not between -2 and {MAX_OCEAN_DEPTH_M:g}"
     return ""

@@ -40,6 +40,11 @@ class ShipPosition:
     heading_deg: float | None = None
     status: str | None = None
 
+    @property
+    def lat_lon(self) -> tuple[float, float]:
+        """Latitude and longitude, degrees."""
+        return self.lat_deg, self.lon_deg
+
 
 @dataclass(frozen=True, slots=True)
 class ShipParticulars:

@@ -5,6 +5,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.traffic.sentences import ShipParticulars, ShipPosition
 
 MOST_SHIPS = 1000
@@ -18,7 +19,6 @@ SCATTER_M = 500.0
 """Positions differ by so much for other reasons than a ship's way."""
 JUMP_S = 60.0
 """Who was heard this long ago may be elsewhere now."""
-EARTH_M = 6_371_000.0
 
 
 @dataclass(slots=True)
@@ -95,7 +95,7 @@ class ShipList:
         if ship is None:
             return self._admit(position, now_s)
         silent_s = now_s - ship.heard_s
-        away_m = distance_m(ship.position.lat_deg, ship.position.lon_deg, position.lat_deg, position.lon_deg)
+        away_m = horizontal_distance_m(ship.position.lat_lon, position.lat_lon)
         if silent_s < JUMP_S and away_m > SCATTER_M + FASTEST_MPS * silent_s:
             self.jumps += 1
             return False
@@ -142,16 +142,7 @@ class ShipList:
         return self._first_to_go[-1] if self._first_to_go else None
 
     def _distance_m(self, position: ShipPosition) -> float:
-        return min((distance_m(position.lat_deg, position.lon_deg, *one) for one in self._missions), default=0.0)
-
-
-def distance_m(lat_deg: float, lon_deg: float, other_lat_deg: float, other_lon_deg: float) -> float:
-    """Return the distance of two places over a sphere, to about 0.5 %."""
-    north = math.radians(other_lat_deg - lat_deg)
-    east = math.radians((other_lon_deg - lon_deg + 180.0) % 360.0 - 180.0)
-    lat, other = math.radians(lat_deg), math.radians(other_lat_deg)
-    half = math.sin(0.5 * north) ** 2 + math.cos(lat) * math.cos(other) * math.sin(0.5 * east) ** 2
-    return 2.0 * EARTH_M * math.asin(min(1.0, math.sqrt(half)))
+        return min((horizontal_distance_m(position.lat_lon, one) for one in self._missions), default=0.0)
 
 
 def _merged(before: ShipParticulars, now: ShipParticulars) -> ShipParticulars:

@@ -8,11 +8,12 @@ from datetime import UTC, datetime
 
 import structlog
 
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
 from app.missions.settings import AisSettings
 from app.missions.traffic.own_ship import OwnShip
 from app.missions.traffic.sentences import SentenceError, SentenceReader, ShipPosition
-from app.missions.traffic.ship_list import NEAR_M, Ship, ShipList, distance_m
+from app.missions.traffic.ship_list import NEAR_M, Ship, ShipList
 from app.missions.traffic.sources import FileSource, Source, TcpSource, UdpSource
 
 TICK_S, MOST_PER_TICK = 0.05, 50
@@ -107,11 +108,8 @@ class Traffic:
 
     def near(self, lat_deg: float, lon_deg: float, within_m: float = NEAR_M) -> list[Ship]:
         """Return the ships within so far of a place."""
-        return [
-            ship
-            for ship in self.ships()
-            if distance_m(lat_deg, lon_deg, ship.position.lat_deg, ship.position.lon_deg) <= within_m
-        ]
+        here = lat_deg, lon_deg
+        return [ship for ship in self.ships() if horizontal_distance_m(here, ship.position.lat_lon) <= within_m]
 
     def states(self) -> list[SourceState]:
         """Return how each source is."""

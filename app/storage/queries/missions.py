@@ -17,7 +17,7 @@ ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id
 
 
 CHUNK = 500
-"""So many ids are asked for at once."""
+"""At most so many ids are asked for in one query."""
 
 
 async def summaries(session: AsyncSession, mission_ids: Sequence[str]) -> Sequence[tuple[str, dict[str, Any]]]:
@@ -194,12 +194,6 @@ async def first_step_at(session: AsyncSession, mission_id: str) -> datetime | No
     """Return when the first step was committed."""
     query = select(StepRow.committed_at).where(StepRow.mission_id == mission_id).order_by(StepRow.number).limit(1)
     return (await session.scalars(query)).first()
-
-
-async def waypoints_of_step(session: AsyncSession, mission_id: str, step: int) -> Sequence[WaypointRow]:
-    """Return the waypoints of one step."""
-    query = select(WaypointRow).where(WaypointRow.mission_id == mission_id, WaypointRow.step == step)
-    return (await session.scalars(query.order_by(WaypointRow.vehicle))).all()
 
 
 async def steps_after(session: AsyncSession, mission_id: str, after: int, limit: int) -> Sequence[StepRow]:

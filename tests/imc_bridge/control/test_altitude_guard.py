@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imc_bridge.control.altitude_guard import AltitudeGuard, DepthLimit
-from imc_bridge.control.distances import distance_m
 from imc_bridge.control.seabed import CELL_M, Seabed
+from imc_bridge.distances import distance_m
 from imc_bridge.events import BottomPoint
 
 LAT, LON = 41.185, -8.705

@@ -4,9 +4,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from imc_bridge import Waypoint
-from imc_bridge.control.distances import Place
 from imc_bridge.control.orders import Order
 from imc_bridge.control.references import SentReference
+from imc_bridge.distances import Place
 from imc_bridge.events import StateReport
 from simulator.geodesy import LocalFrame
 

@@ -11,7 +11,6 @@ from imc_bridge.nodes.plausibility import (
     ALLOWANCE_M,
     CONFIRM_S,
     CONFIRMATIONS,
-    EARTH_M,
     FASTEST_MPS,
     PlausiblePlace,
     Step,
@@ -19,6 +18,8 @@ from imc_bridge.nodes.plausibility import (
 from imc_bridge.telemetry.soundings import StateSample
 
 LAT = math.radians(41.0)
+EARTH_M = 6_363_000.0
+"""The radius of the meridian there."""
 
 
 def at(time_s: float, north_m: float, depth_m: float = 2.0, lon_rad: float = -0.15) -> StateSample:

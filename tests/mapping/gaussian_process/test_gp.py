@@ -275,8 +275,7 @@ def test_many_soundings_of_one_cell_count_as_one_and_the_map_stays_as_good() -> 
     grid = Grid(0.0, 0.0, 1.0, 20, 20)
     centre = grid.centres_m
     truth = (8.0 + np.sin(centre[:, 0] / 4.0) + 0.1 * centre[:, 1]).reshape(20, 20)
-    whole, limited = GaussianProcessMap(), GaussianProcessMap()
-    limited.least_merge_m = 0.5
+    whole, limited = GaussianProcessMap(), GaussianProcessMap(least_merge_m=0.5)
     fine, merged = (model.fit(soundings).predict(grid) for model in (whole, limited))
     off = [float(np.sqrt(np.mean((found.depth_m - truth) ** 2))) for found in (fine, merged)]
     assert off[1] <= 1.2 * off[0] < 0.05

@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Callable
 import numpy as np
 import pytest
 
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions import clock
 from app.missions.fleet.interface import (
     FleetEvent,
@@ -26,7 +27,7 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.imc import ImcFleetLink
-from app.missions.fleet.links.rest import RestFleetLink, horizontal_distance_m
+from app.missions.fleet.links.rest import RestFleetLink
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
@@ -225,7 +226,7 @@ async def bench(request: pytest.FixtureRequest) -> AsyncIterator[Bench]:
 def distance_m(bench: Bench, order: WaypointOrder) -> float:
     report = bench.info().report
     assert report is not None
-    return horizontal_distance_m(report.position, order.position)
+    return horizontal_distance_m(report.position.lat_lon, order.position.lat_lon)
 
 
 async def test_a_vehicle_never_heard_of_is_refused_with_reason_and_remedy(bench: Bench) -> None:

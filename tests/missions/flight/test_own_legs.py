@@ -243,8 +243,8 @@ async def test_vehicles_that_fall_silent_while_legs_are_exchanged_are_waited_for
 
     async def long_look(exchange: LegExchange) -> bool:
         changed = await look(exchange)
-        if not silent and len(live.team.present) == 2:
-            silent.extend(live.team.present)
+        if not silent and len(live.team.plannable) == 2:
+            silent.extend(live.team.plannable)
             for member in silent:
                 member.engaged = False
             asyncio.get_running_loop().call_later(0.3, come_back)

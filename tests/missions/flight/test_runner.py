@@ -80,7 +80,7 @@ async def test_a_step_that_every_vehicle_turns_down_is_sent_again(
     view = await until_state(service, mission, MissionState.FINISHED)
     assert refused == 4
     async with service._database.reading() as session:
-        steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+        steps = [await mission_queries.waypoints_between(session, mission, number, number) for number in (1, 2)]
     assert view.progress.step == 2
     assert {row.status for rows in steps for row in rows} == {"reached"}
 
@@ -104,7 +104,7 @@ async def test_a_waypoint_that_is_committed_while_the_link_is_away_is_sent(
     await act(service, mission, "start", actor="Ana")
     await until_state(service, mission, MissionState.FINISHED)
     async with service._database.reading() as session:
-        steps = [await mission_queries.waypoints_of_step(session, mission, number) for number in (1, 2)]
+        steps = [await mission_queries.waypoints_between(session, mission, number, number) for number in (1, 2)]
     assert all(row.status in ("sent", "acknowledged", "reached") for rows in steps for row in rows)
     assert all(row.status == "reached" for row in steps[0]) or any(row.status != "planned" for row in steps[1])
 

@@ -50,7 +50,7 @@ async def test_a_survey_goes_round_shoals_and_maps_the_ground_between_them(
     await act(service, mission, "start")
     places: dict[str, list[tuple[float, float]]] = {"a": [], "b": []}
     while live.header.state == MissionState.RUNNING:
-        for member in live.team.present:
+        for member in live.team.plannable:
             if member.report is not None:
                 east_m, north_m = member.place_m(live.frame)
                 places[member.name].append((float(east_m), float(north_m)))

@@ -81,7 +81,7 @@ def test_while_soundings_are_read_the_map_stays_and_those_that_come_meanwhile_co
     made = builder.build()
     assert made is not None
     assert (made.soundings, made.digest, made.version) == (65, whole.digest, 2)
-    assert builder.true
+    assert builder.is_current
 
 
 def test_released_soundings_leave_the_map_and_its_doubts() -> None:
@@ -146,7 +146,7 @@ async def test_soundings_that_another_process_stored_are_found(harbour: Harbour,
         # As if the process had been killed before it stored the map of all 81.
         await session.merge(kept)
     live = harbour.service._registry._live[mission]
-    live.whole._kept = live.builder.newest
+    live.stored_soundings._kept = live.builder.newest
     await harbour.reopen()
     assert (await view_of(harbour.service, mission)).progress.soundings == 81
     assert (await newest_map(await harbour.service.get(mission), harbour.service.maps)).built.soundings == 81

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from app.missions.live.journals.journal import METRES_PER_DEGREE
-from app.missions.live.trails import TOLERANCE_M, in_order, worth_drawing
+from app.missions.live.trails import METRES_PER_DEGREE, TOLERANCE_M, in_order, worth_drawing
 from tests.support.missions.harbour import Harbour, Rover, act, sim_spec
 from tests.support.missions.specs import lon_lat
 
@@ -75,4 +74,21 @@ async def test_a_position_that_is_corrected_is_no_way_that_was_flown_also_after_
         await rover.post(lat_deg=lat, lon_deg=lon)
     for _ in range(2):
         assert (await service.get(mission.id)).journal.travelled_m == pytest.approx(5.0, abs=0.1)
+        service = await harbour.reopen(time_scale=1.0)
+
+
+async def test_a_way_across_180_degrees_is_as_long_as_any_other(harbour: Harbour) -> None:
+    service = await harbour.reopen(time_scale=1.0)
+    west = 179.9995
+    ring = [[west, -17.0], [180.0, -17.0], [180.0, -16.999], [west, -16.999], [west, -17.0]]
+    mission = await service.create(
+        sim_spec(vehicles=[{"name": "a", "kind": "rest"}], area={"type": "Polygon", "coordinates": [ring]})
+    )
+    rover = Rover(service, mission.id, "a")
+    await rover.post(lat_deg=-17.0, lon_deg=179.99999)
+    await act(service, mission.id, "start")
+    for lon_deg in (179.99999, -179.99999):
+        await rover.post(lat_deg=-17.0, lon_deg=lon_deg)
+    for _ in range(2):
+        assert (await service.get(mission.id)).journal.travelled_m == pytest.approx(2.1, abs=0.1)
         service = await harbour.reopen(time_scale=1.0)

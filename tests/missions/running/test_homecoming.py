@@ -305,7 +305,7 @@ async def test_who_waited_before_the_mission_was_stopped_waits_in_circles_after_
 
     def waiting() -> bool:
         done = not team["a"].ordered and team["a"].way_left_m(live.spec) == 0.0
-        return done and all(member.present and member.waits_m is not None for member in team.values())
+        return done and all(member.controllable and member.waits_m is not None for member in team.values())
 
     await until(waiting, "one is held, one is done")
     if stopped_by == "a pause":

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.missions.traffic.sentences import ShipParticulars, ShipPosition
-from app.missions.traffic.ship_list import JUMP_S, MOST_SHIPS, ShipList, distance_m
+from app.missions.traffic.ship_list import JUMP_S, MOST_SHIPS, ShipList
 
 HERE = (41.18, -8.70)
 SPAIN = (43.4, -8.2)
@@ -101,7 +101,3 @@ def test_no_history_leaves_an_old_ship_or_more_than_there_is_room_for(
         ships.forget_silent(now_s)
         assert all(now_s - ship.heard_s <= 600.0 for ship in ships)
         assert len({ship.position.mmsi for ship in ships}) == len(ships) <= 30
-
-
-def test_distances_over_the_date_line_are_short() -> None:
-    assert distance_m(0.0, 179.999, 0.0, -179.999) == pytest.approx(222.4, rel=0.01)

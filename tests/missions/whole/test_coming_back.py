@@ -25,7 +25,7 @@ class Deaf:
 
     def __init__(self, bridge: Bridge) -> None:
         self._bridge = bridge
-        self._send, self._hear = bridge.transport.send, bridge._hearing._take_packet
+        self._send, self._hear = bridge.transport.send, bridge._receiver._take_packet
 
     def mute(self, kinds: set[bytes]) -> None:
         """Lose what is sent of these kinds."""
@@ -33,11 +33,11 @@ class Deaf:
 
     def deafen(self) -> None:
         """Lose everything that comes in."""
-        self._bridge._hearing._take_packet = lambda packet, address: None
+        self._bridge._receiver._take_packet = lambda packet, address: None
 
     def hear(self) -> None:
         """Take in again what comes."""
-        self._bridge._hearing._take_packet = self._hear
+        self._bridge._receiver._take_packet = self._hear
 
     def speak(self) -> None:
         """Send again."""
@@ -126,7 +126,7 @@ async def test_a_bridge_that_was_held_up_blames_no_vehicle() -> None:
         sea.bridge.goto(name, sea.waypoint(0, 50, 70, 1.0))
         await until(lambda: WaypointStatus.ACKNOWLEDGED in sea.statuses(name, 0), "it was acknowledged")
         clock, leap = sea.bridge._clock, [0.0]
-        sea.bridge._clock = sea.bridge._hearing._clock = lambda: clock() + leap[0]
+        sea.bridge._clock = sea.bridge._receiver._clock = lambda: clock() + leap[0]
         # 20 s at once, 400 s of the vehicle's: as if the machine had stood still.
         leap[0] = 20.0
         await sea.reached(name, 0)

@@ -180,7 +180,7 @@ async def test_who_went_home_left_and_came_back_surveys_after_a_restart_too(harb
 
     live = await (await harbour.reopen()).get(mission)
     assert live.team.named("a").withdrawal is None
-    await until(lambda: live.team.named("a").surveys, "it surveys still")
+    await until(lambda: live.team.named("a").plannable, "it surveys still")
 
 
 async def test_who_left_surveys_no_more(service: MissionService) -> None:

@@ -97,7 +97,7 @@ async def test_watchers_see_ships_where_something_listens(harbour_closed: Harbou
     live = await service.get(mission.id)
     async with ship_at(service, lambda: HOME):
         with live.broadcaster.subscribe() as subscription:
-            live.telling.start()
+            live.feed.start()
             async with asyncio.timeout(60):
                 async for message in subscription:
                     if isinstance(message, TrafficMessage) and message.ships:

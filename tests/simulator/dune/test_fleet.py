@@ -150,10 +150,12 @@ async def test_the_fleet_describes_itself() -> None:
 
 async def test_all_sockets_are_released() -> None:
     fleet = fleet_of(2)
+    taken = []
     for _ in range(2):
         async with fleet:
-            pass
+            taken.append([node.address for node in fleet.nodes])
         await asyncio.sleep(0)
+    assert taken[0] == taken[1], "a port that is still taken is passed over"
 
 
 async def test_a_taken_port_is_passed_over() -> None:

@@ -134,7 +134,7 @@ async def test_newest_waypoints_are_one_for_each_vehicle(database: Database) -> 
         last = await mission_queries.last_step(session, "m1")
         assert last is not None
         assert (last.number, last.memory) == (2, b"\x00memory")
-        assert [w.vehicle for w in await mission_queries.waypoints_of_step(session, "m1", 1)] == ["a", "b"]
+        assert [w.vehicle for w in await mission_queries.waypoints_between(session, "m1", 1, 1)] == ["a", "b"]
 
 
 async def test_missions_come_newest_first_in_the_state_they_are_in(database: Database) -> None:

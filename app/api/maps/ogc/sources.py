@@ -40,7 +40,7 @@ NEAR_M = 500.0
 METRES_PER_DEGREE = 111_000.0
 
 FEW = 4
-"""Of so many missions all features are counted."""
+"""All features are counted of at most so many missions."""
 
 LARGEST_ID = 2**63 - 1
 

@@ -29,7 +29,7 @@ from app.missions.spec.limits import Limits
 from app.storage.models import MissionRow
 
 MOST_MISSIONS = 8
-"""So many missions, the newest, are drawn into one picture."""
+"""At most so many missions, the newest, are drawn into one picture."""
 BESIDE_M = 1000.0
 """Maps reach a little beyond their areas."""
 

@@ -32,7 +32,10 @@ SAME_OF_STEP = 1e-3
 
 
 class LandmarkRegressors:
-    """See the module's text."""
+    """Regressors of sensors that see landmarks from afar, from the current estimates of the landmarks.
+
+    The module's text tells what is expected of the open ones, and which one the team heads for.
+    """
 
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         if not isinstance(sensor, RangeSensor):
@@ -106,7 +109,7 @@ class LandmarkRegressors:
         return team.positions + team_moves(self._seed, team.vehicles, n, 3, step, alpha)
 
     def regressors(self, candidates: FloatArray) -> FloatArray:
-        """See the module's text."""
+        """Return phi of each candidate, (c, 3): progress and newly accurate ones in sight, nearness of open ones."""
         if len(self._points) == 0:
             return np.zeros((len(candidates), 3))
         configurations = np.ascontiguousarray(candidates)

@@ -94,7 +94,10 @@ class GivenLeg(NamedTuple):
 
 
 class SurveyRegressors:
-    """See the module's text."""
+    """Regressors of bathymeter missions: what a leg gains, and how good the final map becomes with it.
+
+    The module's text tells how the team's plan is made, renewed and followed.
+    """
 
     def __init__(self, options: PlannerOptions, at_cruise: AtCruise, *, every_step: bool = False) -> None:
         """Vehicles move at their cruise depths by ``at_cruise``.
@@ -210,7 +213,7 @@ class SurveyRegressors:
         return self._at_cruise(team, self._bottom, np.array(targets))
 
     def regressors(self, candidates: FloatArray) -> FloatArray:
-        """See the module's text."""
+        """Return phi of each candidate, (c, 2): the final map's improvement, and the uncertainty its legs remove."""
         if not self._looks:
             return np.tile(self._row, (len(candidates), 1))
         values = self._after_legs(candidates)

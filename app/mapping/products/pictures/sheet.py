@@ -21,7 +21,7 @@ MOST_CELLS = 1000
 SHADOW = 0.75
 """Part of the colours' brightness that depends on the light."""
 MOST_NUMBERED = 40
-"""So many holidays have their numbers beside them."""
+"""At most so many holidays have their numbers beside them."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from app.mapping.readers.types import MAX_DEPTH_M, MAX_SOUNDINGS, MapExtent, Poi
 from app.mapping.types import Grid, Soundings
 
 BATCH_SOUNDINGS = 1 << 16
-"""So many are placed together."""
+"""Soundings are placed together as soon as so many wait."""
 REACH_M = 15_000.0
 """Farther aside no sonar sees; what lies beyond is damaged."""
 NEAR_M = 180_000.0

@@ -136,7 +136,7 @@ class ImcFleetLink(FleetLink):
             self._bridge.want(vehicle.gateway)
         self._show_area(deployment.mission.name, deployment.mission.area.ring)
 
-    def withdraw(self, deployment: Deployment) -> None:
+    def end_deployment(self, deployment: Deployment) -> None:
         """Take the mission's area off other consoles."""
         self._show_area(deployment.mission.name, ())
 

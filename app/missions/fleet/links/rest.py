@@ -10,12 +10,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
 from app.missions.fleet.interface import (
     EventSink,
     LinkCapabilities,
     LinkState,
-    Position,
     StopReceipt,
     VehicleInfo,
     VehicleRefusedError,
@@ -24,10 +24,8 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.visiting import VisitedLink, Visitor
-from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, Step, distance_m, reach_m
+from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, Step, moved_m, reach_m
 from imc_bridge.telemetry.soundings import StateSample
-
-EARTH_RADIUS_M = 6_371_000.0
 
 KEPT_S = 86_400.0
 """For how long vehicles may keep positions before they post them, at the most: older ones tell of another clock."""
@@ -158,7 +156,7 @@ class RestFleetLink(VisitedLink):
             return ""
         self._touch(report.vehicle)
         passed_s = abs(sample.time_s - last.time_s) / self._time_scale
-        away_m, most_m = distance_m(last, sample), reach_m(last, sample)
+        away_m, most_m = moved_m(last, sample), reach_m(last, sample)
         return (
             f"lat_deg, lon_deg, depth_m: {away_m:.0f} m from where it was {passed_s:.1f} s before; "
             f"at most {most_m:.0f} m can be; believed once {CONFIRMATIONS} positions in a row agree"
@@ -210,7 +208,7 @@ class RestFleetLink(VisitedLink):
         order, report = poller.order, poller.report
         if order is None or report is None or poller.status is not WaypointStatus.ACKNOWLEDGED:
             return
-        if horizontal_distance_m(report.position, order.position) <= order.arrival_radius_m:
+        if horizontal_distance_m(report.position.lat_lon, order.position.lat_lon) <= order.arrival_radius_m:
             self._report(poller, WaypointStatus.REACHED)
 
     def told_to_stop(self, vehicle: str, mission_id: str) -> None:
@@ -241,10 +239,3 @@ class RestFleetLink(VisitedLink):
     def _silent(self) -> Iterable[Visitor]:
         limit_s = asyncio.get_running_loop().time() - self._lost_after_s
         return [poller for poller in self._pollers.values() if poller.heard_s < limit_s]
-
-
-def horizontal_distance_m(a: Position, b: Position) -> float:
-    """Return the distance over the ground; good to 0.5 %, which arrival needs no better than."""
-    north = math.radians(b.lat_deg - a.lat_deg)
-    east = math.radians(b.lon_deg - a.lon_deg) * math.cos(math.radians((a.lat_deg + b.lat_deg) / 2))
-    return EARTH_RADIUS_M * math.hypot(north, east)

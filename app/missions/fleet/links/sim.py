@@ -170,7 +170,7 @@ class SimFleetLink(FleetLink):
         except ValueError as error:
             raise VehicleRefusedError(vehicle.name, f"cannot be launched: {error}", "change its start") from error
 
-    def withdraw(self, deployment: Deployment) -> None:
+    def end_deployment(self, deployment: Deployment) -> None:
         """Put a vehicle away, unless another mission has it."""
         there = self._deployed.get(deployment.vehicle.name)
         if there is not None and there.mission_id == deployment.mission_id:

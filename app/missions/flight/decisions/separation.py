@@ -33,9 +33,9 @@ def too_close(decision: Decision, live: LiveMission, spec: MissionSpec) -> dict[
     limits = spec.limits
     if limits.min_separation_m <= 0.0:
         return {}
-    before = {m.name: planned_motion(m, live) for m in live.team if m.present}
+    before = {m.name: planned_motion(m, live) for m in live.team if m.controllable}
     new = {leg.vehicle: leg.target_m for leg in decision.legs if not leg.refusal and leg.vehicle in before}
-    speeds, current_mps = {m.name: spec.speed_of(m.spec) for m in live.team if m.present}, live.team.current_mps
+    speeds, current_mps = {m.name: spec.speed_of(m.spec) for m in live.team if m.controllable}, live.team.current_mps
     setting_out = {
         m.name: steered_ahead(live, m, [*planned_places(m, live)[:1], new[m.name]], math.inf)
         for m in live.team
@@ -83,7 +83,7 @@ def passes_above(member: Member, live: LiveMission, spec: MissionSpec) -> str:
     rise = Timeline(np.array([0.0, max(depth_m / ASCENT_MPS, 1e-3)]), up)
     for other in live.team:
         ended = other.withdrawal is not None and other.withdrawal.over
-        if other is member or ended or not other.present or other.report is None:
+        if other is member or ended or not other.controllable or other.report is None:
             continue
         if other.report.position.depth_m > depth_m - limits.min_vertical_separation_m:
             continue

@@ -80,7 +80,7 @@ class StepMaps:
             await making
         await live.journal.flush()
         await live.notice_imports()
-        await live.whole.complete()
+        await live.stored_soundings.complete()
         await live.swath.complete()
         if patient and live.builder.stale and (self._due or live.builder.newest is None):
             await self._make()
@@ -95,7 +95,7 @@ class StepMaps:
         live, loop = self._live, asyncio.get_running_loop()
         started_s = loop.time()
         await live.journal.flush()
-        await live.whole.complete()
+        await live.stored_soundings.complete()
         await live.swath.complete()
         if live.builder.newest is None:
             await self._ready()
@@ -105,7 +105,7 @@ class StepMaps:
             live.publish_map(built)
         self._made_at_s = loop.time()
         self._took_s = self._made_at_s - started_s
-        await live.whole.keep_when_grown(live.header.step)
+        await live.stored_soundings.keep_when_grown(live.header.step)
 
 
 def _learn(builder: MapBuilder) -> None:

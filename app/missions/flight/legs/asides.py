@@ -126,7 +126,7 @@ def _follows(member: Member) -> bool:
     """Whether a vehicle can be led by orders that it gets at once."""
     waits = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
     # Orders by sound, and plans, take longer than there is.
-    return waits and member.spec.guidance is Guidance.FOLLOW and member.present
+    return waits and member.spec.guidance is Guidance.FOLLOW and member.controllable
 
 
 def depth_now_m(member: Member) -> float:

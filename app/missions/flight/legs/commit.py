@@ -107,7 +107,7 @@ class LegCommit:
         self.take_bottom(decision.bottom)
         starts_m = decision.origin_m
         for row, leg, member in zip(rows, decision.legs, getting, strict=True):
-            now_of_name = live.team.get(row.vehicle) or live.team.left.get(row.vehicle)
+            now_of_name = live.team.get(row.vehicle) or live.team.departed.get(row.vehicle)
             if now_of_name is not None:
                 now_of_name.legs = max(now_of_name.legs, row.step)  # it may have left, or come back, meanwhile
             if member is None or member is not now_of_name or member.left_at is not None:

@@ -114,7 +114,7 @@ class Dispatch:
         now_s, due_s = asyncio.get_running_loop().time(), []
         for member in self._live.team:
             flies = member.capabilities.circles_m > 0.0 or member.capabilities.simulated
-            idle = flies and member.surveys and member.legs and not member.ordered and not member.ahead
+            idle = flies and member.plannable and member.legs and not member.ordered and not member.ahead
             if not idle or self._live.halted:
                 self._idle_since_s.pop(member.name, None)
                 continue

@@ -52,12 +52,12 @@ class LegExchange:
         live = self._live
         if live.builder.newest is self._looked_at or live.halted:
             return False
-        old = {member.name: legs for member in live.team.present if (legs := self._open_legs(member))}
+        old = {member.name: legs for member in live.team.plannable if (legs := self._open_legs(member))}
         planner = self._decider.planner
         memory, most = planner.snapshot(), {name: len(legs) for name, legs in old.items()}
         if not old or not planner.take_back(most):
             return False
-        places = [self._place(member, old.get(member.name, [])) for member in live.team.present]
+        places = [self._place(member, old.get(member.name, [])) for member in live.team.plannable]
         number = max(legs[0].number for legs in old.values())
         try:
             decisions = await self._decider.decide(number, places, legs=max(most.values()), most=most)
@@ -131,7 +131,7 @@ class LegExchange:
         live, members = self._live, []
         for name, legs in old.items():
             member = live.team.get(name)
-            if member is None or not member.present or member.withdrawal is not None:
+            if member is None or not member.controllable or member.withdrawal is not None:
                 return False
             if member.ahead[-len(legs) :] != legs or not (member.ordered or len(member.ahead) > len(legs)):
                 return False  # some were begun, or dropped

@@ -184,7 +184,7 @@ class GivingWay:
         now_s = asyncio.get_running_loop().time()
         for name, giving in self._asides.of(Because.VEHICLE).items():
             member = self._live.team.get(name)
-            if member is None or not member.present:
+            if member is None or not member.controllable:
                 continue
             at = next((k for k, that in enumerate(near) if that.member is member), None)
             if at is None:

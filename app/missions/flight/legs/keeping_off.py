@@ -140,7 +140,7 @@ class KeepingOff:
         tries = tries if last is member.order else 0
         self._tries[member.name] = (member.order, tries + 1)
         await self._lead_aside(member, places)
-        if tries >= MOST_TRIES and member.surveys:
+        if tries >= MOST_TRIES and member.plannable:
             await self._asides.give_up(member, "its turns would lead it into a keep-out zone")
 
     async def _lead_aside(self, member: Member, places: list[FloatArray]) -> None:

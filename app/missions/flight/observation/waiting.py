@@ -36,9 +36,9 @@ class Waiting:
         team = self._live.team
         if patient_s is not None:
             deadline_s = asyncio.get_running_loop().time() + patient_s
-            if await self.until(lambda: self._nobody_surveys or self._all_present, deadline_s):
+            if await self.until(lambda: self._nobody_surveys or self._all_controllable, deadline_s):
                 return await self._note_over()
-        if not team.present and not self._nobody_surveys:
+        if not team.plannable and not self._nobody_surveys:
             await self._for_anybody()
         return await self._note_over()
 
@@ -68,7 +68,7 @@ class Waiting:
         )
         if not live.journal.alarms.standing([AlarmKind.NO_VEHICLE]):
             await live.journal.alarm(AlarmKind.NO_VEHICLE, message, vehicles=absent)
-        await self.until(lambda: bool(team.present) or self._nobody_surveys, None)
+        await self.until(lambda: bool(team.plannable) or self._nobody_surveys, None)
 
     async def _note_over(self) -> None:
         """End the alarm that nobody can be sent, whoever raised it: the mission may have been paused meanwhile."""
@@ -77,9 +77,9 @@ class Waiting:
             await self._live.journal.end([AlarmKind.NO_VEHICLE], "a vehicle can be sent again")
 
     @property
-    def _all_present(self) -> bool:
+    def _all_controllable(self) -> bool:
         team = self._live.team
-        return bool(team.present) and all(member.present for member in team.surveying)
+        return bool(team.plannable) and all(member.controllable for member in team.surveying)
 
     @property
     def _nobody_surveys(self) -> bool:

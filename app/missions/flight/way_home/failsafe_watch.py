@@ -225,7 +225,7 @@ class FailsafeWatch:
     def _too_close(self) -> dict[str, dict[Failsafe, str]]:
         """Return whom vehicles are too close to."""
         limits, live = self._live.spec.limits, self._live
-        flying = [m for m in live.team if m.present and m.report is not None and m.legs]
+        flying = [m for m in live.team if m.controllable and m.report is not None and m.legs]
         found: dict[str, dict[Failsafe, str]] = {}
         for one, other in combinations(flying, 2):
             # By when they came: vehicles' own clocks may differ by hours.

@@ -38,7 +38,7 @@ class OnboardWays:
     async def keep(self) -> None:
         """Go on until cancelled."""
         while True:
-            able = [member for member in self._live.team if member.capabilities.keeps_way_home and member.present]
+            able = [member for member in self._live.team if member.capabilities.keeps_way_home and member.controllable]
             await asyncio.gather(*(self._renew(member) for member in able))
             await asyncio.sleep(max(PERIOD_S / self._time_scale, LEAST_LOOK_S))
 

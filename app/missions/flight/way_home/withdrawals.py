@@ -106,7 +106,7 @@ class Withdrawals:
                 return False
             now_s = asyncio.get_running_loop().time()
             away = [m for m in self._live.team if m.withdrawal is not None and not self._is_done(m)]
-            silent_since_s = {m.name: silent_since_s.get(m.name, now_s) for m in away if not m.present}
+            silent_since_s = {m.name: silent_since_s.get(m.name, now_s) for m in away if not m.controllable}
             lost = [m for m in away if now_s - silent_since_s.get(m.name, now_s) >= LINK_LOST_S / self._time_scale]
             if len(lost) == len(away):
                 for member in lost:
@@ -131,7 +131,7 @@ class Withdrawals:
         elif withdrawal.response is Response.RETURN and (why := self._barred(member)):
             self._dispatch.give_up_legs(member, why)
             await self._go_home(member, withdrawal)
-        elif not member.present or await self._waits_below(member, withdrawal) or member.ordered:
+        elif not member.controllable or await self._waits_below(member, withdrawal) or member.ordered:
             return
         elif member.ahead:
             await self._dispatch.begin()
@@ -169,7 +169,7 @@ class Withdrawals:
     def _barred(self, member: Member) -> str:
         """Return why a vehicle gets another way home than the one it flies; '' where it may go on."""
         search = self._live.search
-        if search is not None and member.present and member.ordered and member.target_m is not None:
+        if search is not None and member.controllable and member.ordered and member.target_m is not None:
             here_m = member.place_m(self._live.frame)
             away_m = math.dist(here_m, member.target_m)
             if away_m > self._live.spec.arrival_radius_m and not search.clear(here_m, member.target_m):
@@ -180,7 +180,7 @@ class Withdrawals:
     def _lies_on_its_way(self, member: Member) -> str:
         """Return who came to lie on a vehicle's way home since it was led there; '' where nobody did."""
         limits, known = self._live.spec.limits, self._lay.get(member.name, frozenset())
-        if not member.present or not member.ordered or member.order is None or member.target_m is None:
+        if not member.controllable or not member.ordered or member.order is None or member.target_m is None:
             return ""
         way_m = np.array([member.target_m, *(leg.target_m for leg in member.ahead)])
         depths_m = [member.order.position.depth_m, *(leg.position.depth_m for leg in member.ahead)]
@@ -226,7 +226,7 @@ class Withdrawals:
 
     async def _hold(self, member: Member) -> None:
         """Have a vehicle wait near where it is: once, and again when it was away since, or was stopped."""
-        if not member.present:
+        if not member.controllable:
             self._held.discard(member.name)
         elif member.name not in self._held:
             self._held.add(member.name)

@@ -7,13 +7,13 @@ import asyncio
 import math
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
 import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.mapping.swath.pings import Pings
 from app.missions import metrics
 from app.missions.alarm_kinds import ALARMS, AlarmKind
@@ -45,7 +45,6 @@ FLUSH_PERIOD_S = 0.1
 ENDS = "ends"
 """What a line's data name the kinds of alarms by that it ends."""
 TRACK_SPACING_M = 1.0
-METRES_PER_DEGREE = 111_320.0
 
 TakeScans = Callable[[Sequence[ScanReport], int, AsyncSession], Awaitable[tuple[list[ItemVerdict], Committed]]]
 """Stores scans of a step in a transaction; returns the verdicts and what to call once it has committed."""
@@ -149,13 +148,12 @@ class Journal(WriteBehind[Noted]):
 
     def position(self, report: VehicleReport) -> None:
         """Note a point of a track, unless it is close to the last one."""
-        place = report.position
-        end = (place.lon_deg, place.lat_deg)
+        end = report.position.lat_lon
         last = self._track_ends.get(report.vehicle)
         passed_s = report.time_s - self._heard_s.get(report.vehicle, report.time_s)
         self._heard_s[report.vehicle] = report.time_s
         if last is not None:
-            leg_m = track_length_m([last, end])
+            leg_m = horizontal_distance_m(last, end)
             if leg_m < TRACK_SPACING_M:
                 return
             self.travelled_m += leg_m if is_flown(leg_m, passed_s) else 0.0
@@ -420,14 +418,6 @@ def position_row(mission_id: str, report: VehicleReport, *, imported: bool = Fal
         "depth_m": place.depth_m,
         "imported": imported,
     }
-
-
-def track_length_m(track: Sequence[tuple[float, float]]) -> float:
-    """Return the length of a line through (longitude, latitude) points a short way apart; good to 0.5 %."""
-    return sum(
-        METRES_PER_DEGREE * math.hypot((lon2 - lon1) * math.cos(math.radians(lat1)), lat2 - lat1)
-        for (lon1, lat1), (lon2, lat2) in pairwise(track)
-    )
 
 
 def event_view(row: EventRow) -> EventView:

@@ -11,7 +11,7 @@ from app.missions.views.messages import AlarmMessage
 from app.storage.models import AlarmRow
 
 MOST_SHOWN = 500
-"""Of more than so many the oldest are not shown; all are in the list of the service."""
+"""At most so many alarms are shown, the newest; all are in the list of the service."""
 
 
 class MissionAlarms:

@@ -57,7 +57,7 @@ class VehicleViews:
     def all(self) -> list[VehicleView]:
         """Return the vehicles that take part, and after them those that left, as they were last heard of."""
         infos = self._hub.infos()
-        shown = [*self._team, *(member for member in self._team.left.values() if member.report is not None)]
+        shown = [*self._team, *(member for member in self._team.departed.values() if member.report is not None)]
         return [self._view(member, infos.get(member.key)) for member in shown]
 
     def of(self, info: VehicleInfo) -> VehicleView | None:
@@ -211,7 +211,7 @@ def _reason(member: Member, info: VehicleInfo) -> str:
 
 def _waits_for_the_others(member: Member, spec: MissionSpec) -> str:
     """Return why a vehicle that follows us is sent nowhere any more; '' where it surveys."""
-    begun = member.present and member.withdrawal is None and member.legs > 0
+    begun = member.controllable and member.withdrawal is None and member.legs > 0
     if not begun or member.flown.phase is not Phase.STOPPED or member.way_left_m(spec) > 0.0:
         return ""
     return "it has flown all of the length that it was given, and waits for the others"

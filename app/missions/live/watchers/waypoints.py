@@ -56,7 +56,7 @@ class WaypointViews:
     def _view(
         self, vehicle: str, step: int, place: Position, en_m: tuple[float, float], status: str, reason: str
     ) -> WaypointView:
-        member = self._team.get(vehicle) or self._team.left.get(vehicle)
+        member = self._team.get(vehicle) or self._team.departed.get(vehicle)
         return WaypointView.model_validate(
             {
                 "vehicle": vehicle,

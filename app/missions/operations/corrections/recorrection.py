@@ -31,7 +31,7 @@ from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import stored_maps
 
 AT_ONCE = 10_000
-"""So many soundings are corrected and written at a time."""
+"""At most so many soundings are corrected and written at a time."""
 
 NUMBERS = ("level_m", "east_m", "north_m", "depth_m")
 

@@ -13,11 +13,12 @@ import shapely
 from pydantic import TypeAdapter, ValidationError
 from shapely.geometry import Polygon
 
+from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.interface import PingReport, Position, SoundingReport, VehicleReport
 from app.missions.fleet.links.imc import bridge_settings, ping_report, sounding_report, vehicle_report
-from app.missions.live.journals.journal import TRACK_SPACING_M, position_row, track_length_m
+from app.missions.live.journals.journal import TRACK_SPACING_M, position_row
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.operations.imports.multibeam_log import MultibeamLog, is_multibeam
@@ -186,8 +187,8 @@ class LogImport:
             elif isinstance(event, SwathPing):
                 yield ping_report(event)
             elif isinstance(event, StateReport):
-                end = (event.lon_deg, event.lat_deg)
-                if last is None or track_length_m([last, end]) >= TRACK_SPACING_M:
+                end = (event.lat_deg, event.lon_deg)
+                if last is None or horizontal_distance_m(last, end) >= TRACK_SPACING_M:
                     last = end
                     report = vehicle_report(event)
                     place = local_place(self._live.frame, report.position)

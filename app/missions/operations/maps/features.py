@@ -176,7 +176,7 @@ def _vehicles(live: LiveMission) -> list[Feature]:
         return []
     found = []
     for view in sorted(live.vehicles.all(), key=lambda view: view.name):
-        member = live.team.get(view.name) or live.team.left.get(view.name)
+        member = live.team.get(view.name) or live.team.departed.get(view.name)
         if view.lat_deg is None or view.lon_deg is None or member is None or member.report is None:
             continue
         shown = view.model_dump(mode="json", include=set(_VEHICLE_FIELDS))

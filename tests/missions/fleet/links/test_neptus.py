@@ -228,8 +228,9 @@ async def _settled(gateway: Gateway, mission_id: str, step: int) -> set[str]:
 
     async def there() -> bool:
         async with gateway.database.reading() as session:
+            rows = await queries.waypoints_between(session, mission_id, step, step)
             found.clear()
-            found.update(row.status for row in await queries.waypoints_of_step(session, mission_id, step))
+            found.update(row.status for row in rows)
         return found == {"reached"}
 
     await until(there, f"step {step} is settled")
