@@ -31,8 +31,9 @@ from app.api.accounts.audit_log import AuditLog, AuditMiddleware
 from app.api.accounts.peers import is_own_user
 from app.api.accounts.quotas import Shares
 from app.api.accounts.rates import LimitMiddleware, RequestLimits
+from app.api.accounts.roles import Role
 from app.api.accounts.sessions import SessionStore
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.tokens import TokenStore
 from app.api.bodies.admission import BodyMiddleware
 from app.api.bodies.budget import Budget
 from app.api.bodies.intake import Intakes

@@ -11,7 +11,8 @@ import httpx
 import pytest
 from fastapi.routing import APIRoute
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.api.bodies import admission as bodies
 from app.api.bodies import json_route
 from app.api.bodies.intake import BodyKind, Intakes
