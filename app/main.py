@@ -31,14 +31,15 @@ from app.api.accounts.audit_log import AuditLog, AuditMiddleware
 from app.api.accounts.peers import is_own_user
 from app.api.accounts.quotas import Shares
 from app.api.accounts.rates import LimitMiddleware, RequestLimits
+from app.api.accounts.roles import Role
 from app.api.accounts.sessions import SessionStore
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.tokens import TokenStore
 from app.api.bodies.admission import BodyMiddleware
 from app.api.bodies.budget import Budget
 from app.api.bodies.intake import Intakes
 from app.api.bodies.unread import UnreadBodyMiddleware
 from app.api.health import health_router
-from app.api.http import openapi, problems
+from app.api.http import error_handlers, openapi
 from app.api.maps import maps, profiles, sites, tiles
 from app.api.maps.ogc import routes as features
 from app.api.maps.wms import routes as web_maps
@@ -185,7 +186,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
         app.include_router(router)
     app.include_router(health_router(""), include_in_schema=False)
     mount_dashboard(app, charts=settings.charts)
-    problems.install(app)
+    error_handlers.install(app)
     openapi.install(app)
     _add_middleware(app, settings, limits)
     return app

@@ -6,7 +6,7 @@ import os
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 from urllib.parse import urlsplit
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
@@ -17,6 +17,7 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
+from app.log_choices import LogFormat, LogLevel
 from app.missions.settings import ServiceSettings
 
 PREFIX = "BATHYFLEET_"
@@ -113,8 +114,8 @@ class Settings(BaseSettings, ServiceSettings):
         default=None,
         description="Bring the database's tables up to date at the start; without a value: only for SQLite",
     )
-    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="How much is logged")
-    log_format: Literal["console", "json"] = Field(
+    log_level: LogLevel = Field(default="info", description="How much is logged")
+    log_format: LogFormat = Field(
         default="console", description="Lines for people, or one JSON object per line for log collectors"
     )
     charts: str = Field(

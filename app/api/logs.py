@@ -2,10 +2,11 @@
 
 import logging
 import sys
-from typing import Any, Literal, TextIO
+from typing import Any, TextIO
 
 import structlog
 
+from app.log_choices import LogFormat
 from imc_bridge.printable import printable
 
 _OF_SEVERAL_LINES = frozenset(("exception", "stack"))
@@ -43,7 +44,7 @@ class _Handler(logging.Handler):
             self.handleError(record)
 
 
-def configure(level: str = "info", form: Literal["console", "json"] = "console", stream: TextIO | None = None) -> None:
+def configure(level: str = "info", form: LogFormat = "console", stream: TextIO | None = None) -> None:
     """Send structlog's and the standard library's logs (uvicorn, SQLAlchemy, …) through one formatter.
 
     They go to ``stream``, by default to stderr.

@@ -16,8 +16,9 @@ from pydantic import (
     WrapValidator,
 )
 
+from app.api.http.field_problems import MAX_ERRORS, SUGGESTION, field_problem
 from app.api.http.json_text import Bounds, Unreadable
-from app.api.http.problems import MAX_ERRORS, SUGGESTION, FieldProblem, field_problem
+from app.api.http.problems import FieldProblem
 from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
 from app.missions.soundings.measurement import Measurement

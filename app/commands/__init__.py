@@ -1,1 +1,1 @@
-"""Commands of ``bathyfleet`` that are more than a few lines; ``app.cli`` puts them together."""
+"""The commands of ``bathyfleet``; ``app.cli`` puts them together. Those about the service itself are in ``service``."""

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 
     from app.settings import Settings
 
+FAILURE = 1
+USAGE = 2
+"""Exit codes: something failed, or the command cannot be understood."""
+
 Database = Annotated[
     str | None,
     typer.Option(help="Database URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME"),

@@ -2,6 +2,8 @@
 
 from enum import StrEnum
 
+from app.missions.errors import MissionError
+
 
 class MissionState(StrEnum):
     """Where a mission is in its life."""
@@ -56,15 +58,15 @@ _REMEDIES: dict[MissionState, str] = {
 }
 
 
-class MoveRefusedError(Exception):
+class MoveRefusedError(MissionError):
     """An action is not allowed in the state a mission is in."""
 
     def __init__(self, action: str, state: MissionState) -> None:
         allowed = ", ".join(MOVES[action])
-        super().__init__(f"cannot {action.replace('_', ' ')} a mission that is {state}; allowed from: {allowed}")
+        words = f"cannot {action.replace('_', ' ')} a mission that is {state}; allowed from: {allowed}"
+        super().__init__(words, remedy(state))
         self.action = action
         self.state = state
-        self.remedy = remedy(state)
 
 
 def remedy(state: MissionState) -> str:

@@ -7,7 +7,8 @@ from typing import Any
 import httpx
 import pytest
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.main import Server
 from app.missions.settings import ImcSettings
 from app.settings import Settings

@@ -24,7 +24,8 @@ from schemathesis.specs.openapi.checks import (
     response_schema_conformance,
 )
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from app.storage.database import Database

@@ -19,8 +19,10 @@ from websockets import ConnectionClosed
 from websockets.asyncio.client import connect
 
 from app.api import logs
-from app.api.accounts.tokens import Role, TokenStore
-from app.cli import _show_diagnosis, app
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
+from app.cli import app
+from app.commands.service.doctor import show_diagnosis
 from app.csv_cells import text_cell
 from app.mapping.products.kml import tracks_kml
 from app.mapping.products.tracks import Track, TrackPoint, tracks_gpx
@@ -126,7 +128,7 @@ def test_the_doctor_shows_names_of_strangers(
     monkeypatch.setenv("COLUMNS", "300")
     finding = problem(Cause.NO_TRAFFIC, f"nothing comes from {HOSTILE}", f"see {HOSTILE}")
     diagnosis = Diagnosis(1.0, (), (NodeDiagnosis(HOSTILE, 0x1E, NodeState.HEARD, (finding,)),))
-    _show_diagnosis(diagnosis)
+    show_diagnosis(diagnosis)
     shown = capsys.readouterr().out
     assert not OBEYED.search(shown)
     assert "[red]" in shown

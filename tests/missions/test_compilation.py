@@ -20,7 +20,9 @@ from numba.core.dispatcher import Dispatcher
 import app.exploration
 from app.estimation import SingleBeam
 from app.exploration.planners import create_planner, warm_up_planner
-from app.missions.flight.decisions.decision import Knowledge, Place, decide, make_constraints
+from app.missions.flight.decisions.decision import Knowledge, decide
+from app.missions.flight.decisions.leg import Place
+from app.missions.task.constraints import make_constraints
 from app.missions.live.mission import builder_of
 from tests.support.missions.harbour import sim_spec
 

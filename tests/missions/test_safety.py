@@ -15,8 +15,9 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Proposal, Situation
-from app.missions.flight.decisions.decision import Knowledge, decide, make_constraints
+from app.missions.flight.decisions.decision import Knowledge, decide
 from app.missions.safety import free_space, tide_and_bottom, travel_depth, waypoint_check
+from app.missions.task.constraints import make_constraints
 from tests.support.missions.decisions import Wishes, belief_of, decide_for, place
 from tests.support.missions.specs import lon_lat, make_spec, rectangle
 

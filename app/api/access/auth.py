@@ -13,8 +13,9 @@ from starlette.requests import HTTPConnection
 from app.api.accounts.peers import OWN_USER
 from app.api.accounts.processes import vouched_for
 from app.api.accounts.rates import RequestLimits, host_of
+from app.api.accounts.roles import Role
 from app.api.accounts.sessions import check_own_page, session_of
-from app.api.accounts.tokens import LOCAL_OPERATOR, Principal, Role, TokenStore
+from app.api.accounts.tokens import LOCAL_OPERATOR, Principal, TokenStore
 from app.api.http.links import key_prefix
 from app.api.http.problems import ProblemError
 from app.api.state import EdgeState, State

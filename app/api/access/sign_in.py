@@ -5,8 +5,9 @@ from pydantic import BaseModel, Field
 
 from app.api.access.auth import Reader
 from app.api.accounts.rates import bearer_of
+from app.api.accounts.roles import Role
 from app.api.accounts.sessions import give_cookie, session_of, take_cookie
-from app.api.accounts.tokens import LOCAL_OPERATOR, Principal, Role
+from app.api.accounts.tokens import LOCAL_OPERATOR, Principal
 from app.api.http.problems import problems
 from app.api.schemas import API
 from app.api.state import State

@@ -22,7 +22,8 @@ import httpx
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import Scope
 
-from app.api.accounts.tokens import Principal, Role
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import Principal
 from app.missions.running.ownership import Peer
 
 PEER = "x-bathyfleet-peer"

@@ -2,7 +2,8 @@
 
 from collections import Counter
 
-from app.api.accounts.tokens import LOCAL_OPERATOR, Principal, Role
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import LOCAL_OPERATOR, Principal
 from app.settings import is_loopback
 
 SHARE = 4

@@ -12,7 +12,8 @@ from starlette.requests import HTTPConnection, cookie_parser
 from starlette.responses import Response
 from starlette.types import Scope
 
-from app.api.accounts.tokens import Principal, Role, token_hash
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import Principal, token_hash
 from app.api.http.problems import ProblemError
 from app.storage.database import Database
 from app.storage.fast_read import AtOnce

@@ -6,9 +6,9 @@ import secrets
 import uuid
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from enum import StrEnum
 from pathlib import Path
 
+from app.api.accounts.roles import Role
 from app.storage import private
 from app.storage.concurrency.single_flight import Shared
 from app.storage.database import Database
@@ -20,19 +20,6 @@ from app.storage.upkeep.prepare import FIRST_TOKEN_FILE
 TOKEN_PREFIX = "bf_"  # noqa: S105 - makes leaked tokens easy to search for
 DIGESTS_READ_AGAIN_S = 0.1
 """However many guesses come, the tokens are not read again sooner."""
-
-
-class Role(StrEnum):
-    """What the holder of a token may do."""
-
-    VIEWER = "viewer"
-    """Look at everything."""
-    VEHICLE = "vehicle"
-    """Look, post measurements and fetch waypoints."""
-    OPERATOR = "operator"
-    """Everything that concerns missions."""
-    ADMIN = "admin"
-    """Everything."""
 
 
 @dataclass(frozen=True)

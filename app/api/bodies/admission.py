@@ -9,7 +9,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.bodies.budget import Budget, Lease
 from app.api.bodies.intake import BodyKind, Intake, Intakes, declared_bytes, has_body
-from app.api.http.problems import ProblemError, answer_to
+from app.api.http.error_handlers import answer_to
+from app.api.http.problems import ProblemError
 from app.api.state import EdgeState
 
 MAX_BREAKS = 20

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from starlette.responses import Response
 from starlette.types import Scope
 
+from app.api.http.field_problems import invalid, validation_problem
 from app.api.http.json_text import (
     Bounds,
     EntryTooLongError,
@@ -21,15 +22,7 @@ from app.api.http.json_text import (
     parse,
     unstorable,
 )
-from app.api.http.problems import (
-    FieldProblem,
-    Problem,
-    instance_of,
-    invalid,
-    make_problem,
-    problem_response,
-    validation_problem,
-)
+from app.api.http.problems import FieldProblem, Problem, instance_of, make_problem, problem_response
 
 IN_THREAD_BYTES = 32_768
 """Longer bodies are read and checked in a thread."""

@@ -1,4 +1,4 @@
 """What answers and requests are made of, whatever they are about. Knows no mission and no client.
 
-Others use ``problems``: what was wrong with which field, and what would be right.
+Others use ``problems``: the documents that say what was wrong. ``error_handlers`` says which error becomes which.
 """

@@ -14,7 +14,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.api.access.auth import Reader, authenticate, until_unwelcome
 from app.api.http.first_completed import first_of
-from app.api.http.problems import ProblemError, describe_mission_error, problems
+from app.api.http.problems import ProblemError, problems
 from app.api.mission import Mission
 from app.api.schemas import API, is_mission_id
 from app.api.state import EdgeState, State, edge_state
@@ -203,7 +203,7 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
         }
         await _close(websocket, codes[error.kind], error.detail)
     except MissionError as error:
-        await _close(websocket, CLOSE_NOT_FOUND, describe_mission_error(error)[1])
+        await _close(websocket, CLOSE_NOT_FOUND, str(error))
     except WatchEndedError as error:
         await _close(websocket, CLOSE_TRY_AGAIN, f"{error}: reconnect")
     except WebSocketDisconnect:

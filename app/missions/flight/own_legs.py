@@ -18,7 +18,8 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace
 from app.exploration.planners import COVERERS
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, moved_on, place_ahead
-from app.missions.flight.decisions.decision import INSET_M, Decision, Leg, Place, planned_way_m
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Leg, Place
 from app.missions.flight.decisions.separation import too_close, ways_aside
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
@@ -31,7 +32,8 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.remaining import remaining
 from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
-from app.missions.spec.mission import MissionSpec
+from app.missions.task.constraints import INSET_M
+from app.missions.task.way import least_way_m, planned_way_m
 from app.missions.team import NO_FURTHER_LINE, WAY_FLOWN, Member
 from app.missions.views.mission import Level
 
@@ -55,9 +57,6 @@ PATIENCE = 1
 NOT_WAITED_FOR = 3
 """A vehicle that misses so many legs in a row is no longer waited for when the others have flown their ways."""
 
-LEAST_WAY_M = 1.0
-"""A vehicle with less way left is done, and where a mission lasts so many minutes one with less than it arrives in."""
-
 SOON = 1.3
 """A vehicle whose legs end within this many times the usual lead is decided for together with one that needs a leg."""
 
@@ -66,12 +65,6 @@ HARDLY_BEGUN = 0.6
 
 TOLD_PCT = 0.1
 """A mission that leaves more of its area unseen says so when it ends."""
-
-
-def least_way_m(spec: MissionSpec) -> float:
-    """Return how much of its way a vehicle has left that still goes on."""
-    # By the clock somewhat more or less is left when its last leg ends. Nearer than it arrives it is there already.
-    return LEAST_WAY_M if spec.budget.minutes is None else max(spec.arrival_radius_m, LEAST_WAY_M)
 
 
 class OwnLegs:

@@ -20,7 +20,6 @@ from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import WaypointReport, WaypointStatus
 from app.missions.flight.decisions.deciding import Decider
-from app.missions.flight.decisions.decision import limits_of_decisions, make_constraints, make_planner
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.asides import Asides
 from app.missions.flight.legs.commit import LegCommit, committed_leg
@@ -45,6 +44,8 @@ from app.missions.flight.way_home.onboard_way import OnboardWays
 from app.missions.flight.way_home.withdrawals import Withdrawals
 from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
+from app.missions.task.constraints import limits_of_decisions, make_constraints
+from app.missions.task.planner import make_planner
 from app.missions.team import PART_DONE, SETTLED, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end

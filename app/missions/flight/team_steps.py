@@ -9,7 +9,8 @@ import numpy as np
 
 from app.missions.fleet.interface import WaypointStatus
 from app.missions.flight.decisions.deciding import DECIDE_AGAIN_S, Decider, place_ahead, place_of
-from app.missions.flight.decisions.decision import Decision, Place
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Place
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch

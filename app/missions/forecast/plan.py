@@ -26,16 +26,7 @@ from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
 from app.exploration.swath.survey import SwathSurvey
 from app.mapping.types import Grid
-from app.missions.flight.decisions.decision import (
-    Knowledge,
-    decide,
-    from_outside,
-    make_constraints,
-    make_planner,
-    swath_sonar,
-    turn_radius_m,
-    without_zones,
-)
+from app.missions.flight.decisions.decision import Knowledge, decide
 from app.missions.forecast.floor import LEAST_GUESS_M, ROOM_M, forecast_cell_m
 from app.missions.forecast.simulate import fly
 from app.missions.forecast.swarm import Swarm
@@ -47,6 +38,9 @@ from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome
 from app.missions.safety import free_space
 from app.missions.spec.mission import MissionSpec, PlannerSpec
+from app.missions.task.constraints import from_outside, make_constraints
+from app.missions.task.planner import make_planner, turn_radius_m
+from app.missions.task.swath import swath_sonar, without_zones
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
 

@@ -17,7 +17,6 @@ from app.compute.compute import Compute
 from app.missions.compilation import Compilation
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.hub import FleetHub
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.forecast.floor import forecast_cell_m, thinned
 from app.missions.forecast.ranges import (
     DEVIATION_SD,
@@ -36,6 +35,7 @@ from app.missions.live.watchers.vehicles import near_report
 from app.missions.running.admission import check_spec
 from app.missions.running.team_changes import refuse_ended
 from app.missions.spec.mission import MissionKind, MissionSpec
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Member, Team
 from app.missions.views.base import View
 from app.storage.queries import missions as mission_queries

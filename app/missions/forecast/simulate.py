@@ -13,14 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.flight.decisions.decision import Knowledge, decide, limits_of_decisions, make_constraints
-from app.missions.flight.own_legs import least_way_m
+from app.missions.flight.decisions.decision import Knowledge, decide
 from app.missions.forecast.floor import Floor, floors_of, forecast_cell_m
 from app.missions.forecast.swarm import Flown, SoFar, StepFlown, Swarm, planner_of, poses_apart
 from app.missions.forecast.swath_flight import sweep_over, sweeps
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import Sensor
+from app.missions.task.constraints import limits_of_decisions, make_constraints
+from app.missions.task.way import least_way_m
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
 

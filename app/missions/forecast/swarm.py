@@ -7,12 +7,13 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.exploration.planner.ordered import OrderedPlanner
-from app.missions.flight.decisions.decision import Place, make_planner, planned_way_m
-from app.missions.flight.legs.commit import STILL_M
-from app.missions.flight.own_legs import HARDLY_BEGUN, least_way_m
+from app.missions.flight.decisions.leg import Place
+from app.missions.flight.own_legs import HARDLY_BEGUN
 from app.missions.flight.steering import steered
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
+from app.missions.task.planner import make_planner
+from app.missions.task.way import STILL_M, least_way_m, planned_way_m
 from app.missions.team import Member
 from simulator.vehicles.vehicle import VehicleLimits
 

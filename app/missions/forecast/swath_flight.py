@@ -17,19 +17,15 @@ from app.arrays import FloatArray
 from app.estimation.swath import SwathSonar
 from app.estimation.uncertainty import BeamGeometry, Uncertainty, uncertainty
 from app.exploration.planners import COVERERS
-from app.missions.flight.decisions.decision import (
-    Knowledge,
-    decide,
-    limits_of_decisions,
-    make_constraints,
-    swath_sonar,
-    swath_task,
-)
-from app.missions.flight.own_legs import LEAD_S, SOON, least_way_m
+from app.missions.flight.decisions.decision import Knowledge, decide
+from app.missions.flight.own_legs import LEAD_S, SOON
 from app.missions.forecast.floor import Floor
 from app.missions.forecast.swarm import Flown, SoFar, Swarm, WholeSurvey, planner_of, poses_apart
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
+from app.missions.task.constraints import limits_of_decisions, make_constraints
+from app.missions.task.swath import swath_sonar, swath_task
+from app.missions.task.way import least_way_m
 from app.missions.team import Member
 from simulator.floors.terrain import Terrain
 

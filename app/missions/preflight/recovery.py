@@ -6,13 +6,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.arrays import FloatArray
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import berth_spacing_m, farthest_m, home_of
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.search.state import Search
 from app.missions.spec.mission import MissionSpec
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Member
 from app.missions.views.mission import CheckStatus, CheckView
 

@@ -12,13 +12,6 @@ from app.exploration.core.constraints import Constraints
 from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
 from app.missions.fleet.interface import LinkState, Position
-from app.missions.flight.decisions.decision import (
-    INSET_M,
-    arrival_room_m,
-    from_outside,
-    make_constraints,
-    turn_radius_m,
-)
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.neighbours import neighbour_checks
@@ -28,6 +21,8 @@ from app.missions.preflight.swath import swath_checks
 from app.missions.safety.free_space import WAITING_CIRCLE_M, way_in
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
+from app.missions.task.constraints import INSET_M, arrival_room_m, from_outside, make_constraints
+from app.missions.task.planner import turn_radius_m
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
 from app.storage.models import MissionRow
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from app.exploration.planners import COVERERS
-from app.missions.flight.decisions.decision import swath_sonar
 from app.missions.live.mission import LiveMission
+from app.missions.task.swath import swath_sonar
 from app.missions.views.mission import CheckStatus, CheckView
 
 

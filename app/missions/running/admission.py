@@ -7,10 +7,10 @@ from shapely import Polygon, unary_union
 from app.exploration.pcao.planner import PcaoPlanner
 from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
 from app.missions.errors import InvalidRequestError
-from app.missions.flight.own_legs import least_way_m
 from app.missions.spec.mission import MissionKind, MissionSpec
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
+from app.missions.task.way import least_way_m
 
 
 def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:

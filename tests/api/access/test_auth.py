@@ -12,7 +12,8 @@ from fastapi.routing import APIRoute
 
 import app.api
 from app.api.access import auth
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.api.mission import mission_of
 from app.main import Server, create_app
 from app.settings import Settings, StartupError

@@ -10,7 +10,8 @@ import httpx
 import pytest
 
 from app.api.accounts import audit_log
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.settings import Settings
 from app.storage.database import Database
 from tests.support.api.rest import make_client, mission_spec, running, soundings

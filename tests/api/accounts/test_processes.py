@@ -16,7 +16,8 @@ from app.api.accounts.processes import (
     target_without_token,
     vouched_for,
 )
-from app.api.accounts.tokens import Principal, Role
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import Principal
 from app.missions.running.ownership import Peer
 
 SECRET = "s3cret of the one that is asked"  # noqa: S105 - the test's own

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from app.api.accounts import rates as limits
 from app.api.accounts.rates import Buckets, RequestLimits, network_of
-from app.api.accounts.tokens import DIGESTS_READ_AGAIN_S, Principal, Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import DIGESTS_READ_AGAIN_S, Principal, TokenStore
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database

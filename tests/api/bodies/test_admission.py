@@ -11,12 +11,13 @@ import httpx
 import pytest
 from fastapi.routing import APIRoute
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.api.bodies import admission as bodies
 from app.api.bodies import json_route
 from app.api.bodies.intake import BodyKind, Intakes
 from app.api.bodies.json_route import JsonRoute
-from app.api.http import json_text, problems
+from app.api.http import field_problems, json_text
 from app.api.schemas import ScanBatch
 from app.main import Server, create_app
 from app.settings import Settings
@@ -244,7 +245,7 @@ async def test_wrong_fields_of_very_many_items_are_explained_beside_the_loop(
         )
     assert answer.json()["rejected"] == 1000
     assert "unknown_0: There is no such field" in answer.json()["items"][0]["reason"]
-    assert len(explained) <= problems.MAX_ERRORS
+    assert len(explained) <= field_problems.MAX_ERRORS
     assert all(name.startswith("bodies") for name in explained)
 
 
@@ -270,7 +271,7 @@ async def test_a_description_far_too_large_costs_little(
     assert answer.status_code == status
     assert said in answer.text
     assert len(answer.content) < 100_000
-    assert len(explained) <= problems.MAX_ERRORS
+    assert len(explained) <= field_problems.MAX_ERRORS
     assert all(name.startswith("bodies") for name in explained)
 
 

@@ -9,7 +9,8 @@ import httpx
 import pytest
 import websockets
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.api.middleware.connections import Sockets
 from app.descriptors import allow_descriptors
 from app.main import Server

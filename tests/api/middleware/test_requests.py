@@ -3,13 +3,13 @@
 import httpx
 from fastapi import FastAPI
 
-from app.api.http import problems
+from app.api.http import error_handlers
 from app.api.middleware.requests import RequestMiddleware
 
 
 async def test_an_unexpected_error_is_a_problem_without_internals() -> None:
     app = FastAPI()
-    problems.install(app)
+    error_handlers.install(app)
     app.add_middleware(RequestMiddleware)
 
     @app.get("/broken")

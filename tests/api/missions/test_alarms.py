@@ -9,7 +9,7 @@ import httpx
 import pytest
 import websockets
 
-from app.api.accounts.tokens import Role
+from app.api.accounts.roles import Role
 from app.main import Server
 from app.missions.alarm_kinds import AlarmKind
 from app.settings import Settings

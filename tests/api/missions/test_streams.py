@@ -12,7 +12,8 @@ import websockets
 from httpx_sse import ServerSentEvent, aconnect_sse
 from pydantic import TypeAdapter
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.main import Server
 from app.missions.views.messages import LiveMessage
 from app.missions.views.mission import Level

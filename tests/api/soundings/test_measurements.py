@@ -9,7 +9,8 @@ import httpx
 import pytest
 from sqlalchemy import select
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.main import Server
 from app.settings import Settings
 from app.storage.database import Database

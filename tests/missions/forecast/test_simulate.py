@@ -10,8 +10,6 @@ import pytest
 
 from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import Position, VehicleReport
-from app.missions.flight.decisions.decision import make_constraints
-from app.missions.flight.own_legs import least_way_m
 from app.missions.forecast import request
 from app.missions.forecast.floor import Floor, floors_of
 from app.missions.forecast.ranges import range_of
@@ -22,6 +20,8 @@ from app.missions.operations.history import steps_after
 from app.missions.service import MissionService
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
+from app.missions.task.constraints import make_constraints
+from app.missions.task.way import least_way_m
 from app.missions.team import CommittedLeg, Member, Team
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain

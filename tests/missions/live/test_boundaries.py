@@ -6,7 +6,6 @@ import pytest
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.fleet.links.simulated.launch import Launch
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.live.boundaries import Boundaries
 from app.missions.operations.history import events_after
 from app.missions.preflight.survey import preflight
@@ -14,6 +13,7 @@ from app.missions.safety.free_space import WAITING_CIRCLE_M
 from app.missions.service import MissionService
 from app.missions.settings import SimulationSettings
 from app.missions.spec.vehicle import Sensor, VehicleKind
+from app.missions.task.constraints import make_constraints
 from app.missions.views.mission import CheckStatus, EventView, Level
 from simulator.equipment import Equipment
 from simulator.floors.seafloors import generate

@@ -13,7 +13,8 @@ from sqlalchemy import select
 
 from app.missions.errors import InvalidRequestError
 from app.missions.flight.decisions import deciding
-from app.missions.flight.decisions.decision import Decision, Place, decide
+from app.missions.flight.decisions.decision import Decision, decide
+from app.missions.flight.decisions.leg import Place
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
 from app.missions.operations.maps.mission_maps import export, map_at_step, newest_map

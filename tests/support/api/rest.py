@@ -8,7 +8,8 @@ from typing import Any
 import httpx
 import numpy as np
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.main import Server, serve
 from app.settings import Settings
 from tests.support.missions.specs import AREA

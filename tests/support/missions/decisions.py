@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from app.exploration.core.problem import Belief, Proposal, Situation
-from app.missions.flight.decisions.decision import Decision, Knowledge, Place, decide, make_constraints
+from app.missions.flight.decisions.decision import Decision, Knowledge, decide
+from app.missions.flight.decisions.leg import Place
 from app.missions.spec.mission import MissionSpec
+from app.missions.task.constraints import make_constraints
 from tests.support.missions.specs import make_spec
 
 

@@ -10,7 +10,6 @@ from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, VehicleReport, WaypointOrder
 from app.missions.fleet.interface import WaypointStatus as Status
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.decisions.separation import steered_ahead
 from app.missions.flight.legs.asides import Asides
 from app.missions.flight.legs.commit import LegCommit
@@ -21,6 +20,7 @@ from app.missions.flight.legs.next_moment import NextMoment
 from app.missions.flight.legs.other_vehicles import OtherVehicles
 from app.missions.flight.legs.room_aside import RoomAside
 from app.missions.live.mission import LiveMission
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Member
 
 Place = tuple[float, float, float]

@@ -7,7 +7,8 @@ from typing import Any
 from app.api.access.auth import console_log_in
 from app.api.accounts.peers import is_own_user
 from app.api.accounts.rates import RequestLimits
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.missions.fleet.links.neptus import gateway_settings
 from app.missions.operations.history import events_after
 from app.missions.service import MissionService

@@ -1,4 +1,4 @@
-"""What is decided: the newest map, the planner's proposal, clearance, separation. Nothing here is written or sent.
+"""What is decided: the newest map, who is planned for, the proposal, separation. Nothing here is written or sent.
 
 Others use ``decision.decide``.
 """

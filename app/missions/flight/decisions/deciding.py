@@ -15,9 +15,12 @@ from app.exploration.site_search import SearchTask
 from app.missions import metrics
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.clock import now
-from app.missions.flight.decisions.decision import Decision, Knowledge, Place, decide, swath_task, turn_radius_m
+from app.missions.flight.decisions.decision import Decision, Knowledge, decide
+from app.missions.flight.decisions.leg import Place
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.live.mission import LiveMission
+from app.missions.task.planner import turn_radius_m
+from app.missions.task.swath import swath_task
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 

@@ -8,13 +8,14 @@ from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import TOLERANCE_M, Constraints, Limit
 from app.exploration.motion.timeline import Approach, Timeline, closest_approach, speed_over_ground_mps
-from app.missions.flight.decisions.decision import Decision, turn_radius_m
+from app.missions.flight.decisions.decision import Decision
 from app.missions.flight.steering import steered_motion
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.energy import ASCENT_MPS
 from app.missions.safety import free_space
 from app.missions.spec.limits import Limits
 from app.missions.spec.mission import MissionSpec
+from app.missions.task.planner import turn_radius_m
 from app.missions.team import OUT_OF_REACH, Member
 
 LIMITS_OF_PLACES = (Limit.AREA, Limit.KEEP_OUT)

@@ -7,10 +7,11 @@ from enum import StrEnum
 
 from app.arrays import FloatArray
 from app.missions.fleet.interface import WaypointOrder, WaypointStatus
-from app.missions.flight.legs.commit import STILL_M, LegCommit
+from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.live.mission import LiveMission
 from app.missions.spec.vehicle import Guidance
+from app.missions.task.way import STILL_M
 from app.missions.team import Member
 
 HORIZON_S = 20.0

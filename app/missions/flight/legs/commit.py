@@ -15,15 +15,17 @@ from app.exploration.motion.turning import disc, turned_over
 from app.missions import metrics
 from app.missions.clock import now
 from app.missions.fleet.interface import Position, WaypointOrder, WaypointStatus
-from app.missions.flight.decisions.decision import Decision, Leg, turn_radius_m
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Leg
 from app.missions.live.journals.journal import RISES
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
 from app.missions.safety import free_space, travel_depth
 from app.missions.safety.tide_and_bottom import FallingTide
-from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import Guidance
+from app.missions.task.planner import turn_radius_m
+from app.missions.task.way import way_m
 from app.missions.team import CommittedLeg, Member
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
@@ -38,9 +40,6 @@ LEAD_SAMPLES = 9
 
 NO_LEG = 0
 """In place of a leg's number, in orders that are none."""
-
-STILL_M = 0.5
-"""Who goes no farther holds its place, which takes as much of its way as the longest leg: it flies circles there."""
 
 UNIT_SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
 """About a circle of radius 1: what lies apart from the square lies apart from the circle."""
@@ -395,12 +394,6 @@ class LegCommit:
                 continue
             words = f"{member.name} goes on with the mapping" if target is None else f"{member.name} goes for {target}"
             await self._live.journal.log(Level.INFO, "target", words, step=number, vehicle=member.name)
-
-
-def way_m(ends_m: Sequence[FloatArray], spec: MissionSpec) -> float:
-    """Return how much of a vehicle's way legs take from one of these places (2,) to the next."""
-    lengths_m = np.hypot(*np.diff(np.array(ends_m), axis=0).T)
-    return float(np.where(lengths_m > STILL_M, lengths_m, spec.limits.max_step_m).sum())
 
 
 def committed_leg(row: WaypointRow, *, surfacing: bool = False) -> CommittedLeg:

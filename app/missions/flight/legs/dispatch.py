@@ -10,9 +10,10 @@ import structlog
 from app.arrays import FloatArray
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
-from app.missions.flight.legs.commit import LegCommit, way_m
+from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.stragglers import late_at_s, leg_allowed_s, missed, tell_of
 from app.missions.live.mission import LiveMission
+from app.missions.task.way import way_m
 from app.missions.team import Member
 from app.missions.views.mission import Level
 

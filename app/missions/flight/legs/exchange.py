@@ -13,11 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from app.missions.flight.decisions.deciding import Decider, place_ahead
-from app.missions.flight.decisions.decision import Decision, Leg, Place, planned_way_m
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Leg, Place
 from app.missions.flight.decisions.separation import too_close
-from app.missions.flight.legs.commit import LegCommit, way_m
+from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.live.mission import LiveMission
+from app.missions.task.way import planned_way_m, way_m
 from app.missions.team import CommittedLeg, Member
 
 LEAD_DECISIONS, LEAD_S = 3.0, 2.0

@@ -17,13 +17,13 @@ from shapely.geometry import LineString, Point, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.missions.fleet.interface import WaypointOrder
-from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.decisions.separation import planned_places, steered_ahead
 from app.missions.flight.legs.asides import HORIZON_S, Asides, Because, depth_now_m
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.recovery.way_home import homeward_ground
+from app.missions.task.planner import turn_radius_m
 from app.missions.team import Member
 from app.missions.views.mission import Level
 

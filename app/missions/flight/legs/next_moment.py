@@ -10,10 +10,10 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.motion.timeline import Timeline, closest_approach
 from app.mapping.coordinates.georeference import LocalFrame
-from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.decisions.separation import planned_places, steered_ahead
 from app.missions.flight.legs.asides import HORIZON_S, depth_now_m
 from app.missions.live.mission import LiveMission
+from app.missions.task.planner import turn_radius_m
 from app.missions.team import OUT_OF_REACH, Member
 
 WAITING_S = 40.0

@@ -11,7 +11,8 @@ import httpx
 import numpy as np
 import pytest
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.missions.settings import AisSettings, ImcSettings
 from app.settings import Settings
 from app.storage.database import Database

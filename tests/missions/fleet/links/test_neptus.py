@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.api.accounts.tokens import Role, TokenStore
+from app.api.accounts.roles import Role
+from app.api.accounts.tokens import TokenStore
 from app.missions.fleet.links.neptus import GATHER_S, NeptusFleetLink, gateway_settings
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.settings import NeptusSettings

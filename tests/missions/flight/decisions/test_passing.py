@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from app.missions.fleet.interface import LinkState, Position, VehicleReport
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.decisions.separation import passes_above
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Member, Withdrawal
 from tests.support.missions.harbour import sim_spec
 

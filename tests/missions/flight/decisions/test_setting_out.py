@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.missions.fleet.interface import LinkState, Position, VehicleReport
-from app.missions.flight.decisions.decision import Decision, Leg
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Leg
 from app.missions.flight.decisions.separation import too_close
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec

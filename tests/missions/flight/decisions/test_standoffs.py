@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointOrder, WaypointStatus
-from app.missions.flight.decisions.decision import Decision, Leg
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Leg
 from app.missions.flight.decisions.separation import too_close
 from app.missions.service import MissionService
 from app.missions.team import Member

@@ -10,11 +10,13 @@ from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.water.tides import TideTable
 from app.missions.clock import now, told_by
 from app.missions.fleet.interface import Position, VehicleReport, WaypointStatus
-from app.missions.flight.decisions.decision import Decision, Knowledge, Leg, Place, decide, make_constraints
+from app.missions.flight.decisions.decision import Decision, Knowledge, decide
+from app.missions.flight.decisions.leg import Leg, Place
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.service import MissionService
 from app.missions.soundings.corrections import Corrections
 from app.missions.spec.failsafes import Response
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Withdrawal
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.specs import LAT, LON

@@ -13,12 +13,12 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Member, Withdrawal
 from app.missions.views.mission import Level
 from tests.support.missions.harbour import sim_spec

@@ -9,10 +9,10 @@ from shapely import LineString, Polygon
 
 from app.exploration.core.bottom import Bottom
 from app.missions.fleet.interface import Position, VehicleReport, WaypointOrder
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.onboard_way import positions
 from app.missions.service import MissionService
+from app.missions.task.constraints import make_constraints
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.specs import lon_lat
 

@@ -15,13 +15,15 @@ from app.exploration.planner.ordered import OrderedPlanner
 from app.missions.fleet.interface import LinkState, Position, VehicleReport, WaypointStatus
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.deciding import Decider, moved_on, place_ahead
-from app.missions.flight.decisions.decision import Decision, decide, make_constraints, make_planner
+from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.exchange import LegExchange
 from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
+from app.missions.task.constraints import make_constraints
+from app.missions.task.planner import make_planner
 from app.missions.team import Member
 from app.storage.database import Database
 from app.storage.models import StepRow, WaypointRow

@@ -12,7 +12,6 @@ from app.commands.home import fly_mission
 from app.exploration.lines import lawnmower
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.fleet.interface import LinkState, Position, WaypointStatus
-from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.legs.asides import MOST_ASIDES, Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.giving_way import PATIENCE_S
@@ -22,6 +21,7 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import OrderKind, OrderState
+from app.missions.task.planner import turn_radius_m
 from app.missions.team import CommittedLeg, OperatorOrder, Withdrawal
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import Place, PlacedVehicles

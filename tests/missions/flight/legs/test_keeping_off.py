@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 
 from app.missions.fleet.interface import WaypointStatus as Status
-from app.missions.flight.decisions.decision import turn_radius_m
 from app.missions.flight.legs.asides import Because
 from app.missions.flight.legs.commit import NO_LEG
 from app.missions.flight.legs.keeping_off import MOST_TRIES, KeepOutZones
 from app.missions.service import MissionService
+from app.missions.task.planner import turn_radius_m
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import PlacedVehicles
 from tests.support.missions.specs import rectangle

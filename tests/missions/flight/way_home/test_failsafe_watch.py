@@ -9,7 +9,6 @@ import pytest
 from app.missions.clock import told_by
 from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import LinkState, Position, VehicleInfo, VehicleRefusedError, VehicleReport
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
@@ -19,6 +18,7 @@ from app.missions.recovery import failsafes
 from app.missions.service import MissionService
 from app.missions.settings import AisSettings
 from app.missions.spec.failsafes import Failsafe
+from app.missions.task.constraints import make_constraints
 from app.missions.traffic.watch import SILENCE_S, Traffic
 from app.missions.views.mission import Level
 from tests.support.missions.harbour import act, sim_spec, until_step

@@ -10,7 +10,6 @@ from shapely import LineString, Point
 from app.arrays import FloatArray
 from app.exploration.core.bottom import Bottom
 from app.missions.fleet.interface import Position, VehicleReport
-from app.missions.flight.decisions.decision import make_constraints
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.way_home.past_berths import way_past_berths
 from app.missions.flight.way_home.withdrawals import Withdrawals
@@ -18,6 +17,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.recovery.berths import home_of
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
+from app.missions.task.constraints import make_constraints
 from app.missions.team import Withdrawal
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import PlacedVehicles

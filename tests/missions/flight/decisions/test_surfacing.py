@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from sqlalchemy import select
 
-from app.missions.flight.decisions.decision import Decision, Place, make_constraints
+from app.missions.flight.decisions.decision import Decision
+from app.missions.flight.decisions.leg import Place
 from app.missions.states import MissionState
+from app.missions.task.constraints import make_constraints
 from app.storage.database import Database
 from app.storage.models import EventRow, WaypointRow
 from tests.support.missions.decisions import decide_for, place

@@ -14,16 +14,12 @@ from shapely.geometry import LineString, Polygon
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, Limit
 from app.exploration.core.routes import FreeSpace
-from app.missions.flight.decisions.decision import (
-    Knowledge,
-    Place,
-    decide,
-    limits_of_decisions,
-    make_constraints,
-    make_planner,
-)
-from app.missions.flight.decisions.zone_clearance import room_around
+from app.missions.flight.decisions.decision import Knowledge, decide
+from app.missions.flight.decisions.leg import Place
+from app.missions.safety.zone_clearance import room_around
 from app.missions.spec.mission import MissionSpec
+from app.missions.task.constraints import limits_of_decisions, make_constraints
+from app.missions.task.planner import make_planner
 from tests.support.missions.decisions import belief_of, decide_for, place
 from tests.support.missions.specs import make_spec, rectangle
 

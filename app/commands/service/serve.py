@@ -1,0 +1,59 @@
+"""The command that runs the service."""
+
+import asyncio
+import gc
+from typing import Annotated
+
+import typer
+
+from app.commands.command import Database, command_settings
+from app.log_choices import LogFormat, LogLevel
+
+
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on [default: 127.0.0.1]")] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="TCP port; 0: any free one [default: 8080]")
+    ] = None,
+    database: Database = None,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Serve other machines without access tokens: anyone may command.")
+    ] = False,
+    time_scale: Annotated[
+        float | None, typer.Option(help="How much faster than wall time simulated vehicles live [default: 1]")
+    ] = None,
+    log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged [default: info]")] = None,
+    log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
+) -> None:
+    """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
+    settings = command_settings(
+        host=host,
+        port=port,
+        database_url=database,
+        insecure=insecure or None,
+        time_scale=time_scale,
+        log_level=log_level,
+        log_format=log_format,
+    )
+    from app.api import logs
+    from app.compiled.cache import compile_beside
+    from app.storage.upkeep.prepare import prepare_database
+
+    compile_beside()
+    logs.configure(settings.log_level, settings.log_format)
+    # Before the rest is loaded, which takes seconds: most starts that fail do so here.
+    asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
+    # What is imported stays: looking for garbage in it takes a fifth of a start, and later keeps requests waiting.
+    gc.disable()
+    from app.main import Server, serve
+
+    gc.freeze()
+    gc.enable()
+
+    def started(server: Server) -> None:
+        token = f" An operator token for others is in {server.first_token}." if server.first_token is not None else ""
+        typer.echo(
+            f"bathyfleet answers at {server.url} (API: {server.url}/api/docs).{token} Ctrl-C stops it.", err=True
+        )
+
+    asyncio.run(serve(settings, started=started, with_first_token=True))
