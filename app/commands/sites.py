@@ -36,7 +36,7 @@ def list_sites(database: Database = None) -> None:
     from imc_bridge.printable import printable
 
     async def run(service: "MissionService") -> "list[tuple[SiteView, list[SurveyView]]]":
-        return [(site, await service.sites.surveys(site.id)) for site in await service.sites.all()]
+        return [(site, await service.site_models.surveys(site.id)) for site in await service.sites.all()]
 
     found = with_missions(command_settings(database_url=database), run)
     if not found:
@@ -81,12 +81,12 @@ def export_site(
 
     async def run(service: "MissionService") -> "Product":
         meant = (await _meant(service, site)).id
-        for survey in await service.sites.surveys(meant):
+        for survey in await service.site_models.surveys(meant):
             if survey.left_out:
                 typer.echo(f"note: mission {survey.mission_id} is left out: {survey.left_out}", err=True)
         if format in MAP_FILES:
-            return site_map_file(format, await service.sites.map(meant))
-        change = await service.sites.changes(meant, earlier, later, confidence)
+            return site_map_file(format, await service.site_models.map(meant))
+        change = await service.site_models.changes(meant, earlier, later, confidence)
         return changes_file(format.removeprefix(CHANGES), change)
 
     product = with_missions(settings, run)

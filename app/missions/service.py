@@ -35,7 +35,8 @@ from app.missions.operations.imports.reader_process import Reader
 from app.missions.operations.imports.uploads import Uploads
 from app.missions.operations.maps.map_pictures import MapPictures
 from app.missions.operations.reports import Reports
-from app.missions.operations.sites import Sites
+from app.missions.operations.sites.site_models import SiteModels
+from app.missions.operations.sites.sites import Sites
 from app.missions.operations.traffic import places_of, traffic_view
 from app.missions.operations.work_processes import WorkProcesses
 from app.missions.preflight.neighbours import neighbour_checks
@@ -101,22 +102,8 @@ class MissionService:
         self.settings = settings
         self._database = database
         self._at_once = AtOnce(database)
-        links: list[FleetLink] = [
-            RestFleetLink(settings.time_scale),
-            SimFleetLink(settings.simulation, settings.time_scale),
-        ]
         self._examine: Examine = switched_off
-        if settings.imc.enabled:
-            from app.missions.fleet.links.imc import make_imc_link
-
-            imc = make_imc_link(settings.imc, settings.time_scale)
-            self._examine = imc.diagnosis
-            links.append(imc)
-        if settings.neptus.enabled:
-            from app.missions.neptus_sessions import NeptusSessions
-
-            links.append(NeptusSessions(self, database, settings.neptus, log_in or _nobody, is_own_user).link)
-        self.hub = FleetHub(links)
+        self.hub = FleetHub(self._links(log_in or _nobody, is_own_user))
         """All links."""
         self._processes = WorkProcesses()
         self.compute = Compute(settings.compute, self._processes)
@@ -163,11 +150,34 @@ class MissionService:
         """Files that missions begin with or are compared with."""
         self.reports = Reports(self.maps, settings.provider, self.compute)
         """Reports of surveys."""
-        self.sites = Sites(database, self.get, self.maps, self.imports, lambda: self._started)
+        self.site_models = SiteModels(database, self.get, self.maps, lambda: self._started)
+        """What is known of places that are surveyed again and again."""
+        self.sites = Sites(database, self.site_models, self.maps, self.imports)
         """Places that are surveyed again and again."""
         self._succession = Succession(database, self.get, self._start_following)
         self._supervisor.ended = self._succession.ended
         self._started = False
+
+    def _links(
+        self, log_in: Callable[[str, str, bool], Awaitable[str | None]], is_own_user: Callable[[socket.socket], bool]
+    ) -> list[FleetLink]:
+        """Return the links that are switched on."""
+        settings = self.settings
+        links: list[FleetLink] = [
+            RestFleetLink(settings.time_scale),
+            SimFleetLink(settings.simulation, settings.time_scale),
+        ]
+        if settings.imc.enabled:
+            from app.missions.fleet.links.imc import make_imc_link
+
+            imc = make_imc_link(settings.imc, settings.time_scale)
+            self._examine = imc.diagnosis
+            links.append(imc)
+        if settings.neptus.enabled:
+            from app.missions.neptus_sessions import NeptusSessions
+
+            links.append(NeptusSessions(self, self._database, settings.neptus, log_in, is_own_user).link)
+        return links
 
     # Life of the service
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
+from enum import StrEnum
 from itertools import pairwise
 from typing import Any
 
@@ -34,10 +35,15 @@ SETTLED = frozenset({WaypointStatus.REACHED, WaypointStatus.REFUSED, WaypointSta
 OUT_OF_REACH = frozenset({LinkState.UNKNOWN, LinkState.LOST})
 
 
-WAY_FLOWN = "it has flown its way"
-NO_FURTHER_LINE = "what is left of its way is for going home and for no further line"
-PART_DONE = (WAY_FLOWN, NO_FURTHER_LINE)
-"""Why vehicles go home that have done their part, while others still survey."""
+class WithdrawalCause(StrEnum):
+    """What kind of reason ended a vehicle's survey."""
+
+    CALLED = "called"
+    """A person, a failsafe, or energy that lasts for the way home only: some of its part is left."""
+    PART_DONE = "part_done"
+    """It has done its part; others may still survey."""
+    MISSION_END = "mission_end"
+    """Its mission was flown to its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +99,8 @@ class Withdrawal:
         Whether a person wanted it: then only a person ends it.
     below
         Whether it waits below for ships to pass: it would come up where it is.
-    done
-        Whether it has flown its part, or its mission was flown to its end.
+    cause
+        What kind of reason that was.
     told
         Whether the mission's log says so, that of an earlier run of the service too.
     """
@@ -105,22 +111,26 @@ class Withdrawal:
     led: bool = False
     asked: bool = False
     below: bool = False
-    done: bool = False
+    cause: WithdrawalCause = WithdrawalCause.CALLED
     told: bool = False
+
+    @property
+    def done(self) -> bool:
+        """Whether it has flown its part, or its mission was flown to its end."""
+        return self.cause is not WithdrawalCause.CALLED
 
     def remember(self) -> dict[str, Any]:
         """Return what is stored, so that a restart goes on with it."""
         facts = {"response": self.response, "why": self.why, "over": self.over, "asked": self.asked}
-        return facts | {"done": self.done}
+        return facts | {"cause": self.cause}
 
     @classmethod
     def recall(cls, stored: dict[str, Any] | None) -> "Withdrawal | None":
         """Return what was stored."""
         if not stored:
             return None
-        why, asked = stored["why"], stored.get("asked", False)
-        done = stored.get("done", why in PART_DONE)
-        return cls(Response(stored["response"]), why, stored["over"], asked=asked, done=done, told=True)
+        response, cause = Response(stored["response"]), WithdrawalCause(stored["cause"])
+        return cls(response, stored["why"], stored["over"], asked=stored["asked"], cause=cause, told=True)
 
 
 @dataclass

@@ -34,7 +34,7 @@ async def fill(url: str) -> tuple[str, list[str]]:
             await measure(await service.get(mission), measured(80, wrong=None)[:80])
             await act(service, mission, "abort")
             missions.append(mission)
-        assert [survey.surveyed for survey in await service.sites.surveys(site)] == [True, True]
+        assert [survey.surveyed for survey in await service.site_models.surveys(site)] == [True, True]
         return site, missions
     finally:
         await service.shutdown()

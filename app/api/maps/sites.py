@@ -106,7 +106,7 @@ async def delete_site(site_id: Site, service: Service, operator: Operator) -> No
 @router.get("/{site_id}/surveys", operation_id="listSurveys", summary="List a site's surveys", responses=_FOUND)
 async def list_surveys(site_id: Site, service: Service, reader: Reader) -> list[SurveyView]:
     """Return its missions with dates, share and accuracy, oldest first; those that have not ended come last."""
-    return await service.sites.surveys(site_id)
+    return await service.site_models.surveys(site_id)
 
 
 @router.get(
@@ -122,7 +122,7 @@ async def get_site_map(site_id: Site, service: Service, reader: Reader) -> Respo
     Each survey's own soundings count by their uncertainty, which grows by `yearly_change_m` with their age; where a
     survey found the floor changed, those before it count no more. What nobody measured is null.
     """
-    site = await service.sites.map(site_id)
+    site = await service.site_models.map(site_id)
     content = await asyncio.to_thread(lambda: site.view().model_dump_json())
     return Response(content, media_type="application/json", headers={"Cache-Control": "no-cache"})
 
@@ -145,7 +145,7 @@ async def get_changes(
 
     A difference is significant by |d| / sqrt(sd1^2 + sd2^2), each survey by its own soundings alone.
     """
-    change = await service.sites.changes(site_id, earlier, later, confidence)
+    change = await service.site_models.changes(site_id, earlier, later, confidence)
     return await asyncio.to_thread(change.view)
 
 
@@ -183,7 +183,7 @@ async def get_site_map_file(
 ) -> Response:
     """Return the site's map as a file."""
     _check("the map of a site is", format, MAP_FILES)
-    site = await service.sites.map(site_id)
+    site = await service.site_models.map(site_id)
     return file_answer(await asyncio.to_thread(site_map_file, format, site))
 
 
@@ -205,7 +205,7 @@ async def get_changes_file(
 ) -> Response:
     """Return difference, deviation and significance of each cell as a file."""
     _check("changes are", format, CHANGE_FILES)
-    change = await service.sites.changes(site_id, earlier, later, confidence)
+    change = await service.site_models.changes(site_id, earlier, later, confidence)
     return file_answer(await asyncio.to_thread(changes_file, format, change))
 
 

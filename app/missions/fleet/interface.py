@@ -218,13 +218,17 @@ class WaypointOrder:
 
 @dataclass(frozen=True, slots=True)
 class WaypointReport:
-    """What became of a waypoint; ``reason`` is filled for every status that is not progress."""
+    """What became of a waypoint; ``reason`` is filled for every status that is not progress.
+
+    ``begun`` is False where the service took the waypoint back before its vehicle made for it.
+    """
 
     vehicle: str
     mission_id: str
     step: int
     status: WaypointStatus
     reason: str = ""
+    begun: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,7 @@ from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
 from app.missions.task.constraints import INSET_M
 from app.missions.task.way import least_way_m, planned_way_m
-from app.missions.team import NO_FURTHER_LINE, WAY_FLOWN, Member
+from app.missions.team import Member, WithdrawalCause
 from app.missions.views.mission import Level
 
 AHEAD = 2
@@ -141,7 +141,9 @@ class OwnLegs:
                     await self._waiting.for_team(patient_s=patient_s)
                     patient_s = None
                 for member in self._flown_out():
-                    self._live.withdraw(member, Response.RETURN, WAY_FLOWN, done=True)
+                    self._live.withdraw(
+                        member, Response.RETURN, "it has flown its way", cause=WithdrawalCause.PART_DONE
+                    )
                 getting = self._who_gets_legs()
                 if getting:
                     await self._decide(getting)
@@ -328,8 +330,11 @@ class OwnLegs:
             if member.name in done and idle and self._spec.ends_at_home(member.spec):
                 energy_m = self._range.beyond_m(member)
                 lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
-                why = "its energy lasts for its way home and for no further line" if lasts else NO_FURTHER_LINE
-                self._live.withdraw(member, Response.RETURN, why, done=not lasts)
+                if lasts:
+                    why, cause = "its energy lasts for its way home", WithdrawalCause.CALLED
+                else:
+                    why, cause = "what is left of its way is for going home", WithdrawalCause.PART_DONE
+                self._live.withdraw(member, Response.RETURN, f"{why} and for no further line", cause=cause)
                 self._sent_home.add(member.name)
 
     def _flown_out(self) -> list[Member]:

@@ -23,7 +23,7 @@ from app.missions.flight.decisions.deciding import Decider
 from app.missions.flight.decisions.step_maps import StepMaps
 from app.missions.flight.legs.asides import Asides
 from app.missions.flight.legs.commit import LegCommit, committed_leg
-from app.missions.flight.legs.dispatch import GIVEN_UP, Dispatch
+from app.missions.flight.legs.dispatch import Dispatch
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.legs.giving_way import GivingWay
 from app.missions.flight.legs.keeping_off import KeepingOff, KeepOutZones
@@ -46,7 +46,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.spec.failsafes import Response
 from app.missions.task.constraints import limits_of_decisions, make_constraints
 from app.missions.task.planner import make_planner
-from app.missions.team import PART_DONE, SETTLED, Member
+from app.missions.team import SETTLED, Member, WithdrawalCause
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.queries import missions as mission_queries
@@ -174,14 +174,14 @@ class Runner:
         team = self._live.team
         if team.going_on:
             return ""
-        ends = [m.withdrawal.why for m in team if m.withdrawal is not None and m.withdrawal.done]
-        return next((why for why in ends if why not in PART_DONE), "")
+        withdrawals = [member.withdrawal for member in team if member.withdrawal is not None]
+        return next((one.why for one in withdrawals if one.cause is WithdrawalCause.MISSION_END), "")
 
     def _call_home(self, why: str) -> None:
         """Send everybody home at the mission's end who has a recovery point, unless the mission wants it otherwise."""
         for member in self._live.team:
             if self._live.spec.ends_at_home(member.spec):
-                self._live.withdraw(member, Response.RETURN, why, done=True)
+                self._live.withdraw(member, Response.RETURN, why, cause=WithdrawalCause.MISSION_END)
 
     async def _recover(self) -> bool:
         """Take up what was last committed: the planner's memory, and the legs that were not flown; whether any was."""
@@ -197,7 +197,7 @@ class Runner:
             rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
             ended = await mission_queries.settled_waypoints(session, live.id, SETTLED)
             newest = await mission_queries.newest_waypoints(session, live.id)
-            way_m, spared = await mission_queries.committed_way(session, live.id, GIVEN_UP)
+            way_m, spared = await mission_queries.committed_way(session, live.id)
         await self._remember(step.memory)
         live.set_step(step.number, step.objective, step.terms)
         last = {row.vehicle: row.step for row in newest}

@@ -55,7 +55,7 @@ from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import ENDED, NOT_STARTED, MissionState
 from app.missions.targets.filters import TargetFilters
 from app.missions.targets.views import target_views
-from app.missions.team import Member, Swath, Team, Withdrawal
+from app.missions.team import Member, Swath, Team, Withdrawal, WithdrawalCause
 from app.missions.views.messages import StateMessage
 from app.missions.views.mission import MissionSummary, Progress
 from app.missions.views.search import SearchProgress
@@ -322,16 +322,22 @@ class LiveMission:
             self._mates.note(event.vehicle)
 
     def withdraw(
-        self, member: Member, response: Response, why: str, *, asked: bool = False, done: bool = False
+        self,
+        member: Member,
+        response: Response,
+        why: str,
+        *,
+        asked: bool = False,
+        cause: WithdrawalCause = WithdrawalCause.CALLED,
     ) -> bool:
         """Take a vehicle out of the survey, unless it left that for something as strong; whether it does so now.
 
-        The flight sends it where the response leads. ``asked``: a person wants it; ``done``: it has flown its part.
+        The flight sends it where the response leads. ``asked``: a person wants it.
         """
         before = member.withdrawal
         if before is not None and (STRENGTH[before.response] >= STRENGTH[response] or before.over):
             return False
-        member.withdrawal = Withdrawal(response, why, asked=asked, done=done)
+        member.withdrawal = Withdrawal(response, why, asked=asked, cause=cause)
         member.pursuing = None
         self.changed.set()
         return True

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ForeignKey, ForeignKeyConstraint, Index, LargeBinary, String, Text
+from sqlalchemy import ForeignKey, ForeignKeyConstraint, Index, LargeBinary, String, Text, true
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from app.storage.models.alarms import AlarmRow
@@ -83,6 +83,8 @@ class WaypointRow(Base):
     depth_m: Mapped[float]
     status: Mapped[str] = mapped_column(String(16))
     reason: Mapped[str] = mapped_column(Text, default="")
+    begun: Mapped[bool] = mapped_column(default=True, server_default=true())
+    """False where it was taken back before its vehicle made for it."""
     changed_at: Mapped[datetime]
 
 

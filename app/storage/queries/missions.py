@@ -109,21 +109,21 @@ async def keep_ending(session: AsyncSession, mission_id: str, ending: dict[str, 
     await session.execute(update(MissionRow).where(MissionRow.id == mission_id).values(ending=ending))
 
 
-async def committed_way(session: AsyncSession, mission_id: str, given_up: str) -> tuple[dict[str, float], Counter[str]]:
+async def committed_way(session: AsyncSession, mission_id: str) -> tuple[dict[str, float], Counter[str]]:
     """Return how long all legs of each vehicle are together, metres, but for the way to the end of its first one.
 
-    Legs whose reason begins with ``given_up`` were not begun: they do not count, and how many there are comes second.
+    Legs that were not begun do not count, and how many there are comes second.
     """
     query = (
-        select(WaypointRow.vehicle, WaypointRow.east_m, WaypointRow.north_m, WaypointRow.reason)
+        select(WaypointRow.vehicle, WaypointRow.east_m, WaypointRow.north_m, WaypointRow.begun)
         .where(WaypointRow.mission_id == mission_id)
         .order_by(WaypointRow.vehicle, WaypointRow.step)
     )
     way_m: dict[str, float] = {}
     before: tuple[str, float, float] | None = None
     spared: Counter[str] = Counter()
-    for vehicle, east, north, reason in await session.execute(query):
-        if reason.startswith(given_up):
+    for vehicle, east, north, begun in await session.execute(query):
+        if not begun:
             spared[vehicle] += 1
             continue
         if before is not None and before[0] == vehicle:
@@ -226,13 +226,21 @@ async def newest_waypoints(session: AsyncSession, mission_id: str) -> Sequence[W
 
 
 async def set_waypoint_status(
-    session: AsyncSession, mission_id: str, step: int, vehicle: str, status: str, reason: str, now: datetime
+    session: AsyncSession,
+    mission_id: str,
+    step: int,
+    vehicle: str,
+    status: str,
+    reason: str,
+    now: datetime,
+    *,
+    begun: bool = True,
 ) -> None:
     """Record what became of a waypoint."""
     await session.execute(
         update(WaypointRow)
         .where(WaypointRow.mission_id == mission_id, WaypointRow.step == step, WaypointRow.vehicle == vehicle)
-        .values(status=status, reason=reason, changed_at=now)
+        .values(status=status, reason=reason, begun=begun, changed_at=now)
     )
 
 

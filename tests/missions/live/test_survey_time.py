@@ -14,7 +14,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
 from app.missions.states import MissionState
-from app.missions.team import Member, Withdrawal
+from app.missions.team import Member, Withdrawal, WithdrawalCause
 from tests.support.missions.harbour import act, sim_spec, until_state
 
 SPEED_MPS, MINUTES = 2.0, 30.0
@@ -215,7 +215,7 @@ async def test_the_way_home_is_not_left_of_the_survey(under_way: Made) -> None:
     for time_s in (10.0, 11.0):
         vehicle.reports(time_s, 30.0)
     assert member.flown.left_m == pytest.approx(80.0, abs=0.1), "of the only leg that it may fly"
-    member.withdrawal = Withdrawal(Response.RETURN, "it has flown its way", done=True)
+    member.withdrawal = Withdrawal(Response.RETURN, "it has flown its way", cause=WithdrawalCause.PART_DONE)
     vehicle.reports(20.0, 50.0)
     assert member.flown.left_m == 0.0
 

@@ -62,7 +62,7 @@ async def test_the_second_survey_begins_with_the_first_and_finds_what_was_dredge
         service = await harbour.open(simulation={"terrain": floors[0], "seed": 1})
         site = (await service.sites.create(SiteSpec.model_validate(SITE))).id
         first = await survey(harbour, site)
-        known = (await service.sites.map(site)).model
+        known = (await service.site_models.map(site)).model
         service = await harbour.reopen(simulation={"terrain": floors[1], "seed": 2})
         second = await survey(harbour, site)
 
@@ -70,11 +70,11 @@ async def test_the_second_survey_begins_with_the_first_and_finds_what_was_dredge
         assert begun.site == site
         assert begun.found >= known.known.sum() > 0.97 * SIDE_M**2
         assert begun.max_depth_m < 10.0, "the pit was not there yet"
-        listed = await service.sites.surveys(site)
+        listed = await service.site_models.surveys(site)
         assert [(one.mission_id, one.state) for one in listed] == [(first, "finished"), (second, "finished")]
         assert listed[0].beams > 1000
 
-        found = await service.sites.changes(site)
+        found = await service.site_models.changes(site)
         change, grid = found.change, found.change.grid
         north, east = np.meshgrid(grid.north_m, grid.east_m, indexing="ij")
         inside = (np.minimum(east, north) > PIT_M[0] + 1) & (np.maximum(east, north) < PIT_M[1] - 1)
@@ -84,7 +84,7 @@ async def test_the_second_survey_begins_with_the_first_and_finds_what_was_dredge
         assert change.significant[outside & change.compared].mean() < 0.1
         dug_m3 = DUG_M * (PIT_M[1] - PIT_M[0]) ** 2
         assert abs(change.lost.m3 - dug_m3) < 2.0 * change.lost.sd_m3 < dug_m3
-        model = (await service.sites.map(site)).model
+        model = (await service.site_models.map(site)).model
         assert (model.surveys[inside] == 1).mean() > 0.99
         assert np.median(model.depth_m[inside] - known.depth_m[inside]) > 0.9 * DUG_M
     finally:
@@ -100,7 +100,7 @@ async def test_a_mission_takes_the_depths_of_its_site_as_they_are_when_it_starts
     first = (await service.create(make_spec(site=site))).id
     await measure(await service.get(first), measured(80, wrong=None)[:80])
     await act(service, first, "abort")
-    assert [one.surveyed for one in await service.sites.surveys(site)] == [True, False]
+    assert [one.surveyed for one in await service.site_models.surveys(site)] == [True, False]
 
     await act(service, waiting, "start")
     (begun,) = await imports_of(await service.get(waiting))
@@ -116,14 +116,14 @@ async def test_a_site_keeps_what_a_mission_found_that_was_removed_to_make_room(h
     mission = (await service.create(make_spec(site=site))).id
     await measure(await service.get(mission), measured(80, wrong=None)[:80])
     await act(service, mission, "abort")
-    before = await service.sites.map(site)
+    before = await service.site_models.map(site)
     url = harbour.database.url
     await harbour.close()
     database = Database(url)
     assert await remove(database, mission, -1.0)
     await database.close()
     service = await harbour.open()
-    after = await service.sites.map(site)
+    after = await service.site_models.map(site)
     np.testing.assert_array_equal(after.model.depth_m, before.model.depth_m)
-    (kept,) = await service.sites.surveys(site)
+    (kept,) = await service.site_models.surveys(site)
     assert (kept.mission_id, kept.state, kept.surveyed) == (mission, None, True)

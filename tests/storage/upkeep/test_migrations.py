@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import Connection, MetaData, column, inspect, select, text
+from sqlalchemy import Connection, MetaData, column, inspect, null, select, text
 
+from app.missions.team import Withdrawal, WithdrawalCause
 from app.storage.database import Database, make_engine
-from app.storage.models import Base, MissionRow
+from app.storage.models import Base, MissionRow, MissionVehicleRow, WaypointRow
 from app.storage.upkeep import migrate
 from app.storage.upkeep.prepare import prepare_database
 from tests.support.storage.rows import one_of_each
@@ -147,3 +148,53 @@ def test_another_driver_is_refused_by_name(bad: str) -> None:
 def test_migrations_lie_beside_the_package() -> None:
     assert (migrate.MIGRATIONS / "env.py").is_file()
     assert list(Path(migrate.MIGRATIONS, "versions").glob("0001_*.py"))
+
+
+async def test_what_only_words_told_is_kept_as_values(empty_url: str) -> None:
+    """Databases that know neither which legs were not begun nor why exactly vehicles were called home."""
+    asked = {"response": "return", "why": "called home by Ana", "over": True, "asked": True, "done": False}
+    ended = asked | {"why": "every step is done", "asked": False, "done": True}
+    older = {"response": "return", "why": "it has flown its way", "over": False}
+    stored: dict[str, Any] = {"asked": asked, "ended": ended, "older": older, "surveys": None}
+    reasons = ["given up: called home", "it did not get there", ""]
+
+    def fill(connection: Connection) -> None:
+        _fill_as_it_is(connection)
+        tables = MetaData()
+        tables.reflect(connection)
+        vehicles, waypoints = tables.tables["mission_vehicles"], tables.tables["waypoints"]
+        sample = dict(connection.execute(vehicles.select()).mappings().one())
+        for slot, (name, withdrawal) in enumerate(stored.items(), start=1):
+            changes = {"name": name, "slot": slot, "withdrawal": null() if withdrawal is None else withdrawal}
+            connection.execute(vehicles.insert().values(sample | changes))
+        sample = dict(connection.execute(waypoints.select()).mappings().one())
+        for number, reason in enumerate(reasons):
+            connection.execute(waypoints.insert().values(sample | {"vehicle": f"v{number}", "reason": reason}))
+        connection.commit()
+
+    def withdrawals(connection: Connection) -> dict[str, Any]:
+        tables = MetaData()
+        tables.reflect(connection)
+        vehicles = tables.tables["mission_vehicles"].c
+        query = select(vehicles.name, vehicles.withdrawal).where(vehicles.name.in_(stored))
+        return dict(map(tuple, connection.execute(query)))
+
+    await migrate.upgrade(empty_url, "0020")
+    await _on(empty_url, fill)
+    await migrate.upgrade(empty_url)
+    database = Database(empty_url)
+    async with database.reading() as session:
+        rows = await session.scalars(select(MissionVehicleRow).where(MissionVehicleRow.name.in_(stored)))
+        found = {row.name: Withdrawal.recall(row.withdrawal) for row in rows}
+        query = select(WaypointRow.reason, WaypointRow.begun).where(WaypointRow.vehicle.startswith("v"))
+        begun = dict(await session.execute(query))
+    await database.close()
+    assert found.pop("surveys") is None
+    assert {name: one and (one.cause, one.asked) for name, one in found.items()} == {
+        "asked": (WithdrawalCause.CALLED, True),
+        "ended": (WithdrawalCause.MISSION_END, False),
+        "older": (WithdrawalCause.PART_DONE, False),
+    }
+    assert begun == {"given up: called home": False, "it did not get there": True, "": True}
+    await migrate.downgrade(empty_url, "0020")
+    assert await _on(empty_url, withdrawals) == stored | {"older": older | {"asked": False, "done": True}}

@@ -20,9 +20,6 @@ from app.missions.views.mission import Level
 HOLD_AFTER_S = 1.0
 """How long a vehicle that has no leg flies straight on, by its clock, before it is sent to circle somewhere."""
 
-GIVEN_UP = "given up: "
-"""How the reason begins for which a leg is missed that its vehicle had not begun."""
-
 MOST_REFUSALS = 5
 """How often a vehicle may refuse the same leg before the next one is tried."""
 
@@ -214,7 +211,8 @@ class Dispatch:
         legs, member.ahead[:] = list(member.ahead), []
         ends_m = [leg.target_m for leg in legs]
         for leg in legs:
-            report = WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, GIVEN_UP + reason)
+            name, mission, shown = member.name, self._live.id, f"given up: {reason}"
+            report = WaypointReport(name, mission, leg.number, WaypointStatus.MISSED, shown, begun=False)
             self._live.journal.waypoint(report)
         if not flown_to_m and member.report is not None:
             flown_to_m = [member.place_m(self._live.frame)]

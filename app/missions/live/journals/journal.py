@@ -200,8 +200,9 @@ class Journal(WriteBehind[Noted]):
         rows = [_copy(row) for row in _of(EventRow, noted)]
         await add_lines(session, rows)
         for report in _of(WaypointReport, noted):
+            where = (self._mission_id, report.step, report.vehicle)
             await mission_queries.set_waypoint_status(
-                session, self._mission_id, report.step, report.vehicle, report.status, report.reason, now()
+                session, *where, report.status, report.reason, now(), begun=report.begun
             )
 
         def committed() -> None:

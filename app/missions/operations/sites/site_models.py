@@ -1,22 +1,16 @@
-"""Sites: places that are surveyed again and again, their model, and what changed between surveys."""
+"""What the surveys of a site found together, and what changed between two of them."""
 
 import asyncio
-import uuid
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import shapely
 import structlog
-from pydantic import ValidationError
-from shapely.geometry import Polygon
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.arrays import FloatArray
 from app.mapping.sites import SiteFusion, Survey, compare, resample
-from app.mapping.types import SoundingRows
 from app.mapping.water.vertical import VerticalDatum
 from app.missions.clock import now
 from app.missions.errors import (
@@ -31,16 +25,12 @@ from app.missions.live.mission import LiveMission
 from app.missions.maps.builder import make_grid
 from app.missions.maps.site_maps import SiteChange, SiteFacts, SiteMap, Surveyed, moment
 from app.missions.maps.survey_codec import unpack_survey
-from app.missions.operations.imports.imports import Imports
 from app.missions.running.final_maps import FinalMaps
-from app.missions.spec.mission import MissionSpec
-from app.missions.spec.site import SiteChanges, SiteSpec, in_frame
-from app.missions.states import AT_SEA, ENDED
-from app.missions.views.maps.sites import SiteView, SurveyView
-from app.missions.views.mission import Level
-from app.storage.concurrency.uncancellable import to_the_end
+from app.missions.spec.site import SiteSpec
+from app.missions.states import ENDED
+from app.missions.views.maps.sites import SurveyView
 from app.storage.database import Database
-from app.storage.models import MissionRow, SiteRow, SiteSurveyRow
+from app.storage.models import SiteRow, SiteSurveyRow
 from app.storage.queries import sites as site_queries
 
 MOST_REMEMBERED_CELLS = 8_000_000
@@ -73,19 +63,17 @@ class _Fused:
         return self.surveys[-1].vertical_datum.epsg if self.surveys else None
 
 
-class Sites:
-    """All sites.
+class SiteModels:
+    """The models of all sites: made of their surveys when somebody asks, and remembered until one of these changes.
 
     Parameters
     ----------
     database
-        Where they are stored; several processes may use them.
+        Where surveys are stored; several processes may use them.
     get
         Returns a mission that this process may have. Raises MissionElsewhereError.
     maps
         Makes what is missing of missions' surveys.
-    imports
-        Lets a mission begin with a site's depths.
     makes
         Tells whether this process has missions of its own, whose surveys it makes; else it only reads.
     """
@@ -95,150 +83,15 @@ class Sites:
         database: Database,
         get: Callable[[str], Awaitable[LiveMission]],
         maps: FinalMaps,
-        imports: Imports,
         makes: Callable[[], bool],
     ) -> None:
         self._database = database
         self._get = get
         self._maps = maps
-        self._imports = imports
         self._makes = makes
         self._fused: OrderedDict[tuple[Any, ...], _Fused] = OrderedDict()
         # One model at a time takes its memory.
         self._fusing = asyncio.Lock()
-
-    # Sites
-
-    async def create(self, spec: SiteSpec) -> SiteView:
-        """Store a new site."""
-        created = now()
-        row = SiteRow(
-            id=str(uuid.uuid4()),
-            name=spec.name,
-            spec=spec.model_dump(mode="json"),
-            created_at=created,
-            updated_at=created,
-        )
-        async with self._database.writing() as session:
-            session.add(row)
-        return _view(row, (0, 0, None))
-
-    async def all(self) -> list[SiteView]:
-        """Return every site, newest first."""
-        async with self._database.reading() as session:
-            rows = await site_queries.all_sites(session)
-            numbers = await site_queries.numbers(session)
-        return [_view(row, numbers.get(row.id, (0, 0, None))) for row in rows]
-
-    async def view(self, site_id: str) -> SiteView:
-        """Return a site. Raises SiteNotFoundError."""
-        async with self._database.reading() as session:
-            row = await _row(session, site_id)
-            numbers = await site_queries.numbers(session)
-        return _view(row, numbers.get(site_id, (0, 0, None)))
-
-    async def change(self, site_id: str, changes: SiteChanges) -> SiteView:
-        """Change what is given of a site. Raises SiteNotFoundError, InvalidRequestError."""
-        async with self._database.writing() as session:
-            row = await _row(session, site_id)
-            given = changes.model_dump(mode="json", exclude_none=True)
-            try:
-                spec = await asyncio.to_thread(SiteSpec.model_validate, row.spec | given)
-            except ValidationError as error:
-                first = error.errors(include_url=False)[0]
-                field = ".".join(str(part) for part in first["loc"]) or next(iter(given), "area")
-                words = first["msg"].removeprefix("Value error, ")
-                raise InvalidRequestError(field, words, "change the area or the cell, or both together") from None
-            row.name, row.spec, row.updated_at = spec.name, spec.model_dump(mode="json"), now()
-        return await self.view(site_id)
-
-    async def delete(self, site_id: str) -> None:
-        """Remove a site that has neither missions nor surveys. Raises SiteNotFoundError, ConflictError."""
-        async with self._database.writing() as session:
-            row = await _row(session, site_id)
-            missions, surveys, _ = (await site_queries.numbers(session)).get(site_id, (0, 0, None))
-            if missions or surveys:
-                raise ConflictError(
-                    f"the site has {missions} missions and {surveys} surveys: what was measured is kept",
-                    "take its missions out first: PUT /api/v1/missions/{id}/site",
-                )
-            await session.delete(row)
-
-    # Missions of a site
-
-    async def check(self, spec: MissionSpec) -> None:
-        """Refuse a mission of a site that is not there or elsewhere. Raises InvalidRequestError."""
-        if spec.site is not None:
-            await self._check_place(spec, spec.site)
-
-    async def _check_place(self, spec: MissionSpec, site_id: str) -> None:
-        async with self._database.reading() as session:
-            row = await session.get(SiteRow, site_id)
-        if row is None:
-            raise InvalidRequestError("site", f"there is no site {site_id!r}", "GET /api/v1/sites lists them")
-        site = await asyncio.to_thread(SiteSpec.model_validate, row.spec)
-        if not _meet(site, spec):
-            raise InvalidRequestError(
-                "area", f"it lies outside of the site {row.name!r}", "give an area of the site, or another site"
-            )
-
-    async def join(self, live: LiveMission, site_id: str | None, actor: str) -> None:
-        """Put a mission into a site, or into none; what it found goes with it.
-
-        Raises
-        ------
-        InvalidRequestError, ConflictError
-            When there is no such site or it lies elsewhere; when vehicles are at sea.
-        """
-        if live.header.state in AT_SEA:
-            raise ConflictError(
-                f"the mission is {live.header.state}", "put it into a site before it starts or when it ended"
-            )
-        if live.spec.search is not None:
-            raise ConflictError("the mission is a search: only surveys find depths", "put surveys into sites")
-        if site_id is not None:
-            await self._check_place(live.spec, site_id)
-        await to_the_end(self._join(live, site_id))
-        words = "taken out of its site" if site_id is None else f"put into site {site_id}"
-        await live.journal.log(Level.INFO, "site", f"{words} by {actor}", actor=actor)
-        if live.header.state not in ENDED:
-            await self.begin(live)
-        self._maps.survey(live)
-
-    async def _join(self, live: LiveMission, site_id: str | None) -> None:
-        async with live.correcting, live.journal.writing:
-            async with live.database.writing() as session:
-                if site_id is not None and not await site_queries.hold(session, site_id):
-                    raise InvalidRequestError("site", f"there is no site {site_id!r}", "GET /api/v1/sites lists them")
-                await site_queries.set_site(session, live.id, site_id)
-                mission = await session.get_one(MissionRow, live.id)
-                mission.spec = mission.spec | {"site": site_id}
-            live.spec = live.spec.model_copy(update={"site": site_id})
-
-    async def begin(self, live: LiveMission) -> None:
-        """Let a mission that did not start yet begin with what its site knows now, in place of what it knew before."""
-        spec = live.spec
-        site = await self._map(spec.site) if spec.site is not None and spec.site_prior else None
-        rows = np.zeros((0, 4)) if site is None else await live.in_background(_prior, site, live)
-        if site is None or not len(rows):
-            await self._imports.begin_with(live, None)
-            return
-        newest = site.surveys[-1]
-        notes = [f"standard deviations as of {moment(site.model.at_s):%Y-%m-%d}, grown with the age of surveys"]
-        own = live.facts.vertical_datum
-        if site.datum.epsg != own.epsg:
-            notes.append(
-                f"the site's depths are below another datum ({site.datum.statement}) than the mission's "
-                f"({own.statement}), and differ by that: correct the mission to one datum by its tide"
-            )
-        described = {
-            "site": site.facts.id,
-            "source": f"site {site.facts.name}, {len(site.surveys)} surveys, newest {newest.name}",
-            "notes": notes,
-        }
-        await self._imports.begin_with(live, rows, described)
-        for note in notes[1:]:
-            await live.journal.log(Level.WARNING, "site", note)
 
     # What is known of a site
 
@@ -253,14 +106,15 @@ class Sites:
 
     async def map(self, site_id: str) -> SiteMap:
         """Return what is known of a site now. Raises SiteNotFoundError, MapNotReadyError."""
-        found = await self._map(site_id)
+        found = await self.newest(site_id)
         if found is None:
             raise MapNotReadyError(
                 "no survey of the site has ended yet", "finish a mission of the site in which something was measured"
             )
         return found
 
-    async def _map(self, site_id: str) -> SiteMap | None:
+    async def newest(self, site_id: str) -> SiteMap | None:
+        """Return what is known of a site now; None before its first survey. Raises SiteNotFoundError."""
         _, rows = await self._complete(site_id)
         fused = await self._together(site_id, rows)
         if not fused.surveys:
@@ -306,7 +160,7 @@ class Sites:
                 "correct both to one datum: PUT /api/v1/missions/{id}/tide",
             )
         async with self._database.reading() as session:
-            spec = SiteSpec.model_validate((await _row(session, site_id)).spec)
+            spec = SiteSpec.model_validate((await stored_site(session, site_id)).spec)
             contents = await site_queries.contents(session, [one.mission_id for one in pair])
 
         def compute() -> SiteChange:
@@ -320,7 +174,7 @@ class Sites:
     async def _complete(self, site_id: str) -> tuple[list[site_queries.SiteMission], list[SiteSurveyRow]]:
         """Return a site's missions and its surveys by their time; missing ones are made where that is ours."""
         async with self._database.reading() as session:
-            await _row(session, site_id)
+            await stored_site(session, site_id)
             missions = await site_queries.missions_of(session, site_id)
             behind = [
                 one.id for one in missions if one.state in ENDED and not await site_queries.is_current(session, one.id)
@@ -342,7 +196,7 @@ class Sites:
         """Return the surveys that count, fused."""
         counting = _counting(rows)
         async with self._database.reading() as session:
-            site = await _row(session, site_id)
+            site = await stored_site(session, site_id)
         key = (site_id, str(site.spec), *((row.mission_id, row.digest, row.last_time_s) for row in counting))
         async with self._fusing:
             if key in self._fused:
@@ -378,7 +232,8 @@ def _cells(fused: _Fused) -> int:
     return fused.facts.grid.rows * fused.facts.grid.cols
 
 
-async def _row(session: AsyncSession, site_id: str) -> SiteRow:
+async def stored_site(session: AsyncSession, site_id: str) -> SiteRow:
+    """Return a site's row. Raises SiteNotFoundError."""
     row = await session.get(SiteRow, site_id)
     if row is None:
         raise SiteNotFoundError(f"there is no site {site_id!r}", "GET /api/v1/sites lists all")
@@ -426,44 +281,6 @@ def _counting(rows: Sequence[SiteSurveyRow]) -> list[SiteSurveyRow]:
 def _surveyed(row: SiteSurveyRow) -> Surveyed:
     datum = VerticalDatum(row.summary["datum_epsg"], row.summary["vertical_datum"])
     return Surveyed(row.mission_id, row.mission_name, row.last_time_s, datum)
-
-
-def _meet(site: SiteSpec, spec: MissionSpec) -> bool:
-    """Tell whether a mission's area and a site's have ground in common."""
-    try:
-        area = in_frame(spec.area, site.frame())
-    except ValueError:
-        return False
-    return Polygon(area).intersection(Polygon(site.local_area())).area > 0.0
-
-
-def _prior(site: SiteMap, live: LiveMission) -> SoundingRows:
-    """Return what a site knows in or near a mission's area as soundings in the mission's frame, (n, 4)."""
-    model = site.model
-    row, col = np.nonzero(model.known)
-    east, north = model.grid.east_m[col], model.grid.north_m[row]
-    try:
-        at = live.frame.to_local(*site.facts.frame.to_geographic(east, north))
-    except ValueError:
-        return np.zeros((0, 4))
-    zone = Polygon(live.area).buffer(live.margin_m)
-    shapely.prepare(zone)
-    near = shapely.contains_xy(zone, *at)
-    rows: FloatArray = np.column_stack([*at, model.depth_m[row, col], model.sd_m[row, col]])[near]
-    return rows
-
-
-def _view(row: SiteRow, numbers: tuple[int, int, float | None]) -> SiteView:
-    missions, surveys, last_s = numbers
-    return SiteView(
-        **row.spec,
-        id=row.id,
-        created_at=row.created_at,
-        updated_at=row.updated_at,
-        missions=missions,
-        surveys=surveys,
-        last_survey_at=None if last_s is None else moment(last_s),
-    )
 
 
 def _survey_view(row: SiteSurveyRow, state: str | None, fused: _Fused) -> SurveyView:
