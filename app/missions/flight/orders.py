@@ -243,10 +243,9 @@ class OrderBook:
         if self._flight is not None and member.withdrawal is None:
             self._flight.dispatch.leave_line(member, "it left the mission")
 
-    @property
-    def _given_up_now(self) -> dict[str, list[FloatArray]]:
-        """Legs given up that were not looked at yet."""
-        return {} if self._flight is None else self._flight.dispatch.given_up
+    def _has_given_up(self, member: Member) -> bool:
+        """Whether a vehicle gave legs of its order up that were not looked at yet."""
+        return self._flight is not None and self._flight.dispatch.unflown.has_of_order(member.name)
 
     @property
     def waiting(self) -> bool:
@@ -255,8 +254,7 @@ class OrderBook:
         if flight is None:
             return False
         return any(
-            m.name in flight.dispatch.given_up
-            or m.name in flight.dispatch.dropped
+            flight.dispatch.unflown.waits(m.name)
             or (m.asked is None and flight.planner.is_ordered(m.name))
             or (m.asked is not None and m.asked.state is OrderState.ACCEPTED and m.plannable)
             for m in self._live.team
@@ -270,11 +268,11 @@ class OrderBook:
         flight, taken = self._flight, []
         if flight is None or not flight.apart:
             return []
-        planner, given_up = flight.planner, flight.dispatch.given_up
-        for name in list(given_up):
-            planner.lose(name, np.array(given_up.pop(name)).reshape(-1, 2))
-        for name in list(flight.dispatch.dropped):
-            planner.go_round(name, np.array(flight.dispatch.dropped.pop(name)).reshape(-1, 2))
+        planner, unflown = flight.planner, flight.dispatch.unflown
+        for name, ends_m in unflown.take_of_orders():
+            planner.lose(name, ends_m)
+        for name, ends_m in unflown.take_barred():
+            planner.go_round(name, ends_m)
             taken.append(name)
         for member in [*self._live.team, *self._live.team.departed.values()]:
             order = member.asked
@@ -304,7 +302,7 @@ class OrderBook:
             line = line_now(lines)
             begin_m = here_m if line is None else line[0]
             ends = flight.dispatch.give_up_legs(member, f"its line is left out: ordered by {order.asked_by}")
-            flight.dispatch.given_up.pop(name, None)
+            flight.dispatch.unflown.forget_order(name)
             if not planner.skip(name, order.id, np.array(ends).reshape(-1, 2), begin_m, here_m):
                 why = f"planner {self._live.spec.planner.name!r} knows of no line that it flies now"
                 await self._over(member, order, OrderState.FAILED, why)
@@ -314,7 +312,7 @@ class OrderBook:
             planner.lead(name, order.id, order.corners_m, np.zeros((0, 2)), member.last_end_m(self._live.frame))
         else:
             ends = flight.dispatch.give_up_legs(member, f"ordered elsewhere by {order.asked_by}")
-            flight.dispatch.given_up.pop(name, None)
+            flight.dispatch.unflown.forget_order(name)
             planner.lead(name, order.id, order.corners_m, np.array(ends).reshape(-1, 2), here_m)
         if member.asked is order:
             member.asked = replace(order, state=OrderState.FLYING)
@@ -340,7 +338,7 @@ class OrderBook:
         ends = [member.target_m] if member.ordered and member.target_m is not None else []
         ends += [leg.target_m for leg in member.ahead]
         last_m = order.corners_m[-1]
-        if member.name not in self._given_up_now and not any(np.hypot(*(end - last_m)) <= THERE_M for end in ends):
+        if not self._has_given_up(member) and not any(np.hypot(*(end - last_m)) <= THERE_M for end in ends):
             planner.drop(member.name)
             await self._over(member, order, OrderState.DONE)
 

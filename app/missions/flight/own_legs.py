@@ -177,12 +177,11 @@ class OwnLegs:
 
         Returns whether there were any.
         """
-        if not self._dispatch.left_lines:
+        if not self._dispatch.unflown.any_left_line:
             return False
         planner, space = self._decider.planner, await self._live.in_thread(FreeSpace, self._constraints, 0.0)
-        for name in list(self._dispatch.left_lines):
-            place_m, ends_m = self._dispatch.left_lines.pop(name)
-            planner.leave(name, space.nearest(place_m), np.array(ends_m).reshape(-1, 2))
+        for name, place_m, ends_m in self._dispatch.unflown.take_left_lines():
+            planner.leave(name, space.nearest(place_m), ends_m)
         # What was stored with the legs has these as flown, and a restart would go on from that.
         await self._committing.remember(planner.snapshot())
         return True
@@ -276,8 +275,7 @@ class OwnLegs:
         for leg in decision.legs:
             end_m = given_m.get(leg.vehicle)
             gets_it = end_m is not None and np.array_equal(end_m, leg.target_m)
-            led_to = self._dispatch.dropped.get(leg.vehicle, [])
-            is_led_round = any(np.array_equal(end, leg.target_m[:2]) for end in led_to)
+            is_led_round = self._dispatch.unflown.is_barred_end(leg.vehicle, leg.target_m[:2])
             if not leg.unplanned and not leg.refusal and not gets_it and not is_led_round:
                 yield leg
 
@@ -294,7 +292,7 @@ class OwnLegs:
             and member.controllable
             and member.legs < numbers[leg.vehicle]
             and self._wants_legs(member)
-            and leg.vehicle not in self._dispatch.dropped
+            and not self._dispatch.unflown.is_barred(leg.vehicle)
             and self._begins_at(member, starts_m[leg.vehicle])
             and self._comes_home_after(member, leg)
         ]
@@ -303,9 +301,9 @@ class OwnLegs:
         legs = [leg for leg in decision.legs if not leg.refusal]
         if legs:
             for leg in wished:
-                if not leg.refusal and leg.vehicle in numbers and leg.vehicle in self._dispatch.dropped:
+                if not leg.refusal and leg.vehicle in numbers and self._dispatch.unflown.is_barred(leg.vehicle):
                     # The planner takes it as flown, and it goes on from legs that are not.
-                    self._dispatch.dropped[leg.vehicle].append(leg.target_m[:2])
+                    self._dispatch.unflown.add_barred(leg.vehicle, [leg.target_m[:2]])
             await self._committing.commit(replace(decision, legs=legs), numbers)
             live.changed.set()
         elif any(self._refusals.get(leg.vehicle) == 1 for leg in decision.legs):

@@ -169,18 +169,17 @@ class TeamSteps:
 
     async def _send_until_flown(self) -> None:
         """Send the step again for as long as every vehicle refused it: what nobody took on is not over."""
-        live, turned_down = self._live, self._dispatch.turned_down
+        live = self._live
         while not live.halted:
             ordered = [member for member in live.team if member.order is not None]
-            if not ordered or not all(member.name in turned_down for member in ordered):
+            if not ordered or not all(map(self._dispatch.has_refused, ordered)):
                 return
             await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
             await self._waiting.for_team()
             for member in live.team.plannable:
                 if member.order is not None:
                     member.status = WaypointStatus.PLANNED
-                    turned_down.pop(member.name, None)
-                    await self._dispatch.send(member)
+                    await self._dispatch.send_anew(member)
 
     async def _arrive(self, deadline_s: float) -> None:
         """Wait until every vehicle under way arrived or refused; at the deadline go on without the others."""

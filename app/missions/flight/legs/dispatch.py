@@ -12,6 +12,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import VehicleRefusedError, WaypointOrder, WaypointReport, WaypointStatus
 from app.missions.flight.legs.commit import LegCommit
 from app.missions.flight.legs.stragglers import late_at_s, leg_allowed_s, missed, tell_of
+from app.missions.flight.legs.unflown import UnflownLegs
 from app.missions.live.mission import LiveMission
 from app.missions.task.way import way_m
 from app.missions.team import Member
@@ -50,14 +51,9 @@ class Dispatch:
         self._time_scale = time_scale
         self._idle_since_s: dict[str, float] = {}
         """Since when vehicles have had nothing to fly, the event loop's time; inf once they hold."""
-        self.given_up: dict[str, list[FloatArray]] = {}
-        """Where legs were to end that vehicles did not fly, each (2,), until somebody takes note of it."""
-        self.dropped: dict[str, list[FloatArray]] = {}
-        """Where legs were to end that something barred, each (2,), until the planner is told to lead round that."""
-        self.left_lines: dict[str, tuple[FloatArray, list[FloatArray]]] = {}
-        """Where vehicles left their lines, and where legs were to end that they did not fly then, each (2,), until the
-        planner is told."""
-        self.turned_down: dict[str, int] = {}
+        self.unflown = UnflownLegs()
+        """Legs that vehicles did not fly, until the planner is told."""
+        self._refusals: dict[str, int] = {}
         """How often vehicles refused the order that they have."""
 
     async def keep(self) -> None:
@@ -159,7 +155,7 @@ class Dispatch:
             self._committing.begin_next(member)
             member.leg_began_s = asyncio.get_running_loop().time()
             member.leg_allowed_s = leg_allowed_s(self._live, member)
-            self.turned_down.pop(member.name, None)
+            self._refusals.pop(member.name, None)
             if member.engaged:
                 beginning.append(self.send(member))
         await asyncio.gather(*beginning)
@@ -172,12 +168,21 @@ class Dispatch:
             await self._hub.order(member.key, member.order)
         except VehicleRefusedError as error:
             member.engaged = False
-            before = self.turned_down.get(member.name, 0)
-            self.turned_down[member.name] = before + 1
+            before = self._refusals.get(member.name, 0)
+            self._refusals[member.name] = before + 1
             if not before:
                 await self._live.journal.log(Level.WARNING, "vehicle", str(error), vehicle=member.name)
             if not self._persistent or (before + 1 >= MOST_REFUSALS and member.ahead):
                 self.settle(member, WaypointStatus.REFUSED, str(error))
+
+    def has_refused(self, member: Member) -> bool:
+        """Whether a vehicle refused the order that it has."""
+        return member.name in self._refusals
+
+    async def send_anew(self, member: Member) -> None:
+        """Send a vehicle its order as if it had never refused it."""
+        self._refusals.pop(member.name, None)
+        await self.send(member)
 
     def settle(self, member: Member, status: WaypointStatus, reason: str) -> None:
         """End a vehicle's leg."""
@@ -201,7 +206,7 @@ class Dispatch:
         flown = member.legs > 0
         ends_m = self.give_up_legs(member, reason)
         if self._persistent and flown and member.report is not None:
-            self.left_lines[member.name] = member.place_m(self._live.frame), ends_m
+            self.unflown.add_left_line(member.name, member.place_m(self._live.frame), ends_m)
 
     def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:
         """Take the legs back that a vehicle has not begun; returns where they were to end, each (2,).
@@ -223,14 +228,14 @@ class Dispatch:
 
     def _note_given_up(self, member: Member, ends_m: list[FloatArray]) -> list[FloatArray]:
         if member.asked is not None:
-            self.given_up.setdefault(member.name, []).extend(ends_m)
+            self.unflown.add_of_order(member.name, ends_m)
         return ends_m
 
     async def drop_ahead(self, member: Member, reason: str) -> None:
         """Give up the legs that a vehicle has not begun."""
         ends_m = self._spare(member, [], reason)
         if self._persistent and member.asked is None and member.withdrawal is None:
-            self.dropped.setdefault(member.name, []).extend(ends_m)
+            self.unflown.add_barred(member.name, ends_m)
         self._note_given_up(member, ends_m)
         await self._live.journal.log(
             Level.WARNING,
