@@ -24,6 +24,7 @@ from app.estimation.swath import SwathSonar
 from app.evaluation.coverage.run import CoverageJob
 from app.evaluation.coverage.world import MIN_ALTITUDE_M, CoverageScenario, cell_by_depth_m
 from app.evaluation.runs.jobs import run_jobs
+from benchmarks.common.names import named
 from benchmarks.common.report import COVERAGE, make_parser, write_section
 from simulator.floors.seafloors import FAMILIES, generate
 from simulator.floors.terrain import Terrain
@@ -59,12 +60,11 @@ def floors(options: argparse.Namespace) -> Iterator[tuple[str, Terrain]]:
                 yield file.stem, load_terrain(file)
 
 
-def jobs_of(options: argparse.Namespace) -> dict[tuple[str, int], CoverageJob]:
+def jobs_of(options: argparse.Namespace, parser: argparse.ArgumentParser) -> dict[tuple[str, int], CoverageJob]:
     """Return a job for each floor and team."""
-    found = {}
-    for name, terrain in floors(options):
-        if options.only and name not in options.only.split(","):
-            continue
+    found, every = {}, dict(floors(options))
+    for name in named(parser, "--only", options.only, every) or every:
+        terrain = every[name]
         for vehicles in options.vehicles:
             scenario = CoverageScenario(
                 terrain, vehicles, SwathSonar(), cell_by_depth_m(terrain), seed=options.seeds[0]
@@ -86,10 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--terrains", type=Path, help="folder of .npz floors")
     parser.add_argument("--set", choices=["own", "large", "unseen"], default="own")
     parser.add_argument("--vehicles", type=int, nargs="+", default=[1, 2, 3, 4])
-    parser.add_argument("--only", help="names of floors")
+    parser.add_argument("--only", help="names of floors, separated by commas")
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args(arguments)
-    jobs = jobs_of(options)
+    jobs = jobs_of(options, parser)
     rows: dict[str, Any] = {}
     found: list[tuple[float, dict[str, Any]]] = []
     with ProgressBar() as bar:

@@ -26,6 +26,7 @@ from app.evaluation.runs.summary import spread
 from app.evaluation.survey.job import SurveyJob
 from app.evaluation.survey.world import SPEED_MPS, SurveyScenario
 from app.exploration.planner.options import PlannerOptions
+from benchmarks.common.names import named
 from benchmarks.common.report import FLIGHT, make_parser, write_section
 from benchmarks.planning.survey_study import PATCHY, PATTERNS, sea_floors
 from simulator.floors.seafloors import FAMILIES, generate
@@ -36,6 +37,9 @@ MINUTES = STEPS * STEP_M / SPEED_MPS / 60.0
 OURS, YARDSTICK = "cao", "lawnmower"
 UNSEEN = 1000
 """Added to the seed where generated floors are to be others than those that anything was chosen on."""
+
+
+SETS = ("demo", "floors", "unseen")
 
 
 def floors(sets: Sequence[str], folder: Path | None, seed: int) -> Iterator[tuple[str, Terrain]]:
@@ -84,14 +88,16 @@ def main() -> None:
     """Run what the command line asks for."""
     parser = make_parser(__doc__, FLIGHT, seeds=[0])
     parser.add_argument("--terrains", type=Path, help="folder of terrain files")
-    parser.add_argument("--sets", default="demo", help="demo, floors, unseen, separated by commas")
+    parser.add_argument("--sets", default="demo", help=f"{', '.join(SETS)}, separated by commas")
     parser.add_argument("--only", default="", help="names of sea floors, separated by commas")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args()
-    only = [name for name in given.only.split(",") if name]
+    sets = named(parser, "--sets", given.sets, SETS)
+    every = {seed: list(floors(sets, given.terrains, seed)) for seed in given.seeds}
+    only = named(parser, "--only", given.only, (terrain.name for drawn in every.values() for _, terrain in drawn))
     jobs, flown_over = [], []
-    for seed in given.seeds:
-        for name, terrain in floors(given.sets.split(","), given.terrains, seed):
+    for seed, drawn in every.items():
+        for name, terrain in drawn:
             if only and terrain.name not in only:
                 continue
             scenario = SurveyScenario(terrain, VEHICLES, STEPS, STEP_M, "continuous", seed=seed)

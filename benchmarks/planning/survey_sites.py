@@ -22,6 +22,7 @@ from app.evaluation.runs.jobs import Progress, run_jobs
 from app.evaluation.survey.run import best_even_survey, fly_pattern
 from app.evaluation.survey.world import SurveyScenario, default_map, fly_planner, rmse_m
 from app.exploration.planner.options import PlannerOptions
+from benchmarks.common.names import named
 from benchmarks.common.report import PLANNING, make_parser, write_section
 from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain
@@ -121,7 +122,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args()
     parts = [float(part) for part in given.parts.split(",")]
-    jobs = site_jobs(given.terrains, given.seeds, parts, [name for name in given.only.split(",") if name])
+    only = named(parser, "--only", given.only, [*GENERATED, *([REAL] if given.terrains else [])])
+    jobs = site_jobs(given.terrains, given.seeds, parts, only)
     runs = []
     with ProgressBar() as bar:
         task = bar.add_task("sites", total=len(jobs))

@@ -22,6 +22,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from app.api import logs
+from app.exploration.planners import PLANNERS
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.gaussian_process.gp import warm_up
 from app.missions.forecast.request import starts_of
@@ -30,6 +31,7 @@ from app.missions.forecast.swarm import StepFlown
 from app.missions.maps.builder import MapBuilder
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team
+from benchmarks.common.names import named
 from benchmarks.common.report import FLIGHT, make_parser, write_section
 from benchmarks.imc.mission import ORIGIN
 from simulator.floors.seafloors import FAMILIES, generate
@@ -153,13 +155,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--step", type=float, default=given.max_step_m, help="longest leg, metres")
     parser.add_argument("--cell", type=float, default=given.cell_m, help="of the map, metres")
     options = parser.parse_args(arguments)
+    families = named(parser, "--families", options.families, FAMILIES)
+    asked = named(parser, "--planners", options.planners, PLANNERS)
     logs.configure("error", "json")
     warm_up()
     survey = TeamSurvey(options.vehicles, options.side, options.minutes, options.step, options.cell)
-    planners = [YARDSTICK, *(name for name in options.planners.split(",") if name != YARDSTICK)]
+    planners = [YARDSTICK, *(name for name in asked if name != YARDSTICK)]
     runs = []
     for seed in options.seeds:
-        for family in options.families.split(","):
+        for family in families:
             for planner in planners:
                 runs.append(run(survey, planner, family, seed))
                 print(json.dumps(asdict(runs[-1])), flush=True)
