@@ -6,9 +6,13 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from sqlalchemy import select
 
 from app.missions import compilation
+from app.missions.running import supervisor
+from app.storage.models import EventRow
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_step
+from tests.support.waiting import until
 
 COMPILED = """
 import pkgutil
@@ -65,6 +69,35 @@ async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
         await act(service, mission.id, "start", actor="Ana")
         await until_step(service, mission.id, 1)
         assert not compiled.is_set()
+    finally:
+        compiled.set()
+
+
+async def test_an_operator_is_told_that_the_first_legs_wait_for_a_planner_that_is_compiled(
+    harbour: Harbour, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled = threading.Event()
+    monkeypatch.setattr(compilation, "warm_up_planner", lambda *_: compiled.wait())
+    monkeypatch.setattr(supervisor, "COMPILED_SOON_S", 0.0)
+    try:
+        await harbour.close()
+        await harbour.open()
+        service = harbour.service
+        mission = await service.create(sim_spec(steps=3))
+        await act(service, mission.id, "start", actor="Ana")
+
+        async def told() -> list[str]:
+            async with harbour.database.reading() as session:
+                query = select(EventRow.message).where(EventRow.message.contains("compiled"))
+                return list(await session.scalars(query))
+
+        await until(told, "the operator is told")
+        assert await told() == [
+            "planner 'random' is being compiled, once on this machine: vehicles get their first legs when that is done"
+        ]
+        compiled.set()
+        await until_step(service, mission.id, 1)
+        assert len(await told()) == 1
     finally:
         compiled.set()
 

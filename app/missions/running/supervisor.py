@@ -29,6 +29,8 @@ from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Guard
 from app.storage.queries import missions as mission_queries
 
+COMPILED_SOON_S = 2.0
+"""An operator who has waited so long for the first legs is told what is compiled."""
 PATIENCE_S = 0.5
 """How long a stop waits for the database, so that a restart knows of it too; vehicles wait no longer for a disk."""
 ANSWER_S = 0.5
@@ -103,13 +105,28 @@ class MissionSupervisor:
 
         self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
 
+    async def _until_compiled(self, live: LiveMission) -> None:
+        """Wait until what planning needs is compiled: on a new machine that takes a while."""
+        name = live.spec.planner.name
+        compiled = asyncio.create_task(self._compilation.planner(name, live.planning_sensor))
+        try:
+            if not (await asyncio.wait([compiled], timeout=COMPILED_SOON_S))[0]:
+                await live.journal.log(
+                    Level.INFO,
+                    "mission",
+                    f"planner {name!r} is being compiled, once on this machine: vehicles get their first legs when "
+                    "that is done",
+                )
+            await compiled
+        finally:
+            compiled.cancel()
+
     async def _supervise(self, live: LiveMission, run: Callable[[], Awaitable[str]]) -> None:
         """Run a mission to its end; whatever happens, its vehicles are stopped."""
         try:
             if (ending := self._ending.get(live.id)) is not None:
                 await asyncio.wait([ending])
-            # Compiling what planning needs takes seconds on a new machine; vehicles must not wait for it.
-            await self._compilation.planner(live.spec.planner.name, live.planning_sensor)
+            await self._until_compiled(live)
             reason = await run()
         except asyncio.CancelledError:
             raise
