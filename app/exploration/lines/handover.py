@@ -10,10 +10,14 @@ def hand_over(routes: dict[str, FloatArray], vehicles: tuple[str, ...], en_m: Fl
     """Return a route (k, 2) for each of ``vehicles``, which are at ``en_m`` (n_vehicles, 2).
 
     The rest of a vehicle that left goes to the one whose own rest ends closest to it; a newcomer takes the second half
-    of the longest rest. At least one vehicle must have a route already.
+    of the longest rest. Where all have left, the rests go to the newcomer that is closest to the first of them, and
+    the others take their halves from it.
     """
     here = dict(zip(vehicles, en_m, strict=True))
     result = {name: routes[name] for name in vehicles if name in routes}
+    if not result:
+        begins_m = next((routes[name][0] for name in sorted(routes) if len(routes[name])), en_m[0])
+        result[min(vehicles, key=lambda name: float(np.hypot(*(here[name] - begins_m))))] = np.zeros((0, 2))
     for name in sorted(routes.keys() - here.keys()):
         rest = routes[name]
         if len(rest):

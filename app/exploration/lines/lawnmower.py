@@ -295,7 +295,7 @@ class LawnmowerPlanner(PlannerBase):
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""
         en = team.positions[:, :2]
-        if not self._routes.keys() & set(team.vehicles):
+        if not self._routes:
             corner_m = CORNER_LOSS * team.constraints.max_step_m if team.left_m is None else 0.0
             routes = shared_lines(team.constraints, en, metres_left(team), self._turn_radii_m(team), corner_m)
             self._routes = dict(zip(team.vehicles, routes, strict=True))

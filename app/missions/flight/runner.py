@@ -207,6 +207,10 @@ class Runner:
         for member in live.team.departed.values():
             # It may come back, and goes on with its own numbers.
             self._count_legs(member, last, way_m, spared)
+            of_it = [row for row in rows if row.vehicle == member.name and member.withdrawal is None]
+            member.ahead[:] = map(committed_leg, of_it)
+            if member.ahead:
+                self._dispatch.leave_line(member, "it left the mission")
         for member in live.team:
             was_led = member.legs > 0
             self._count_legs(member, last, way_m, spared)

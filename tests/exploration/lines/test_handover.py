@@ -21,3 +21,13 @@ def test_who_joins_leaves_no_piece_of_a_line_out(left: int, joins_at: tuple[floa
 def test_nobody_is_sent_to_where_the_other_one_ends() -> None:
     routes = hand_over({"a": LINES[-1:]}, ("a", "b"), LINES[:2])
     assert (len(routes["a"]), len(routes["b"])) == (1, 0)
+
+
+def test_a_team_that_is_replaced_goes_on_with_what_is_left() -> None:
+    left = {"a": LINES[-3:], "b": LINES[:0]}
+    routes = hand_over(left, ("c", "d"), np.array([[0.0, 0.0], [30.0, 80.0]]))
+    flown = [LineString(np.vstack([LINES[-3], way])) for way in (routes["d"], routes["c"])]
+    assert MultiLineString(flown).buffer(1e-6).covers(LineString(LINES[-3:]))
+    assert len(routes["d"]), "it is closest"
+    nothing_left = hand_over({"a": LINES[:0]}, ("c",), LINES[:1])
+    assert {name: len(way) for name, way in nothing_left.items()} == {"c": 0}

@@ -19,7 +19,7 @@ from tests.support.waiting import until
 pytestmark = pytest.mark.usefixtures("simulated_time")
 
 
-@pytest.mark.parametrize("how", ["held", "taken out"])
+@pytest.mark.parametrize("how", ["held", "taken out", "taken out for another", "taken out in a pause for another"])
 async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
     harbour_closed: Harbour, database: Database, how: str
 ) -> None:
@@ -30,14 +30,22 @@ async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
     live = await service.get(mission)
     await act(service, mission, "start")
     await until(lambda: live.team.named("a").flown.on_plan_m > 60.0, "it surveys")
+    if "pause" in how:
+        await act(service, mission, "pause")
     if how == "held":
         await homecoming.hold(live, "a", "Ana")
         # It circles for a while, elsewhere.
         await asyncio.sleep(30.0 / service.settings.time_scale)
         await service.send_on(live, "a", "Ana")
+    elif "another" in how:
+        another = live.team.named("a").spec.model_copy(update={"name": "b"})
+        await service.team_changes.take_out(live, "a", "Ana")
+        await service.team_changes.join(live, another, "Ana")
     else:
         await service.team_changes.take_out(live, "a", "Ana")
         await service.team_changes.rejoin(live, "a", "Ana")
+    if "pause" in how:
+        await act(service, mission, "resume")
     await until_state(service, mission, MissionState.FINISHED)
     async with database.reading() as session:
         rows = (await session.scalars(select(WaypointRow).order_by(WaypointRow.step))).all()
@@ -47,8 +55,11 @@ async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
     assert 1 < len(missed) == np.ptp(missed) + 1
     again = ends[missed[-1] + 1 :]
     assert LineString(again).buffer(1.0).covers(LineString(ends[missed]))
-    # Legs that it did not begin take nothing of its way.
-    assert live.team.named("a").spared == len(missed) - 1
+    if "another" in how:
+        assert not LineString(again).buffer(1.0).covers(LineString(ends[:3])), "the first one had flown that"
+    else:
+        # Legs that it did not begin take nothing of its way.
+        assert live.team.named("a").spared == len(missed) - 1
 
 
 @pytest.mark.parametrize(("budget", "left"), [({"minutes": 90}, "90 min"), ({"km_per_vehicle": 2.0}, "2.0 km")])

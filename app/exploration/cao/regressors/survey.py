@@ -128,7 +128,7 @@ class SurveyRegressors:
         self._left_m = metres_left(team)
         self._steps_m = np.minimum(team.constraints.max_step_m, self._left_m) * (1 - 1e-9)
         self._whole_m = max(self._flown_m + float(self._left_m.sum()), 1e-9)
-        begins = not self._plan.keys() & set(team.vehicles)
+        begins = not self._plan
         self._leave_out_cut_off()
         changed = not begins and self._plan.keys() != set(team.vehicles)
         explores = not begins and any(self._coarse.get(v, 0) == 0 for v in team.vehicles)

@@ -207,6 +207,9 @@ class Dispatch:
         ends_m = self.give_up_legs(member, reason)
         if self._persistent and flown and member.report is not None:
             self.unflown.add_left_line(member.name, member.place_m(self._live.frame), ends_m)
+        elif self._persistent and ends_m:
+            # Since a restart it was not heard.
+            self.unflown.add_left_line(member.name, ends_m[0], ends_m)
 
     def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:
         """Take the legs back that a vehicle has not begun; returns where they were to end, each (2,).
