@@ -1,5 +1,6 @@
 """Health and metrics."""
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from app.settings import Settings
 from app.storage.upkeep import migrate
 from app.storage.upkeep.prepare import DatabaseNotReadyError
 from tests.support.api.rest import mission_spec, soundings
+from tests.support.storage.databases import query
 from tests.support.waiting import until
 
 
@@ -45,6 +47,18 @@ async def test_a_lost_database_is_not_ready_but_alive(server: Server, client: ht
     assert "disk is gone" in ready.json()["components"]["database"]
     assert (await client.get("/health")).status_code == 200
     assert (await client.get("/health/live")).status_code == 200
+
+
+async def test_a_process_that_others_took_for_dead_is_asked_again_later(
+    server: Server, client: httpx.AsyncClient
+) -> None:
+    service = server.config.app.state.edge.service
+    await service._failover.end()  # it would enter again
+    await asyncio.to_thread(query, service._database.url, "delete from processes")
+    refused = await client.post("/missions", json=mission_spec())
+    assert (refused.status_code, refused.json()["type"]) == (503, "urn:bathyfleet:problem:not-ready")
+    assert refused.headers["Retry-After"] == "5"
+    assert (await client.get("/missions")).json() == []
 
 
 async def _fail() -> None:

@@ -26,6 +26,7 @@ from app.missions.errors import (
     MissionUnreadableError,
     PingsNotFoundError,
     PingsUnreadableError,
+    ProcessApartError,
     ProductUnavailableError,
     SiteNotFoundError,
     SoundingNotFoundError,
@@ -51,6 +52,7 @@ KINDS: dict[type[MissionError], str] = {
     MoveRefusedError: "move-refused",
     PingsNotFoundError: "pings-not-found",
     PingsUnreadableError: "pings-unreadable",
+    ProcessApartError: "not-ready",
     ProductUnavailableError: "product-unavailable",
     SiteNotFoundError: "site-not-found",
     SoundingNotFoundError: "sounding-not-found",
@@ -90,7 +92,7 @@ def answer_to(error: Exception, scope: Scope) -> Response:
     request = Request(scope)
     if isinstance(error, ProblemError):
         return _edge_problem(request, error)
-    if isinstance(error, MissionNotFoundError):
+    if isinstance(error, MissionError):
         return _mission_problem(request, error)
     if isinstance(error, DBAPIError | sqlite3.Error):
         return _database_problem(request, error)
@@ -114,7 +116,7 @@ def _mission_problem(request: Request, error: MissionError) -> Response:
             )
         )
     problem = make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
-    later = isinstance(error, ImportUnavailableError | ProductUnavailableError)
+    later = isinstance(error, ImportUnavailableError | ProcessApartError | ProductUnavailableError)
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
 
 

@@ -14,7 +14,7 @@ import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
-from app.missions.errors import MissionElsewhereError
+from app.missions.errors import MissionElsewhereError, ProcessApartError
 from app.missions.states import AT_SEA
 from app.storage.database import Database, Guard
 from app.storage.models import ProcessRow
@@ -153,7 +153,13 @@ class Ownership:
             return await processes.orphans(session, AT_SEA)
 
     async def owner(self, mission_id: str) -> Peer | None:
-        """Return the other process that has a mission; None when it is ours, nobody's or unknown."""
+        """Return the other process that has a mission; None when it is ours, nobody's or unknown.
+
+        Raises
+        ------
+        ProcessApartError
+            While this process knows of no other one.
+        """
         if mission_id in self._mine:
             return None
         async with self._database.reading() as session:
@@ -161,17 +167,32 @@ class Ownership:
         if number is None or number == self._number:
             return None
         if number not in self._peers:
-            await self.look()
+            try:
+                await self.look()
+            except MembershipLostError as error:
+                raise _apart() from error
         return self._peers.get(number)
 
     async def take(self, mission_id: str) -> bool:
-        """Have a mission from now on; False when another process has it."""
+        """Have a mission from now on; False when another process has it. Raises ProcessApartError."""
         async with self._database.writing() as session:
-            await processes.take(session, mission_id, self._number, now())
+            await self.take_within(session, mission_id)
             mine = await processes.owner(session, mission_id) == self._number
         if mine:
             self._mine.add(mission_id)
         return mine
+
+    async def take_within(self, session: AsyncSession, mission_id: str) -> None:
+        """Have a mission without owner once a transaction ends well.
+
+        Raises
+        ------
+        ProcessApartError
+            When this process is none of those that share the database: whatever the transaction wrote is taken back.
+        """
+        if not await processes.is_known(session, self._number):
+            raise _apart()
+        await processes.take(session, mission_id, self._number, now())
 
     async def release(self, mission_ids: Iterable[str]) -> None:
         """Give missions up."""
@@ -190,3 +211,10 @@ class Ownership:
                 )
 
         return check
+
+
+def _apart() -> ProcessApartError:
+    return ProcessApartError(
+        "this process is none of those that share the database now: it was out of reach, or others took it for dead",
+        "Ask again in a moment: it enters again by itself as soon as it can",
+    )
