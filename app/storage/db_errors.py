@@ -1,8 +1,9 @@
-"""Troubles of the database that pass: its disk is full, another program holds it locked, its server is away."""
+"""Troubles of the database that pass: its disk is full, another program holds it locked, its server is away or busy."""
 
 import sqlite3
 
 from sqlalchemy.exc import DBAPIError, InterfaceError
+from sqlalchemy.exc import TimeoutError as NoFreeConnectionError
 
 _SQLITE = {
     sqlite3.SQLITE_FULL: "the disk with the database is full: free some space on it",
@@ -26,12 +27,19 @@ _SERVER = {
 }
 """By SQLSTATE, or its class."""
 
+_ALL_IN_USE = (
+    "every connection of this process to the database is in use: ask again in a moment; where it stays so see what "
+    "holds its tables locked, and who asks that often"
+)
+
 
 def trouble_of(error: BaseException) -> str:
     """Return in words what keeps the database from being used and what to do about it.
 
     Empty when waiting will not help: the error is in what was asked of the database.
     """
+    if isinstance(error, NoFreeConnectionError):
+        return _ALL_IN_USE
     cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
     code = getattr(cause, "sqlite_errorcode", None)
     if code is not None:

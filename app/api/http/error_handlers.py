@@ -5,7 +5,7 @@ from http import HTTPStatus
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import Scope
@@ -82,7 +82,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _validation_problem)  # type: ignore[arg-type]
     app.add_exception_handler(HTTPException, _http_problem)  # type: ignore[arg-type]
     app.add_exception_handler(ProblemError, _edge_problem)  # type: ignore[arg-type]
-    app.add_exception_handler(DBAPIError, _database_problem)
+    app.add_exception_handler(SQLAlchemyError, _database_problem)
     app.add_exception_handler(sqlite3.Error, _database_problem)
     app.add_exception_handler(MissionError, _mission_problem)  # type: ignore[arg-type]
 
@@ -94,7 +94,7 @@ def answer_to(error: Exception, scope: Scope) -> Response:
         return _edge_problem(request, error)
     if isinstance(error, MissionError):
         return _mission_problem(request, error)
-    if isinstance(error, DBAPIError | sqlite3.Error):
+    if isinstance(error, SQLAlchemyError | sqlite3.Error):
         return _database_problem(request, error)
     raise error
 

@@ -51,6 +51,9 @@ class Failover:
         self._supervisor = supervisor
         self._claims = claims
         self._task: asyncio.Task[None] | None = None
+        self._taking: asyncio.Task[None] | None = None
+        """Takes missions up, beside the watch: what it reads may be locked for longer than others wait."""
+        self._telling: set[asyncio.Task[None]] = set()
         self._aside = False
         """Whether the vehicles are stopped, because others may take this process for dead."""
         self._trouble = "did not begin yet"
@@ -63,16 +66,20 @@ class Failover:
     async def begin(self) -> None:
         """Take up what nobody has, and keep watch from now on."""
         await self._ownership.enter()
-        await self._take_up(await self._ownership.look())
+        self._taking = asyncio.create_task(self._take_up(await self._ownership.look()), name="taking up")
         self._trouble = ""
         self._begin_watch()
+        await asyncio.wait([self._taking])
+        if not self._taking.cancelled():
+            self._taking.result()
 
     async def end(self) -> None:
         """Keep watch no longer."""
-        task, self._task = self._task, None
-        if task is not None:
+        watch, self._task = self._task, None
+        tasks = [task for task in (watch, self._taking, *self._telling) if task is not None]
+        for task in tasks:
             task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     def _begin_watch(self) -> None:
         self._task = asyncio.create_task(self._keep(), name="watch")
@@ -123,7 +130,9 @@ class Failover:
             try:
                 if self._aside:
                     await self._come_back()
-                await self._take_up(await self._ownership.look())
+                missions = await self._ownership.look()
+                if missions and (self._taking is None or self._taking.done()):
+                    self._taking = asyncio.create_task(self._try_to_take_up(missions), name="taking up")
             except MembershipLostError as error:
                 self._trouble = f"others may take this process for dead: {error}"
                 if self._aside:
@@ -140,6 +149,15 @@ class Failover:
             else:
                 self._trouble = ""
 
+    async def _try_to_take_up(self, missions: Sequence[str]) -> None:
+        """Take missions up; what is left over is found again when the watch looks next."""
+        try:
+            await self._take_up(missions)
+        except (ProcessApartError, SQLAlchemyError, OSError) as error:
+            log.error("missions cannot be taken up", error=str(error))
+        except Exception:
+            log.exception("missions cannot be taken up")
+
     async def _take_up(self, missions: Sequence[str]) -> None:
         """Take up missions at sea that nobody has, as far as this process may."""
         # Where several processes take up what one left behind, each comes by its share.
@@ -148,7 +166,7 @@ class Failover:
                 await self._registry.get(mission_id)
             except MissionElsewhereError:
                 continue
-            except (MembershipLostError, ProcessApartError, SQLAlchemyError, OSError):
+            except (ProcessApartError, SQLAlchemyError, OSError):
                 raise  # that concerns all of them
             except Exception:
                 # One that cannot be read, as when a newer version wrote it, is not the others' trouble.
@@ -159,6 +177,8 @@ class Failover:
     async def _stand_aside(self) -> None:
         """Stop the vehicles before others take the missions up. Raises nothing: the watch goes on."""
         self._aside = True
+        if self._taking is not None:
+            self._taking.cancel()
         ours = [live for live in self._registry if live.id in self._supervisor.runs]
         halted = await asyncio.gather(*(self._supervisor.halt(live) for live in ours), return_exceptions=True)
         for live, error in zip(ours, halted, strict=True):
@@ -187,4 +207,11 @@ class Failover:
             self._supervisor.run(live)
         for live in again:
             words = "the database was out of reach; the vehicles were stopped meanwhile"
-            await live.journal.log(Level.WARNING, "resumed", words)
+            telling = asyncio.create_task(live.journal.log(Level.WARNING, "resumed", words), name=f"tell {live.id}")
+            self._telling.add(telling)
+            telling.add_done_callback(self._told)
+
+    def _told(self, done: asyncio.Task[None]) -> None:
+        self._telling.discard(done)
+        if not done.cancelled() and done.exception() is not None:
+            log.error("a line of a mission's log could not be written", exc_info=done.exception())

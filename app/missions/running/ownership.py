@@ -58,6 +58,7 @@ class Ownership:
 
     def __init__(self, database: Database, url: str, certificate: str | None = None) -> None:
         self._database = database
+        self._apart = database.apart()
         self._url = url
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
@@ -97,7 +98,7 @@ class Ownership:
         self._mine.clear()
         for _ in range(TRIES):
             row = ProcessRow(url=self._url, secret=self.secret, certificate=self._certificate, began_at=now())
-            async with self._database.writing() as session:
+            async with self._apart.writing() as session:
                 session.add(row)
                 await session.flush()
                 self._number = row.id
@@ -108,14 +109,14 @@ class Ownership:
         raise MembershipLostError(f"this process was taken for dead {TRIES} times while it began")
 
     async def _is_known(self) -> bool:
-        async with self._database.reading() as session:
+        async with self._apart.reading() as session:
             return await session.get(ProcessRow, self._number) is not None
 
     async def leave(self) -> None:
         """Give everything up and tell the others."""
         if self._number:
             try:
-                async with self._database.writing() as session:
+                async with self._apart.writing() as session:
                     await processes.bury(session, [self._number])
                 await self._membership.call()
             except Exception as error:
@@ -133,7 +134,7 @@ class Ownership:
         MembershipLostError
             When the others may take this process for dead.
         """
-        async with self._database.reading() as session:
+        async with self._apart.reading() as session:
             known = await processes.all_processes(session)
         alive = await self._membership.alive([row.id for row in known])
         if self._number not in alive:
@@ -141,7 +142,7 @@ class Ownership:
         dead = {row.id for row in known} - alive
         if dead:
             await self._membership.end_sessions(dead)
-            async with self._database.writing() as session:
+            async with self._apart.writing() as session:
                 await processes.bury(session, dead)
             log.warning("another process ended, or hangs", processes=sorted(dead))
         self._peers = {
@@ -149,7 +150,7 @@ class Ownership:
             for row in known
             if row.id in alive and row.id != self._number
         }
-        async with self._database.reading() as session:
+        async with self._apart.reading() as session:
             return await processes.orphans(session, AT_SEA)
 
     async def owner(self, mission_id: str) -> Peer | None:
