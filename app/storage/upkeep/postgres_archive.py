@@ -5,17 +5,22 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, NamedTuple
 
+import structlog
 from sqlalchemy import URL
 
 from app.storage.models import Base, MissionOwnerRow, ProcessRow
 from app.storage.processes.membership import HELD
 
+log = structlog.get_logger(__name__)
+
 VERSION_TABLE = "alembic_version"
+_FUNCTION = "audit_only_grows()"
+"""What the tables need beside them."""
 _LEFT_OUT = tuple(row.__tablename__ for row in (MissionOwnerRow, ProcessRow))
 """The list of live processes, and what they lead, is of no use later, and their secrets are private."""
 
@@ -64,7 +69,7 @@ def put_back(url: URL, archive: Path, *, replace: bool) -> None:
     """Write what an archive holds into a database: all in one transaction, or nothing. Raises BackupError.
 
     Rows that name a process keep everything but that: the process is in no archive. The references are made again
-    when the names are gone.
+    when the names are gone. ``replace``: the service's tables go before, also those that the archive does not know of.
     """
     read = [_program("pg_restore"), "--no-owner"]
     listed = _run([*read, "--list", str(archive)]).splitlines(keepends=True)
@@ -75,14 +80,18 @@ def put_back(url: URL, archive: Path, *, replace: bool) -> None:
         later.write_text("".join(reference.line for reference in references))
         with _transaction(url) as script:
             if replace:
-                for reference in references:
-                    _write(script, reference.dropped)
+                for table in _tables(listed):
+                    _write(script, f"DROP TABLE IF EXISTS {table} CASCADE;\n")
+                _write(script, f"DROP FUNCTION IF EXISTS {_FUNCTION} CASCADE;\n")
             clean = ["--clean", "--if-exists"] if replace else []
             _run([*read, *clean, f"--use-list={tables}", "--file=-", str(archive)], output=script)
             for reference in references:
                 _write(script, reference.forgotten)
             if references:
                 _run([*read, f"--use-list={later}", "--file=-", str(archive)], output=script)
+    if replace and (strange := _strange_tables(url)):
+        words = "tables stay that this version does not know: others', or a newer version's, whose migration they stop"
+        log.warning(words, tables=strange)
 
 
 class _Reference(NamedTuple):
@@ -92,22 +101,32 @@ class _Reference(NamedTuple):
     """The archive's list names it so."""
     table: str
     column: str
-    name: str
 
     @classmethod
     def to_a_process(cls, line: str) -> "_Reference | None":
         found = re.match(r"\d+; \d+ \d+ FK CONSTRAINT (\S+) (\S+) (\S+) ", line)
         if found is None or found[3] not in _REFERENCES:
             return None
-        return cls(line, f"{_quoted(found[1])}.{_quoted(found[2])}", _quoted(_REFERENCES[found[3]]), _quoted(found[3]))
-
-    @property
-    def dropped(self) -> str:
-        return f"ALTER TABLE IF EXISTS {self.table} DROP CONSTRAINT IF EXISTS {self.name};\n"
+        return cls(line, f"{_quoted(found[1])}.{_quoted(found[2])}", _quoted(_REFERENCES[found[3]]))
 
     @property
     def forgotten(self) -> str:
         return f"UPDATE {self.table} SET {self.column} = NULL WHERE {self.column} IS NOT NULL;\n"  # noqa: S608 - quoted
+
+
+def _tables(listed: Iterable[str]) -> list[str]:
+    """Return the tables of this version, and those that an archive lists."""
+    ours = [VERSION_TABLE, *(table.name for table in Base.metadata.sorted_tables)]
+    found = (re.match(r"\d+; \d+ \d+ TABLE (\S+) (\S+) ", line) for line in listed)
+    archived = [f"{_quoted(table[1])}.{_quoted(table[2])}" for table in found if table is not None]
+    return [*map(_quoted, ours), *archived]
+
+
+def _strange_tables(url: URL) -> list[str]:
+    """Return the tables of a database that are not of this version."""
+    query = "SELECT tablename FROM pg_tables WHERE schemaname = ANY(current_schemas(false)) ORDER BY 1"
+    command = [*_on_server("psql", url), "--no-psqlrc", "--tuples-only", "--no-align", f"--command={query}"]
+    return sorted(set(_run(command, url).split("\n")) - {"", VERSION_TABLE, *Base.metadata.tables})
 
 
 def _quoted(name: str) -> str:
@@ -127,7 +146,8 @@ def _transaction(url: URL) -> Iterator[IO[bytes]]:
         assert psql.stdin is not None  # noqa: S101 - it is a pipe
         failed: BackupError | None = None
         try:
-            _write(psql.stdin, "BEGIN;\n")
+            # The first line of what it says is to be the error.
+            _write(psql.stdin, "SET client_min_messages = warning;\nBEGIN;\n")
             yield psql.stdin
             _write(psql.stdin, "COMMIT;\n")
         except BackupError as error:

@@ -19,6 +19,7 @@ from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
 from app.storage.processes.membership import make_membership
+from app.storage.upkeep import migrate
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
 from tests.support.storage.databases import Databases, query
@@ -303,6 +304,34 @@ async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
 
     await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
     assert query(url, statement) == waiting, "over the row that named a process"
+
+
+@pytest.mark.parametrize("revision", ["0006", "0018"])  # before the audit log, and of a release
+async def test_the_backup_of_an_older_version_replaces_a_newer_database(
+    databases: Databases, tmp_path: Path, capsys: pytest.CaptureFixture[str], revision: str
+) -> None:
+    """The way back after an upgrade; what others keep beside it stays."""
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    older, newer, files = databases.empty("postgresql"), databases.fresh("postgresql"), PingFiles(str(tmp_path / "p"))
+    await migrate.upgrade(older, revision)
+    query(older, "insert into tokens (id, name, role, token_hash, created_at) values ('t', 'Ana', 'admin', 'd', now())")
+    copy, _ = await asyncio.to_thread(back_up, older, tmp_path / "older.dump", files)
+    database = Database(newer)
+    await fill(database, files)
+    await database.close()
+    query(newer, "create table notes (mission varchar(36) references missions)")
+    query(newer, "insert into notes values ('m1')")
+
+    await asyncio.to_thread(restore_to, newer, copy, replace=True, pings=files)
+    assert await migrate.current(newer) == revision
+    assert await migrate.tables(newer) == sorted([*await migrate.tables(older), "notes"])
+    assert query(newer, "select mission from notes") == [("m1",)]
+    assert "tables stay that this version does not know" in (said := capsys.readouterr().out)
+    assert "notes" in said
+    await migrate.upgrade(newer)
+    assert query(newer, "select name from tokens") == [("Ana",)]
+    assert (await counts(newer))["missions"] == 0
 
 
 async def test_an_archive_goes_into_postgresql_as_a_whole_or_not_at_all(databases: Databases, tmp_path: Path) -> None:
