@@ -237,6 +237,17 @@ def at_revision(file: Path, revision: str) -> None:
         connection.commit()
 
 
+@pytest.mark.parametrize("words", [["migrate"], ["migrate", "--down-to", "base"]])
+def test_another_program_s_database_is_not_migrated(bathyfleet: Run, tmp_path: Path, words: list[str]) -> None:
+    with closing(sqlite3.connect(tmp_path / "bathyfleet.db")) as connection:
+        connection.execute("create table cats (name text)")
+    refused = bathyfleet(*words)
+    assert refused.code == 1, refused.stdout
+    assert "bathyfleet.db is not one of bathyfleet: it holds other tables (cats); nothing was changed" in refused.stderr
+    with closing(sqlite3.connect(tmp_path / "bathyfleet.db")) as connection:
+        assert connection.execute("select name from sqlite_master").fetchall() == [("cats",)]
+
+
 def test_a_newer_version_s_database_is_neither_changed_nor_put_in_place(bathyfleet: Run, tmp_path: Path) -> None:
     bathyfleet("token", "create", "Maria")
     assert bathyfleet("backup", "copy.db").code == 0

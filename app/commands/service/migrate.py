@@ -20,12 +20,14 @@ def migrate(
     from sqlalchemy.exc import SQLAlchemyError
 
     from app.storage.upkeep import migrate as migrations
-    from app.storage.upkeep.prepare import of_another_version
+    from app.storage.upkeep.prepare import check_that_empty, of_another_version
 
     async def run() -> tuple[str | None, str | None]:
         url = settings.database_url
         before = await migrations.current(url)
-        if before is not None and not migrations.is_known(before):
+        if before is None:
+            await check_that_empty(url)
+        elif not migrations.is_known(before):
             raise of_another_version(url, before, migrations.head())
         if down_to is None:
             await migrations.upgrade(url)
