@@ -199,6 +199,24 @@ def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
     assert revoked["revoked_at"]
 
 
+def test_what_cannot_be_written_into_the_audit_log_is_done_and_said_to_be_in_none(
+    bathyfleet: Run, tmp_path: Path
+) -> None:
+    bathyfleet("migrate")
+    bathyfleet("migrate", "--down-to", "0018")
+    with closing(sqlite3.connect(tmp_path / "bathyfleet.db")) as connection:
+        connection.execute("create trigger full before insert on audit begin select raise(abort, 'no room'); end")
+    for command, told in (
+        (["migrate"], "from revision 0018 to"),
+        (["token", "create", "Maria"], "bf_"),
+        (["backup", "copy.db"], "copy.db is written and checked"),
+        (["restore", "copy.db", "--replace"], "copy.db is restored"),
+    ):
+        ended = bathyfleet(*command)
+        assert (ended.code, told in ended.stdout) == (0, True), (command, ended)
+        assert "it is done, but not in the audit log: no room\n" in ended.stderr
+
+
 def test_lists_are_whole_in_a_narrow_terminal(bathyfleet: Run) -> None:
     bathyfleet("token", "create", "Maria", "--role", "operator", "--days", "30")
     (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
