@@ -303,6 +303,21 @@ def test_a_backup_that_the_start_would_not_bring_up_to_date_is_restored_and_said
     assert "run 'bathyfleet migrate'" in restored.stderr
 
 
+def test_a_way_down_is_written_down_before_and_only_where_it_is_gone(bathyfleet: Run) -> None:
+    newest = re.search(r"to (\d{4})", bathyfleet("migrate").stdout)
+    assert newest is not None
+    assert bathyfleet("migrate", "--down-to", "nonsense").code == 1
+    assert bathyfleet("migrate", "--down-to", newest[1]).code == 0
+    assert "to 0018" in bathyfleet("migrate", "--down-to", "0018").stdout
+    bathyfleet("migrate")
+    lines = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
+    assert [line["target"] for line in lines] == [
+        f"0018 to {newest[1]}",
+        f"{newest[1]} down to 0018",
+        f"empty to {newest[1]}",
+    ]
+
+
 def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_path: Path) -> None:
     """A service of the older version may still be running on it."""
     bathyfleet("migrate")
