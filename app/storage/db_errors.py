@@ -21,6 +21,7 @@ _SERVER = {
     "40": "the database's server ended a transaction because of others: it is tried again",
     "55P03": "another program holds the database locked: end it",
     "08": "the connection to the database's server broke: see whether it runs and can be reached",
+    "53300": "the database's server takes no more connections: raise its max_connections, or share it among fewer",
     "53": "the database's server lacks room or memory: free some space on its disk",
     "57": "the database's server is stopping or starting: wait for it, or start it",
     "58": "the disk of the database's server reports an error: see whether it is full or broken",
