@@ -3,6 +3,7 @@
 import asyncio
 import os
 import re
+import resource
 import shutil
 import sqlite3
 import subprocess
@@ -123,6 +124,19 @@ async def test_restoring_over_a_database_moves_it_aside_and_never_one_that_is_in
     assert (await counts(sqlite.url))["missions"] == 0
     assert aside is not None
     assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
+
+
+async def test_a_full_disk_keeps_nothing_of_a_copy(sqlite: Database, tmp_path: Path) -> None:
+    async with sqlite.writing() as session:
+        session.add(mission("m1", reason="x" * 4_000_000))
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, most[1]))
+    try:
+        with pytest.raises(BackupError, match="cannot be written"):
+            back_up(sqlite.url, tmp_path / "copies" / "x.db")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, most)
+    assert list((tmp_path / "copies").iterdir()) == []
 
 
 class InterruptedFiles(PingFiles):
