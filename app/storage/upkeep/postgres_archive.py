@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import structlog
 from sqlalchemy import URL
@@ -140,7 +140,7 @@ def _transaction(url: URL) -> Iterator[IO[bytes]]:
     with (
         tempfile.TemporaryFile() as said,
         subprocess.Popen(  # noqa: S603 - no shell
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, env=_with_password(url)
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, env=_environment(url)
         ) as psql,
     ):
         assert psql.stdin is not None  # noqa: S101 - it is a pipe
@@ -184,15 +184,56 @@ def _program(name: str) -> str:
     return found
 
 
+_SETTINGS = {
+    "ssl": "PGSSLMODE",
+    "target_session_attrs": "PGTARGETSESSIONATTRS",
+    "passfile": "PGPASSFILE",
+    "krbsrvname": "PGKRBSRVNAME",
+    "gsslib": "PGGSSLIB",
+    "password": "PGPASSWORD",
+}
+"""What the service's driver takes in a URL, and how PostgreSQL's programs are told the same."""
+_PLACE = ("host", "port", "user", "database")
+_OF_THE_DRIVER = ("async_fallback", "prepared_statement_cache_size", "prepared_statement_name_func")
+"""What says nothing about the way to the server."""
+_USUAL_HOSTS = "/run/postgresql,/var/run/postgresql,/tmp,localhost"
+"""Where the service's driver looks for a server that is not named."""
+
+
+def _given(url: URL) -> dict[str, Any]:
+    """Return where a URL says that a database is, as the service's driver reads it. Raises BackupError."""
+    given = dict(url.get_dialect()().create_connect_args(url)[1])
+    strange = sorted(given.keys() - {*_SETTINGS, *_PLACE, *_OF_THE_DRIVER})
+    if strange:
+        raise BackupError(
+            f"the database's URL has {', '.join(strange)}, which PostgreSQL's programs cannot be told",
+            "Leave it out there: libpq's variables say the same to both, as PGSSLROOTCERT",
+        )
+    return given
+
+
 def _on_server(name: str, url: URL) -> list[str]:
-    place = ["--host", url.host or "localhost", "--port", str(url.port or 5432), "--no-password"]
-    user = ["--username", url.username] if url.username else []
-    return [_program(name), *place, *user, "--dbname", url.database or "postgres"]
+    given = _given(url)
+    command = [_program(name), "--no-password"]
+    if "host" in given:
+        command += ["--host", _listed(given["host"])]
+    elif "PGHOST" not in os.environ:
+        command += ["--host", _USUAL_HOSTS]
+    for option, value in (("--port", "port"), ("--username", "user"), ("--dbname", "database")):
+        if value in given:
+            command += [option, _listed(given[value])]
+    return command
 
 
-def _with_password(url: URL) -> dict[str, str]:
-    """Return an environment with the password, which no other user sees there."""
-    return os.environ | ({"PGPASSWORD": str(url.password)} if url.password else {})
+def _listed(value: object) -> str:
+    """Return one value, or one for each of several servers."""
+    return ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _environment(url: URL) -> dict[str, str]:
+    """Return an environment with what is no option; no other user sees a password there."""
+    given = _given(url)
+    return os.environ | {variable: str(given[name]) for name, variable in _SETTINGS.items() if name in given}
 
 
 def _run(command: list[str], url: URL | None = None, output: IO[bytes] | None = None) -> str:
@@ -201,7 +242,7 @@ def _run(command: list[str], url: URL | None = None, output: IO[bytes] | None = 
         command,
         stdout=output or subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=None if url is None else _with_password(url),
+        env=None if url is None else _environment(url),
         check=False,
     )
     if done.returncode != 0:

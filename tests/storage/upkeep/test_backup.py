@@ -368,8 +368,26 @@ async def test_a_password_is_given_to_no_command_line(tmp_path: Path, monkeypatc
     with pytest.raises(BackupError, match="pg_dump failed"):
         back_up("postgresql+asyncpg://fleet:hunter2@db:5433/fleet", tmp_path / "x.dump")
     assert "hunter2" not in (tmp_path / "arguments").read_text()
-    assert "--host db --port 5433" in (tmp_path / "arguments").read_text()
+    assert "--host db --port 5433 --username fleet --dbname fleet" in (tmp_path / "arguments").read_text()
     assert (tmp_path / "word").read_text() == "hunter2\n"
+
+
+async def test_a_server_is_found_and_spoken_to_as_its_url_says(databases: Databases, tmp_path: Path) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "files"))
+    by_socket = databases.server.socket_url.format(url.rpartition("/")[2])
+    assert await migrate.current(by_socket) == migrate.head()
+    copy, _ = await asyncio.to_thread(back_up, by_socket, tmp_path / "fleet.dump", files)
+    await asyncio.to_thread(restore_to, by_socket, copy, replace=True, pings=files)
+    # It has no certificate: what must be encrypted does not go there in the clear.
+    for mode in ("require", "verify-full"):
+        with pytest.raises(BackupError, match="SSL"):
+            await asyncio.to_thread(back_up, f"{url}?ssl={mode}", tmp_path / "open.dump", files)
+        with pytest.raises(BackupError, match="SSL"):
+            await asyncio.to_thread(restore_to, f"{url}?ssl={mode}", copy, replace=True, pings=files)
+    with pytest.raises(BackupError, match="has sslmode, which PostgreSQL's programs cannot be told"):
+        back_up(f"{url}?sslmode=require", tmp_path / "x.dump", files)
 
 
 async def test_missions_that_ended_long_ago_go_and_give_their_space_back(database: Database) -> None:

@@ -101,6 +101,12 @@ class PostgresServer:
         self._data = data
         self._control = control
 
+    @property
+    def socket_url(self) -> str:
+        """Where it is on this machine without a network."""
+        rest, _, port = self.url.rpartition(":")
+        return f"{rest.rpartition('@')[0]}@/{{}}?host={self._data.parent}&port={port}"
+
     def create(self, name: str, *, template: str = "template0") -> str:
         """Make a database; returns its URL."""
         subprocess.run([*self._command, "-T", template, name], check=True)
