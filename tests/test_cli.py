@@ -318,6 +318,18 @@ def test_a_way_down_is_written_down_before_and_only_where_it_is_gone(bathyfleet:
     ]
 
 
+@pytest.mark.parametrize(
+    "words", [["token", "list"], ["audit"], ["sites", "list"], ["export", "x"], ["prune", "--days", "30"]]
+)
+def test_what_only_reads_leaves_an_older_database_as_it_is(bathyfleet: Run, words: list[str]) -> None:
+    bathyfleet("migrate")
+    bathyfleet("migrate", "--down-to", "0018")
+    refused = bathyfleet(*words)
+    assert refused.code == 1, refused
+    assert re.search(r"is at revision 0018, this version needs \d{4}: run 'bathyfleet migrate'", refused.stderr)
+    assert "from revision 0018 to" in bathyfleet("migrate").stdout
+
+
 def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_path: Path) -> None:
     """A service of the older version may still be running on it."""
     bathyfleet("migrate")

@@ -90,7 +90,7 @@ def prune(
     from app.storage.upkeep.retention import Ended, ended_before, finish_removing, give_space_back, remove
 
     async def run() -> tuple[list[Ended], str]:
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself and apply)
         store = Store(settings.database_url)
         files = PingFiles.beside(settings.database_url, settings.pings_url)
         try:
