@@ -199,6 +199,24 @@ def test_tokens_are_made_listed_and_revoked(bathyfleet: Run) -> None:
     assert revoked["revoked_at"]
 
 
+def test_what_cannot_be_written_into_the_audit_log_is_done_and_said_to_be_in_none(
+    bathyfleet: Run, tmp_path: Path
+) -> None:
+    bathyfleet("migrate")
+    bathyfleet("migrate", "--down-to", "0018")
+    with closing(sqlite3.connect(tmp_path / "bathyfleet.db")) as connection:
+        connection.execute("create trigger full before insert on audit begin select raise(abort, 'no room'); end")
+    for command, told in (
+        (["migrate"], "from revision 0018 to"),
+        (["token", "create", "Maria"], "bf_"),
+        (["backup", "copy.db"], "copy.db is written and checked"),
+        (["restore", "copy.db", "--replace"], "copy.db is restored"),
+    ):
+        ended = bathyfleet(*command)
+        assert (ended.code, told in ended.stdout) == (0, True), (command, ended)
+        assert "it is done, but not in the audit log: no room\n" in ended.stderr
+
+
 def test_lists_are_whole_in_a_narrow_terminal(bathyfleet: Run) -> None:
     bathyfleet("token", "create", "Maria", "--role", "operator", "--days", "30")
     (listed,) = json.loads(bathyfleet("token", "list", "--json").stdout)
@@ -237,6 +255,17 @@ def at_revision(file: Path, revision: str) -> None:
         connection.commit()
 
 
+@pytest.mark.parametrize("words", [["migrate"], ["migrate", "--down-to", "base"]])
+def test_another_program_s_database_is_not_migrated(bathyfleet: Run, tmp_path: Path, words: list[str]) -> None:
+    with closing(sqlite3.connect(tmp_path / "bathyfleet.db")) as connection:
+        connection.execute("create table cats (name text)")
+    refused = bathyfleet(*words)
+    assert refused.code == 1, refused.stdout
+    assert "bathyfleet.db is not one of bathyfleet: it holds other tables (cats); nothing was changed" in refused.stderr
+    with closing(sqlite3.connect(tmp_path / "bathyfleet.db")) as connection:
+        assert connection.execute("select name from sqlite_master").fetchall() == [("cats",)]
+
+
 def test_a_newer_version_s_database_is_neither_changed_nor_put_in_place(bathyfleet: Run, tmp_path: Path) -> None:
     bathyfleet("token", "create", "Maria")
     assert bathyfleet("backup", "copy.db").code == 0
@@ -272,6 +301,33 @@ def test_a_backup_that_the_start_would_not_bring_up_to_date_is_restored_and_said
     assert "what was there before is now" in restored.stdout
     assert "copy.db is restored" in restored.stdout
     assert "run 'bathyfleet migrate'" in restored.stderr
+
+
+def test_a_way_down_is_written_down_before_and_only_where_it_is_gone(bathyfleet: Run) -> None:
+    newest = re.search(r"to (\d{4})", bathyfleet("migrate").stdout)
+    assert newest is not None
+    assert bathyfleet("migrate", "--down-to", "nonsense").code == 1
+    assert bathyfleet("migrate", "--down-to", newest[1]).code == 0
+    assert "to 0018" in bathyfleet("migrate", "--down-to", "0018").stdout
+    bathyfleet("migrate")
+    lines = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
+    assert [line["target"] for line in lines] == [
+        f"0018 to {newest[1]}",
+        f"{newest[1]} down to 0018",
+        f"empty to {newest[1]}",
+    ]
+
+
+@pytest.mark.parametrize(
+    "words", [["token", "list"], ["audit"], ["sites", "list"], ["export", "x"], ["prune", "--days", "30"]]
+)
+def test_what_only_reads_leaves_an_older_database_as_it_is(bathyfleet: Run, words: list[str]) -> None:
+    bathyfleet("migrate")
+    bathyfleet("migrate", "--down-to", "0018")
+    refused = bathyfleet(*words)
+    assert refused.code == 1, refused
+    assert re.search(r"is at revision 0018, this version needs \d{4}: run 'bathyfleet migrate'", refused.stderr)
+    assert "from revision 0018 to" in bathyfleet("migrate").stdout
 
 
 def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """What commands share. Heavy imports stay inside functions, so that ``--help`` answers at once."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
@@ -67,10 +69,35 @@ def this_user() -> str:
         return f"user {os.getuid()}"
 
 
+@contextmanager
+def unnoted_said(result: str = "done") -> Iterator[None]:
+    """Say in a line that a command is not in the audit log, where that cannot be written, and go on: it was given."""
+    import sqlite3
+
+    from sqlalchemy.exc import SQLAlchemyError
+
+    from app.storage.upkeep.prepare import DatabaseNotReadyError
+    from imc_bridge.printable import printable
+
+    try:
+        yield
+    except (DatabaseNotReadyError, SQLAlchemyError, sqlite3.Error, OSError) as error:
+        reason = str(getattr(error, "orig", None) or error).partition("\n")[0]
+        typer.echo(printable(f"it is {result}, but not in the audit log: {reason}"), err=True)
+
+
 async def noted(
     settings: "Settings", action: str, target: str, mission_id: str | None = None, *, refused: str | None = None
 ) -> None:
-    """Write a command that was given on this machine into the audit log; ``refused`` is why it was not carried out."""
+    """Write a command that was given on this machine into the audit log; ``refused`` is why it was not carried out.
+
+    Where that fails it is said: the command's own result is told all the same.
+    """
+    with unnoted_said("done" if refused is None else "refused"):
+        await _note(settings, action, target, mission_id, refused)
+
+
+async def _note(settings: "Settings", action: str, target: str, mission_id: str | None, refused: str | None) -> None:
     from app.storage.database import Database as Store
     from app.storage.queries import audit
     from app.storage.upkeep.prepare import prepare_database

@@ -24,7 +24,8 @@ def with_missions(
     """Run something with the missions of a database; nothing is started, the links stay closed.
 
     A command that is ``changing`` a mission is named by that for the audit log, which it goes into with its result.
-    Raises CommandError where there is no database.
+    Raises CommandError where there is no database, DatabaseNotReadyError also where one that only reads would have to
+    bring it up to date.
     """
     check_database(settings)
     from app.missions.errors import MissionError
@@ -33,7 +34,7 @@ def with_missions(
     from app.storage.upkeep.prepare import prepare_database
 
     async def use() -> "T":
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself and bool(changing))
         store = Store(settings.database_url)
         closed = settings.model_copy(update={"imc": settings.imc.model_copy(update={"enabled": False})})
         service = MissionService(closed, store)

@@ -15,6 +15,10 @@ class MissionNotFoundError(MissionError):
     """There is no such mission."""
 
 
+class ProcessApartError(MissionError):
+    """The process is none of those that share the database now: it can have no mission."""
+
+
 class MissionUnreadableError(MissionError):
     """A mission is stored in a way that cannot be opened, as when a newer version wrote it."""
 

@@ -241,7 +241,7 @@ class MissionService:
 
     async def ready(self) -> tuple[bool, dict[str, str]]:
         """Tell whether requests can be served, and how each component is."""
-        components = {"links": "ok" if self._started else "not started"}
+        components = {"links": "ok" if self._started else "not started", "watch": self._failover.state}
         try:
             await self._database.ping()
             components["database"] = self._database.trouble or "ok"
@@ -256,7 +256,13 @@ class MissionService:
     # Missions
 
     async def create(self, spec: MissionSpec, *, actor: str = "operator") -> MissionView:
-        """Store a new mission; it is ready when it has a vehicle. Raises InvalidRequestError, ConflictError."""
+        """Store a new mission; it is ready when it has a vehicle.
+
+        Raises
+        ------
+        InvalidRequestError, ConflictError, ProcessApartError
+            Nothing is stored then.
+        """
         check_spec(spec, self.hub.kinds)
         await self.sites.check(spec)
         await self._succession.check(spec)
@@ -267,6 +273,7 @@ class MissionService:
             await session.flush()
             session.add_all(vehicle_row(row.id, vehicle, slot) for slot, vehicle in enumerate(spec.vehicles))
             await set_site(session, row.id, spec.site)
+            await self._registry.own(session, row.id)
         live = await self.get(row.id)
         await live.journal.log(Level.INFO, "state", f"created by {actor}", state=row.state, actor=actor)
         await self.sites.begin(live)

@@ -10,6 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
+from sqlalchemy.pool import QueuePool
 
 from app.storage import private
 from app.storage.application_name import connect_arguments, new_application_name
@@ -22,14 +23,27 @@ TROUBLED_TIMEOUT_MS = 1_000
 """How long one waits once another one has waited in vain."""
 PATIENCE = "bathyfleet_patience_ms"
 """Under this name a connection keeps how long it waits."""
+CONNECTIONS = 15
+"""So many transactions of one process are under way at the same time; others wait for their turn."""
+KEPT_CONNECTIONS = 5
+"""So many stay open while they are not needed."""
+TURN_S = 30.0
+"""How long a transaction waits for a connection that is free."""
+APART_CONNECTIONS = 2
+"""Of what nobody else may hold up: the watch beside other processes, and whether the database can be reached."""
+PING_S = 2.0
+"""A database that does not answer for this long cannot be reached: before those who ask give up."""
 RECENT_S = 60.0
 """A trouble that did not show for this long is taken to be over."""
 
 
-def make_engine(url: str, application_name: str = "") -> AsyncEngine:
+def make_engine(
+    url: str, application_name: str = "", connections: int = CONNECTIONS, kept: int = KEPT_CONNECTIONS
+) -> AsyncEngine:
     """Return an engine for ``url``; SQLite is put into WAL mode with foreign keys and durable commits.
 
-    ``application_name``: what PostgreSQL is told that its connections are called.
+    ``application_name``: what PostgreSQL is told that its connections are called. ``connections``: how many it has at
+    most, ``kept`` of them also while they are not needed.
 
     Raises
     ------
@@ -41,10 +55,12 @@ def make_engine(url: str, application_name: str = "") -> AsyncEngine:
         raise ValueError(
             f"database_url names {parsed.drivername!r}: use sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER@HOST/NAME"
         )
+    pool: dict[str, Any] = {"pool_size": kept, "max_overflow": connections - kept, "pool_timeout": TURN_S}
     if parsed.get_backend_name() != "sqlite":
-        return create_async_engine(url, pool_pre_ping=True, connect_args=connect_arguments(application_name))
-    engine = create_async_engine(url)
+        named = connect_arguments(application_name)
+        return create_async_engine(url, pool_pre_ping=True, connect_args=named, **pool)
     file = Path(parsed.database) if parsed.database and parsed.database != ":memory:" else None
+    engine = create_async_engine(url, **(pool if file is not None else {}))
 
     @event.listens_for(engine.sync_engine, "do_connect")
     def _make_private(*_arguments: Any) -> None:
@@ -103,6 +119,11 @@ class Database:
         self.url = url
         self.application_name = new_application_name()
         self._engine = make_engine(url, self.application_name)
+        # In memory each engine has a database of its own.
+        in_memory = not isinstance(self._engine.pool, QueuePool)
+        few = (APART_CONNECTIONS, APART_CONNECTIONS)
+        self._engine_apart = self._engine if in_memory else make_engine(url, self.application_name, *few)
+        self._pinging: asyncio.Task[None] | None = None
         # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
         # locked"). Those of this process stand in line instead; the timeout is left for other processes.
         self._turn = asyncio.Lock() if self._engine.dialect.name == "sqlite" else None
@@ -114,6 +135,12 @@ class Database:
         guarded = copy(self)
         guarded._guard = guard
         return guarded
+
+    def apart(self) -> "Database":
+        """Return the same database by connections that requests and missions cannot take, for what must not wait."""
+        apart = copy(self)
+        apart._engine = self._engine_apart
+        return apart
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
@@ -145,7 +172,16 @@ class Database:
         return self._trouble.recent
 
     async def ping(self) -> None:
-        """Raise when the database cannot be reached."""
+        """Raise when the database cannot be reached; within ``PING_S``, however many connections are in use."""
+        if self._pinging is None or self._pinging.done():
+            self._pinging = asyncio.create_task(self.apart()._reach(), name="ping")
+            self._pinging.add_done_callback(_look_at)
+        await asyncio.wait([self._pinging], timeout=PING_S)
+        if not self._pinging.done():
+            raise TimeoutError(f"it does not answer within {PING_S:g} s")
+        self._pinging.result()
+
+    async def _reach(self) -> None:
         async with self._connected() as connection:
             await connection.execute(text("SELECT 1"))
 
@@ -163,6 +199,13 @@ class Database:
     async def close(self) -> None:
         """Close every connection."""
         await self._engine.dispose()
+        await self._engine_apart.dispose()
+
+
+def _look_at(done: asyncio.Task[None]) -> None:
+    """Look at a task's error, which nobody may be waiting for any more."""
+    if not done.cancelled():
+        done.exception()
 
 
 @asynccontextmanager

@@ -1,18 +1,24 @@
 """Health and metrics."""
 
+import asyncio
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from sqlalchemy import text
 
 from app import __version__
 from app.main import Server, create_app
 from app.settings import Settings
+from app.storage import database as database_module
+from app.storage.database import CONNECTIONS
 from app.storage.upkeep import migrate
 from app.storage.upkeep.prepare import DatabaseNotReadyError
-from tests.support.api.rest import mission_spec, soundings
+from tests.support.api.rest import make_client, mission_spec, running, soundings
+from tests.support.storage.databases import query
 from tests.support.waiting import until
 
 
@@ -45,6 +51,37 @@ async def test_a_lost_database_is_not_ready_but_alive(server: Server, client: ht
     assert "disk is gone" in ready.json()["components"]["database"]
     assert (await client.get("/health")).status_code == 200
     assert (await client.get("/health/live")).status_code == 200
+
+
+async def test_requests_that_find_every_connection_in_use_are_asked_to_come_again(
+    make_settings: Callable[..., Settings], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(database_module, "TURN_S", 0.1)
+    async with running(make_settings()) as server, make_client(server) as client, AsyncExitStack() as viewers:
+        mission = (await client.post("/missions", json=mission_spec())).json()["id"]
+        for _ in range(CONNECTIONS):
+            session = await viewers.enter_async_context(server.config.app.state.edge.service.database.reading())
+            await session.execute(text("select 1"))
+        for path in (f"/missions/{mission}/events", "/sites"):
+            refused = await client.get(path, headers={"Accept": "application/json"})
+            assert (refused.status_code, refused.json()["type"]) == (503, "urn:bathyfleet:problem:database-unavailable")
+            assert "every connection of this process to the database is in use" in refused.json()["detail"]
+            assert refused.headers["Retry-After"] == "5"
+        stream = await client.get(f"/missions/{mission}/events", headers={"Accept": "text/event-stream"})
+        assert (stream.status_code, stream.text) == (200, ""), "it is over, and its reader connects anew"
+        assert (await client.get("/health/ready")).status_code == 200
+
+
+async def test_a_process_that_others_took_for_dead_is_asked_again_later(
+    server: Server, client: httpx.AsyncClient
+) -> None:
+    service = server.config.app.state.edge.service
+    await service._failover.end()  # it would enter again
+    await asyncio.to_thread(query, service._database.url, "delete from processes")
+    refused = await client.post("/missions", json=mission_spec())
+    assert (refused.status_code, refused.json()["type"]) == (503, "urn:bathyfleet:problem:not-ready")
+    assert refused.headers["Retry-After"] == "5"
+    assert (await client.get("/missions")).json() == []
 
 
 async def _fail() -> None:

@@ -2,20 +2,25 @@
 
 import asyncio
 import gc
+import socket
 import sqlite3
 import subprocess
 import sys
 import threading
+from contextlib import AsyncExitStack
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
 from sqlalchemy import delete, func, select, text
-from sqlalchemy.exc import IntegrityError, OperationalError, StatementError
+from sqlalchemy.exc import IntegrityError, OperationalError, SQLAlchemyError, StatementError
 
-from app.storage.database import Database
+from app.storage import database as database_module
+from app.storage.database import CONNECTIONS, Database
+from app.storage.db_errors import trouble_of
 from app.storage.models import MissionRow, SoundingRow, StepRow, WaypointRow
 from tests.support.storage.rows import TIME, mission, one_of_each, step, waypoint
+from tests.support.waiting import until
 
 
 async def _pragma(database: Database, name: str) -> object:
@@ -251,3 +256,32 @@ async def test_a_transaction_cancelled_at_any_moment_leaves_no_connection_open(d
     assert moment > 5
     await work()
     assert await _count(database, MissionRow) == 0
+
+
+async def test_connections_apart_are_there_however_many_are_in_use(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database_module, "TURN_S", 0.05)
+    database = Database(url)
+    async with AsyncExitStack() as stack:
+        stack.push_async_callback(database.close)
+        for _ in range(CONNECTIONS):
+            session = await stack.enter_async_context(database.reading())
+            await session.execute(select(MissionRow.id))
+        with pytest.raises(SQLAlchemyError) as caught:
+            await stack.enter_async_context(database.reading())
+        assert trouble_of(caught.value).startswith("every connection of this process to the database is in use: ask")
+        await database.ping()
+        async with database.apart().writing() as session:
+            session.add(mission())
+        async with database.apart().reading() as session:
+            assert (await session.scalars(select(MissionRow.id))).all() == ["m1"]
+
+
+async def test_a_server_that_does_not_answer_is_told_of_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database_module, "PING_S", 0.05)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        database = Database(f"postgresql+asyncpg://fleet@127.0.0.1:{silent.getsockname()[1]}/fleet")
+        for _ in range(2):
+            with pytest.raises(TimeoutError, match="does not answer"):
+                await database.ping()
+    await until(lambda: database._pinging is not None and database._pinging.done(), "it gave up")
+    await database.close()

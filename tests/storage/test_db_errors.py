@@ -11,6 +11,7 @@ from sqlalchemy.exc import DBAPIError
 from app.storage import database as database_module
 from app.storage.database import Database
 from app.storage.db_errors import trouble_of
+from tests.support.storage.databases import Databases, query
 from tests.support.storage.rows import mission
 
 
@@ -92,6 +93,8 @@ async def test_a_server_that_ends_the_connection_is_told_of(database: Database) 
         ("55P03", "holds the database locked"),
         ("25006", "takes no writes"),
         ("57P01", "stopping or starting"),
+        ("53300", "raise its max_connections"),
+        ("53100", "free some space"),
         ("23505", ""),
     ],
 )
@@ -103,3 +106,14 @@ async def test_troubles_of_a_server_that_pass_are_waited_for(database: Database,
     told = trouble_of(caught.value)
     assert words in told
     assert bool(told) is bool(words)
+
+
+async def test_a_server_that_takes_no_more_connections_is_told_of(databases: Databases) -> None:
+    url = databases.fresh("postgresql")
+    role = f"few_{url.rpartition('/')[2]}"
+    query(url, f"create role {role} login connection limit 0")
+    database = Database(url.replace("//fleet@", f"//{role}@"))
+    with pytest.raises(DBAPIError) as caught:
+        await database.ping()
+    assert trouble_of(caught.value).startswith("the database's server takes no more connections: raise its max_conn")
+    await database.close()

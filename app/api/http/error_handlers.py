@@ -5,7 +5,7 @@ from http import HTTPStatus
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import Scope
@@ -26,6 +26,7 @@ from app.missions.errors import (
     MissionUnreadableError,
     PingsNotFoundError,
     PingsUnreadableError,
+    ProcessApartError,
     ProductUnavailableError,
     SiteNotFoundError,
     SoundingNotFoundError,
@@ -51,6 +52,7 @@ KINDS: dict[type[MissionError], str] = {
     MoveRefusedError: "move-refused",
     PingsNotFoundError: "pings-not-found",
     PingsUnreadableError: "pings-unreadable",
+    ProcessApartError: "not-ready",
     ProductUnavailableError: "product-unavailable",
     SiteNotFoundError: "site-not-found",
     SoundingNotFoundError: "sounding-not-found",
@@ -80,7 +82,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _validation_problem)  # type: ignore[arg-type]
     app.add_exception_handler(HTTPException, _http_problem)  # type: ignore[arg-type]
     app.add_exception_handler(ProblemError, _edge_problem)  # type: ignore[arg-type]
-    app.add_exception_handler(DBAPIError, _database_problem)
+    app.add_exception_handler(SQLAlchemyError, _database_problem)
     app.add_exception_handler(sqlite3.Error, _database_problem)
     app.add_exception_handler(MissionError, _mission_problem)  # type: ignore[arg-type]
 
@@ -90,9 +92,9 @@ def answer_to(error: Exception, scope: Scope) -> Response:
     request = Request(scope)
     if isinstance(error, ProblemError):
         return _edge_problem(request, error)
-    if isinstance(error, MissionNotFoundError):
+    if isinstance(error, MissionError):
         return _mission_problem(request, error)
-    if isinstance(error, DBAPIError | sqlite3.Error):
+    if isinstance(error, SQLAlchemyError | sqlite3.Error):
         return _database_problem(request, error)
     raise error
 
@@ -114,7 +116,7 @@ def _mission_problem(request: Request, error: MissionError) -> Response:
             )
         )
     problem = make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
-    later = isinstance(error, ImportUnavailableError | ProductUnavailableError)
+    later = isinstance(error, ImportUnavailableError | ProcessApartError | ProductUnavailableError)
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
 
 

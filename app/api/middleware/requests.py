@@ -6,9 +6,11 @@ import time
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.accounts.audit_log import DATA
+from app.api.http.error_handlers import answer_to
 from app.api.http.headers import add_security_headers
 from app.api.http.problems import instance_of, make_problem, problem_response
 from app.api.metrics import observe_request
@@ -47,17 +49,11 @@ class RequestMiddleware:
         with structlog.contextvars.bound_contextvars(request_id=request_id):
             try:
                 await self.app(scope, receive, send_with_id)
-            except Exception:
-                log.exception("request failed", method=scope["method"], path=scope["path"])
+            except Exception as error:
                 if status:
+                    log.exception("request failed", method=scope["method"], path=scope["path"])
                     raise
-                problem = make_problem(
-                    "internal",
-                    "an unexpected error occurred; the log has it under the request's id",
-                    instance=instance_of(scope),
-                    remedy=f"Report it together with the request's id {request_id}",
-                )
-                await problem_response(problem)(scope, receive, send_with_id)
+                await _answer(error, request_id, scope)(scope, receive, send_with_id)
             finally:
                 seconds = time.perf_counter() - began
                 route = getattr(scope.get("route"), "path", "") or "unmatched"
@@ -70,6 +66,21 @@ class RequestMiddleware:
                     status=status,
                     ms=round(seconds * 1000, 1),
                 )
+
+
+def _answer(error: Exception, request_id: str, scope: Scope) -> Response:
+    """Return the answer to an error that no route answered for."""
+    try:
+        return answer_to(error, scope)
+    except Exception:
+        log.exception("request failed", method=scope["method"], path=scope["path"])
+    problem = make_problem(
+        "internal",
+        "an unexpected error occurred; the log has it under the request's id",
+        instance=instance_of(scope),
+        remedy=f"Report it together with the request's id {request_id}",
+    )
+    return problem_response(problem)
 
 
 def _is_routine(scope: Scope, status: int) -> bool:

@@ -1,14 +1,17 @@
 """What a mission does, as it happens: the log as server-sent events, everything over a WebSocket."""
 
 import asyncio
+import sqlite3
 from collections import OrderedDict
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing
 from typing import Annotated
 
 import anyio
 import structlog
 from fastapi import APIRouter, Header, Query, Request, Response, WebSocket, WebSocketDisconnect
 from pydantic import TypeAdapter
+from sqlalchemy.exc import SQLAlchemyError
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.types import Receive, Scope, Send
 
@@ -24,6 +27,7 @@ from app.missions.operations.history import events_after
 from app.missions.running.mission_views import followed, watched
 from app.missions.views.messages import EventMessage, LiveMessage, SnapshotMessage
 from app.missions.views.mission import EventView
+from app.storage.db_errors import trouble_of
 
 router = APIRouter(prefix=f"{API}/missions/{{mission_id}}", tags=["live"])
 
@@ -141,6 +145,19 @@ def _wants_list(accept: str) -> bool:
 
 async def _stream(state: EdgeState, mission_id: str, start: int, request: Request) -> AsyncIterator[ServerSentEvent]:
     """Yield the log after ``start``, first what is stored, then what happens, as long as the client may see it."""
+    try:
+        async with aclosing(_entries(state, mission_id, start, request)) as entries:
+            async for entry in entries:
+                yield entry
+    except (SQLAlchemyError, sqlite3.Error) as error:
+        trouble = trouble_of(error)
+        if not trouble:
+            raise
+        # As when watching ends: the client reconnects with its Last-Event-ID and misses nothing.
+        log.warning("a stream of events ended", mission=mission_id, why=trouble)
+
+
+async def _entries(state: EdgeState, mission_id: str, start: int, request: Request) -> AsyncGenerator[ServerSentEvent]:
     mission = await state.service.get(mission_id)
     async with followed(mission) as (newest_id, messages):
         sent = start

@@ -41,7 +41,7 @@ def audit(
     most = limit or (50 if form == "table" else sys.maxsize)
 
     async def run() -> list["AuditRow"]:
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        await prepare_database(settings.database_url, may_upgrade=False)
         store = Store(settings.database_url)
         rows: list[AuditRow] = []
         try:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.command import CommandError, Database, check_database, command_settings, noted
+from app.commands.command import CommandError, Database, check_database, command_settings, noted, unnoted_said
 
 if TYPE_CHECKING:
     from app.storage.upkeep.backup import Contents
@@ -41,10 +41,11 @@ def backup(
         raise CommandError(str(error), error.remedy) from None
     _tell(path, contents, "is written and checked")
     # In the database, not in the copy: a copy of everything is worth an audit entry, though not an upgrade.
-    if asyncio.run(is_up_to_date(settings.database_url)):
-        asyncio.run(noted(settings, "backup", str(path)))
-    else:
-        typer.echo("the database is another version's: it stays as it is, the copy is in no audit log", err=True)
+    with unnoted_said():
+        if asyncio.run(is_up_to_date(settings.database_url)):
+            asyncio.run(noted(settings, "backup", str(path)))
+        else:
+            typer.echo("the database is another version's: it stays as it is, the copy is in no audit log", err=True)
 
 
 def restore(
@@ -68,10 +69,11 @@ def restore(
     if aside is not None:
         typer.echo(f"what was there before is now {aside}")
     _tell(file, contents, "is restored")
-    if settings.migrates_itself or asyncio.run(is_up_to_date(settings.database_url)):
-        asyncio.run(noted(settings, "restore", str(file)))
-    else:
-        typer.echo("it is of an older version: before the service starts, run 'bathyfleet migrate'", err=True)
+    with unnoted_said():
+        if settings.migrates_itself or asyncio.run(is_up_to_date(settings.database_url)):
+            asyncio.run(noted(settings, "restore", str(file)))
+        else:
+            typer.echo("it is of an older version: before the service starts, run 'bathyfleet migrate'", err=True)
 
 
 def prune(
@@ -88,7 +90,7 @@ def prune(
     from app.storage.upkeep.retention import Ended, ended_before, finish_removing, give_space_back, remove
 
     async def run() -> tuple[list[Ended], str]:
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself and apply)
         store = Store(settings.database_url)
         files = PingFiles.beside(settings.database_url, settings.pings_url)
         try:

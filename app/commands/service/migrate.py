@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands.command import CommandError, Database, command_settings, noted
+from app.commands.command import CommandError, Database, command_settings, noted, this_user
 
 
 def migrate(
@@ -19,20 +19,25 @@ def migrate(
     from alembic.util import CommandError as AlembicError
     from sqlalchemy.exc import SQLAlchemyError
 
+    from app.storage.queries import audit
     from app.storage.upkeep import migrate as migrations
-    from app.storage.upkeep.prepare import of_another_version
+    from app.storage.upkeep.prepare import check_that_empty, of_another_version
 
     async def run() -> tuple[str | None, str | None]:
         url = settings.database_url
         before = await migrations.current(url)
-        if before is not None and not migrations.is_known(before):
+        if before is None:
+            await check_that_empty(url)
+        elif not migrations.is_known(before):
             raise of_another_version(url, before, migrations.head())
         if down_to is None:
             await migrations.upgrade(url)
         elif await migrations.is_in_use(url):
             raise CommandError("a service has the database, and would lose its tables", "Stop the service first")
         else:
-            await migrations.downgrade(url, down_to)
+            target = f"{before or 'empty'} down to {down_to}"
+            noted_before = audit.Command(this_user(), "", "command line", "migrate", target, "done")
+            await migrations.downgrade(url, down_to, noted_before if before != down_to else None)
         return before, await migrations.current(url)
 
     try:

@@ -121,7 +121,8 @@ def _with_tokens(database: str | None, run: Any, changing: str = "", target: str
     from app.storage.upkeep.prepare import prepare_database
 
     async def use() -> Any:
-        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself)
+        writes = bool(changing) or new is not None
+        await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself and writes)
         store = Store(settings.database_url)
         try:
             done = await run(TokenStore(store))

@@ -8,7 +8,7 @@ import structlog
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.missions.alarm_kinds import AlarmKind
-from app.missions.errors import ConflictError, MissionElsewhereError
+from app.missions.errors import ConflictError, MissionElsewhereError, ProcessApartError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
@@ -51,18 +51,48 @@ class Failover:
         self._supervisor = supervisor
         self._claims = claims
         self._task: asyncio.Task[None] | None = None
+        self._taking: asyncio.Task[None] | None = None
+        """Takes missions up, beside the watch: what it reads may be locked for longer than others wait."""
+        self._telling: set[asyncio.Task[None]] = set()
+        self._aside = False
+        """Whether the vehicles are stopped, because others may take this process for dead."""
+        self._trouble = "did not begin yet"
+
+    @property
+    def state(self) -> str:
+        """``ok``, or why nobody can rely on this process for its missions."""
+        return self._trouble or "ok"
 
     async def begin(self) -> None:
         """Take up what nobody has, and keep watch from now on."""
         await self._ownership.enter()
-        await self._take_up(await self._ownership.look())
-        self._task = asyncio.create_task(self._keep(), name="watch")
+        self._taking = asyncio.create_task(self._take_up(await self._ownership.look()), name="taking up")
+        self._trouble = ""
+        self._begin_watch()
+        await asyncio.wait([self._taking])
+        if not self._taking.cancelled():
+            self._taking.result()
 
     async def end(self) -> None:
         """Keep watch no longer."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+        watch, self._task = self._task, None
+        tasks = [task for task in (watch, self._taking, *self._telling) if task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _begin_watch(self) -> None:
+        self._task = asyncio.create_task(self._keep(), name="watch")
+        self._task.add_done_callback(self._watch_ended)
+
+    def _watch_ended(self, task: asyncio.Task[None]) -> None:
+        """Begin a watch again that ended though nobody ended it: without one missions stay that nobody flies."""
+        if task is not self._task:
+            return
+        error = None if task.cancelled() else task.exception()
+        self._trouble = f"ended by {type(error).__name__ if error else 'a cancellation'}, begun again"
+        log.critical("the watch beside the other processes ended: it is begun again", exc_info=error)
+        self._begin_watch()
 
     async def may_take_up(self, row: MissionRow) -> bool:
         """Tell whether a mission is left to others, because this process cannot reach its vehicles."""
@@ -98,14 +128,35 @@ class Failover:
                 pass
             self._ownership.called.clear()
             try:
-                await self._take_up(await self._ownership.look())
+                if self._aside:
+                    await self._come_back()
+                missions = await self._ownership.look()
+                if missions and (self._taking is None or self._taking.done()):
+                    self._taking = asyncio.create_task(self._try_to_take_up(missions), name="taking up")
             except MembershipLostError as error:
-                log.error("others may take this process for dead: its vehicles are stopped", error=str(error))
-                await self._stand_aside()
+                self._trouble = f"others may take this process for dead: {error}"
+                if self._aside:
+                    log.error("not among the living yet", error=str(error))
+                else:
+                    log.error("others may take this process for dead: its vehicles are stopped", error=str(error))
+                    await self._stand_aside()
             except (SQLAlchemyError, OSError) as error:
+                self._trouble = f"cannot look after the other processes: {error}"
                 log.error("cannot look after the other processes", error=str(error))
-            except Exception:
+            except Exception as error:
+                self._trouble = f"cannot look after the other processes: {error}"
                 log.exception("cannot look after the other processes")
+            else:
+                self._trouble = ""
+
+    async def _try_to_take_up(self, missions: Sequence[str]) -> None:
+        """Take missions up; what is left over is found again when the watch looks next."""
+        try:
+            await self._take_up(missions)
+        except (ProcessApartError, SQLAlchemyError, OSError) as error:
+            log.error("missions cannot be taken up", error=str(error))
+        except Exception:
+            log.exception("missions cannot be taken up")
 
     async def _take_up(self, missions: Sequence[str]) -> None:
         """Take up missions at sea that nobody has, as far as this process may."""
@@ -115,7 +166,7 @@ class Failover:
                 await self._registry.get(mission_id)
             except MissionElsewhereError:
                 continue
-            except (MembershipLostError, SQLAlchemyError, OSError):
+            except (ProcessApartError, SQLAlchemyError, OSError):
                 raise  # that concerns all of them
             except Exception:
                 # One that cannot be read, as when a newer version wrote it, is not the others' trouble.
@@ -124,24 +175,43 @@ class Failover:
             log.warning("mission taken up", mission=mission_id)
 
     async def _stand_aside(self) -> None:
-        """Stop the vehicles before others take the missions up; go on as soon as that is allowed again."""
+        """Stop the vehicles before others take the missions up. Raises nothing: the watch goes on."""
+        self._aside = True
+        if self._taking is not None:
+            self._taking.cancel()
         ours = [live for live in self._registry if live.id in self._supervisor.runs]
-        await asyncio.gather(*(self._supervisor.halt(live) for live in ours))
-        while True:
-            try:
-                unchanged = await self._ownership.enter()
-                break
-            except (MembershipLostError, SQLAlchemyError, OSError) as error:
-                log.error("not among the living yet", error=str(error))
-                await asyncio.sleep(PERIOD_S)
+        halted = await asyncio.gather(*(self._supervisor.halt(live) for live in ours), return_exceptions=True)
+        for live, error in zip(ours, halted, strict=True):
+            if isinstance(error, BaseException):
+                log.error("a mission's vehicles could not be stopped", mission=live.id, exc_info=error)
+        self._ownership.called.set()  # what follows need not wait
+
+    async def _come_back(self) -> None:
+        """Go on as soon as that is allowed again. Raises MembershipLostError as long as it is not."""
+        unchanged = await self._ownership.enter()
+        self._aside = False
         if not unchanged:
-            for live in self._registry:
-                self._claims.release_team(live)
-            self._registry.drop()
+            try:
+                for live in self._registry:
+                    self._claims.release_team(live)
+            finally:
+                self._registry.drop()
             return
-        for live in self._registry:
-            if live.header.state is MissionState.RUNNING and live.id not in self._supervisor.runs:
-                await live.journal.log(
-                    Level.WARNING, "resumed", "the database was out of reach; the vehicles were stopped meanwhile"
-                )
-                self._supervisor.run(live)
+        again = [
+            live
+            for live in self._registry
+            if live.header.state is MissionState.RUNNING and live.id not in self._supervisor.runs
+        ]
+        # Vehicles wait for no line of the log.
+        for live in again:
+            self._supervisor.run(live)
+        for live in again:
+            words = "the database was out of reach; the vehicles were stopped meanwhile"
+            telling = asyncio.create_task(live.journal.log(Level.WARNING, "resumed", words), name=f"tell {live.id}")
+            self._telling.add(telling)
+            telling.add_done_callback(self._told)
+
+    def _told(self, done: asyncio.Task[None]) -> None:
+        self._telling.discard(done)
+        if not done.cancelled() and done.exception() is not None:
+            log.error("a line of a mission's log could not be written", exc_info=done.exception())

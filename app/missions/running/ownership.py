@@ -14,7 +14,7 @@ import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
-from app.missions.errors import MissionElsewhereError
+from app.missions.errors import MissionElsewhereError, ProcessApartError
 from app.missions.states import AT_SEA
 from app.storage.database import Database, Guard
 from app.storage.models import ProcessRow
@@ -58,6 +58,7 @@ class Ownership:
 
     def __init__(self, database: Database, url: str, certificate: str | None = None) -> None:
         self._database = database
+        self._apart = database.apart()
         self._url = url
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
@@ -97,7 +98,7 @@ class Ownership:
         self._mine.clear()
         for _ in range(TRIES):
             row = ProcessRow(url=self._url, secret=self.secret, certificate=self._certificate, began_at=now())
-            async with self._database.writing() as session:
+            async with self._apart.writing() as session:
                 session.add(row)
                 await session.flush()
                 self._number = row.id
@@ -108,14 +109,14 @@ class Ownership:
         raise MembershipLostError(f"this process was taken for dead {TRIES} times while it began")
 
     async def _is_known(self) -> bool:
-        async with self._database.reading() as session:
+        async with self._apart.reading() as session:
             return await session.get(ProcessRow, self._number) is not None
 
     async def leave(self) -> None:
         """Give everything up and tell the others."""
         if self._number:
             try:
-                async with self._database.writing() as session:
+                async with self._apart.writing() as session:
                     await processes.bury(session, [self._number])
                 await self._membership.call()
             except Exception as error:
@@ -133,7 +134,7 @@ class Ownership:
         MembershipLostError
             When the others may take this process for dead.
         """
-        async with self._database.reading() as session:
+        async with self._apart.reading() as session:
             known = await processes.all_processes(session)
         alive = await self._membership.alive([row.id for row in known])
         if self._number not in alive:
@@ -141,7 +142,7 @@ class Ownership:
         dead = {row.id for row in known} - alive
         if dead:
             await self._membership.end_sessions(dead)
-            async with self._database.writing() as session:
+            async with self._apart.writing() as session:
                 await processes.bury(session, dead)
             log.warning("another process ended, or hangs", processes=sorted(dead))
         self._peers = {
@@ -149,11 +150,17 @@ class Ownership:
             for row in known
             if row.id in alive and row.id != self._number
         }
-        async with self._database.reading() as session:
+        async with self._apart.reading() as session:
             return await processes.orphans(session, AT_SEA)
 
     async def owner(self, mission_id: str) -> Peer | None:
-        """Return the other process that has a mission; None when it is ours, nobody's or unknown."""
+        """Return the other process that has a mission; None when it is ours, nobody's or unknown.
+
+        Raises
+        ------
+        ProcessApartError
+            While this process knows of no other one.
+        """
         if mission_id in self._mine:
             return None
         async with self._database.reading() as session:
@@ -161,17 +168,32 @@ class Ownership:
         if number is None or number == self._number:
             return None
         if number not in self._peers:
-            await self.look()
+            try:
+                await self.look()
+            except MembershipLostError as error:
+                raise _apart() from error
         return self._peers.get(number)
 
     async def take(self, mission_id: str) -> bool:
-        """Have a mission from now on; False when another process has it."""
+        """Have a mission from now on; False when another process has it. Raises ProcessApartError."""
         async with self._database.writing() as session:
-            await processes.take(session, mission_id, self._number, now())
+            await self.take_within(session, mission_id)
             mine = await processes.owner(session, mission_id) == self._number
         if mine:
             self._mine.add(mission_id)
         return mine
+
+    async def take_within(self, session: AsyncSession, mission_id: str) -> None:
+        """Have a mission without owner once a transaction ends well.
+
+        Raises
+        ------
+        ProcessApartError
+            When this process is none of those that share the database: whatever the transaction wrote is taken back.
+        """
+        if not await processes.is_known(session, self._number):
+            raise _apart()
+        await processes.take(session, mission_id, self._number, now())
 
     async def release(self, mission_ids: Iterable[str]) -> None:
         """Give missions up."""
@@ -190,3 +212,10 @@ class Ownership:
                 )
 
         return check
+
+
+def _apart() -> ProcessApartError:
+    return ProcessApartError(
+        "this process is none of those that share the database now: it was out of reach, or others took it for dead",
+        "Ask again in a moment: it enters again by itself as soon as it can",
+    )

@@ -131,7 +131,7 @@ class MissionRegistry:
 
         Raises
         ------
-        MissionNotFoundError, MissionElsewhereError, MissionUnreadableError
+        MissionNotFoundError, MissionElsewhereError, MissionUnreadableError, ProcessApartError
         """
         live = self._live.get(mission_id)
         if live is not None and not await self._was_removed(live):
@@ -195,6 +195,11 @@ class MissionRegistry:
             live.abandon(why)
         if self._ownership is not None:
             await self._ownership.release([live.id])
+
+    async def own(self, session: AsyncSession, mission_id: str) -> None:
+        """Have a new mission together with its rows, or none of both. Raises ProcessApartError."""
+        if self._ownership is not None:
+            await self._ownership.take_within(session, mission_id)
 
     async def try_out(self, row: MissionRow) -> None:
         """Open a mission as it is to be stored, and put it away. Raises InvalidRequestError where it cannot be opened.

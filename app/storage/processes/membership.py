@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from sqlalchemy import make_url, text
-from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncSession, create_async_engine
 from sqlalchemy.pool import NullPool
 
@@ -192,8 +191,9 @@ class AdvisoryMembership:
             async with asyncio.timeout(2 * ANSWER_S):
                 await self._connect()
                 held = await self._driver.fetchval("SELECT pg_try_advisory_lock($1, $2)", LOCKS, number)
-        except (OSError, SQLAlchemyError, TimeoutError) as error:
-            raise MembershipLostError(f"the database cannot be reached: {error}") from error
+        except Exception as error:
+            # Whatever it is, as from a server that is a standby for a while: who is not certain to be in is not in.
+            raise MembershipLostError(f"the database lets nobody in: {error or type(error).__name__}") from error
         if not held:
             raise MembershipLostError(f"another process has number {number}")
         self._number = number

@@ -21,6 +21,12 @@ async def bury(session: AsyncSession, numbers: Iterable[int]) -> None:
     await session.execute(delete(ProcessRow).where(ProcessRow.id.in_(list(numbers))))
 
 
+async def is_known(session: AsyncSession, process: int) -> bool:
+    """Tell whether a process entered and was not found dead; it is not buried before the transaction ends."""
+    query = select(ProcessRow.id).where(ProcessRow.id == process).with_for_update(read=True, key_share=True)
+    return await session.scalar(query) is not None
+
+
 async def owner(session: AsyncSession, mission_id: str, *, hold: bool = False) -> int | None:
     """Return the number of the process that has a mission; ``hold``: it keeps it until the transaction ends."""
     query = select(MissionOwnerRow.process_id).where(MissionOwnerRow.mission_id == mission_id)

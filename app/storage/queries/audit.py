@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy import delete, select
 from sqlalchemy.ext.asyncio import AsyncSession
+from sqlalchemy.orm import Session
 
 from app.storage.models import AuditRow
 
@@ -29,7 +30,7 @@ class Command:
     request_id: str = ""
 
 
-def add(session: AsyncSession, command: Command) -> None:
+def add(session: AsyncSession | Session, command: Command) -> None:
     """Write a command down, now."""
     # A path may hold anything; not every database takes a NUL in a text.
     texts = {name: value.replace("\0", "\ufffd") for name, value in asdict(command).items() if isinstance(value, str)}

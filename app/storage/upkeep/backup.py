@@ -83,8 +83,9 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
     finally:
-        if part.exists():
-            part.unlink()
+        for left in (part.with_name(part.name + suffix) for suffix in ("", "-journal", "-wal", "-shm")):
+            if left.exists():
+                left.unlink()
         if not target.exists() and copies.folder is not None:
             shutil.rmtree(copies.folder, ignore_errors=True)
     return target, contents

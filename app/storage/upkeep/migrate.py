@@ -7,15 +7,21 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, inspect, select
+from sqlalchemy import Connection, func, inspect, select
 from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
 
 from app.storage.database import Database, make_engine
-from app.storage.models import ProcessRow
-from app.storage.processes.membership import alive_beside
+from app.storage.models import AuditRow, ProcessRow
+from app.storage.processes.membership import LOCKS, alive_beside
+from app.storage.queries import audit
 
 # The migrations lie beside the package in a checkout as in an installation.
 MIGRATIONS = Path(__file__).resolve().parents[3] / "migrations"
+
+
+_TURN = (LOCKS + 1, 0)
+"""The advisory lock of who migrates a PostgreSQL database; no process has it."""
 
 
 def _config(connection: Connection | None = None) -> Config:
@@ -76,9 +82,21 @@ async def upgrade(url: str, revision: str = "head") -> None:
     await _run(url, lambda config: command.upgrade(config, revision))
 
 
-async def downgrade(url: str, revision: str) -> None:
-    """Take a database back to ``revision`` (``base``: empty)."""
-    await _run(url, lambda config: command.downgrade(config, revision))
+async def downgrade(url: str, revision: str, noted: audit.Command | None = None) -> None:
+    """Take a database back to ``revision`` (``base``: empty).
+
+    ``noted`` is written into the audit log before, where there is one: together with the rest, or neither.
+    """
+
+    def down(config: Config) -> None:
+        connection = config.attributes["connection"]
+        if noted is not None and inspect(connection).has_table(AuditRow.__tablename__):
+            with Session(connection) as session:
+                audit.add(session, noted)
+                session.flush()
+        command.downgrade(config, revision)
+
+    await _run(url, down)
 
 
 async def _run(url: str, action: Callable[[Config], None]) -> None:
@@ -92,6 +110,9 @@ async def _run(url: str, action: Callable[[Config], None]) -> None:
                 assert raw is not None  # noqa: S101 - a connection that was opened has one
                 await raw.execute("PRAGMA foreign_keys=OFF")
             async with connection.begin():
+                if engine.dialect.name == "postgresql":
+                    # Before the revision is read; SQLite's writers stand in line anyway.
+                    await connection.execute(select(func.pg_advisory_xact_lock(*_TURN)))
                 await connection.run_sync(lambda sync: action(_config(sync)))
                 if engine.dialect.name == "sqlite":
                     await connection.run_sync(_check_references)

@@ -5,17 +5,22 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 
+import structlog
 from sqlalchemy import URL
 
 from app.storage.models import Base, MissionOwnerRow, ProcessRow
 from app.storage.processes.membership import HELD
 
+log = structlog.get_logger(__name__)
+
 VERSION_TABLE = "alembic_version"
+_FUNCTION = "audit_only_grows()"
+"""What the tables need beside them."""
 _LEFT_OUT = tuple(row.__tablename__ for row in (MissionOwnerRow, ProcessRow))
 """The list of live processes, and what they lead, is of no use later, and their secrets are private."""
 
@@ -64,7 +69,7 @@ def put_back(url: URL, archive: Path, *, replace: bool) -> None:
     """Write what an archive holds into a database: all in one transaction, or nothing. Raises BackupError.
 
     Rows that name a process keep everything but that: the process is in no archive. The references are made again
-    when the names are gone.
+    when the names are gone. ``replace``: the service's tables go before, also those that the archive does not know of.
     """
     read = [_program("pg_restore"), "--no-owner"]
     listed = _run([*read, "--list", str(archive)]).splitlines(keepends=True)
@@ -75,14 +80,18 @@ def put_back(url: URL, archive: Path, *, replace: bool) -> None:
         later.write_text("".join(reference.line for reference in references))
         with _transaction(url) as script:
             if replace:
-                for reference in references:
-                    _write(script, reference.dropped)
+                for table in _tables(listed):
+                    _write(script, f"DROP TABLE IF EXISTS {table} CASCADE;\n")
+                _write(script, f"DROP FUNCTION IF EXISTS {_FUNCTION} CASCADE;\n")
             clean = ["--clean", "--if-exists"] if replace else []
             _run([*read, *clean, f"--use-list={tables}", "--file=-", str(archive)], output=script)
             for reference in references:
                 _write(script, reference.forgotten)
             if references:
                 _run([*read, f"--use-list={later}", "--file=-", str(archive)], output=script)
+    if replace and (strange := _strange_tables(url)):
+        words = "tables stay that this version does not know: others', or a newer version's, whose migration they stop"
+        log.warning(words, tables=strange)
 
 
 class _Reference(NamedTuple):
@@ -92,22 +101,32 @@ class _Reference(NamedTuple):
     """The archive's list names it so."""
     table: str
     column: str
-    name: str
 
     @classmethod
     def to_a_process(cls, line: str) -> "_Reference | None":
         found = re.match(r"\d+; \d+ \d+ FK CONSTRAINT (\S+) (\S+) (\S+) ", line)
         if found is None or found[3] not in _REFERENCES:
             return None
-        return cls(line, f"{_quoted(found[1])}.{_quoted(found[2])}", _quoted(_REFERENCES[found[3]]), _quoted(found[3]))
-
-    @property
-    def dropped(self) -> str:
-        return f"ALTER TABLE IF EXISTS {self.table} DROP CONSTRAINT IF EXISTS {self.name};\n"
+        return cls(line, f"{_quoted(found[1])}.{_quoted(found[2])}", _quoted(_REFERENCES[found[3]]))
 
     @property
     def forgotten(self) -> str:
         return f"UPDATE {self.table} SET {self.column} = NULL WHERE {self.column} IS NOT NULL;\n"  # noqa: S608 - quoted
+
+
+def _tables(listed: Iterable[str]) -> list[str]:
+    """Return the tables of this version, and those that an archive lists."""
+    ours = [VERSION_TABLE, *(table.name for table in Base.metadata.sorted_tables)]
+    found = (re.match(r"\d+; \d+ \d+ TABLE (\S+) (\S+) ", line) for line in listed)
+    archived = [f"{_quoted(table[1])}.{_quoted(table[2])}" for table in found if table is not None]
+    return [*map(_quoted, ours), *archived]
+
+
+def _strange_tables(url: URL) -> list[str]:
+    """Return the tables of a database that are not of this version."""
+    query = "SELECT tablename FROM pg_tables WHERE schemaname = ANY(current_schemas(false)) ORDER BY 1"
+    command = [*_on_server("psql", url), "--no-psqlrc", "--tuples-only", "--no-align", f"--command={query}"]
+    return sorted(set(_run(command, url).split("\n")) - {"", VERSION_TABLE, *Base.metadata.tables})
 
 
 def _quoted(name: str) -> str:
@@ -121,13 +140,14 @@ def _transaction(url: URL) -> Iterator[IO[bytes]]:
     with (
         tempfile.TemporaryFile() as said,
         subprocess.Popen(  # noqa: S603 - no shell
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, env=_with_password(url)
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, env=_environment(url)
         ) as psql,
     ):
         assert psql.stdin is not None  # noqa: S101 - it is a pipe
         failed: BackupError | None = None
         try:
-            _write(psql.stdin, "BEGIN;\n")
+            # The first line of what it says is to be the error.
+            _write(psql.stdin, "SET client_min_messages = warning;\nBEGIN;\n")
             yield psql.stdin
             _write(psql.stdin, "COMMIT;\n")
         except BackupError as error:
@@ -164,15 +184,56 @@ def _program(name: str) -> str:
     return found
 
 
+_SETTINGS = {
+    "ssl": "PGSSLMODE",
+    "target_session_attrs": "PGTARGETSESSIONATTRS",
+    "passfile": "PGPASSFILE",
+    "krbsrvname": "PGKRBSRVNAME",
+    "gsslib": "PGGSSLIB",
+    "password": "PGPASSWORD",
+}
+"""What the service's driver takes in a URL, and how PostgreSQL's programs are told the same."""
+_PLACE = ("host", "port", "user", "database")
+_OF_THE_DRIVER = ("async_fallback", "prepared_statement_cache_size", "prepared_statement_name_func")
+"""What says nothing about the way to the server."""
+_USUAL_HOSTS = "/run/postgresql,/var/run/postgresql,/tmp,localhost"
+"""Where the service's driver looks for a server that is not named."""
+
+
+def _given(url: URL) -> dict[str, Any]:
+    """Return where a URL says that a database is, as the service's driver reads it. Raises BackupError."""
+    given = dict(url.get_dialect()().create_connect_args(url)[1])
+    strange = sorted(given.keys() - {*_SETTINGS, *_PLACE, *_OF_THE_DRIVER})
+    if strange:
+        raise BackupError(
+            f"the database's URL has {', '.join(strange)}, which PostgreSQL's programs cannot be told",
+            "Leave it out there: libpq's variables say the same to both, as PGSSLROOTCERT",
+        )
+    return given
+
+
 def _on_server(name: str, url: URL) -> list[str]:
-    place = ["--host", url.host or "localhost", "--port", str(url.port or 5432), "--no-password"]
-    user = ["--username", url.username] if url.username else []
-    return [_program(name), *place, *user, "--dbname", url.database or "postgres"]
+    given = _given(url)
+    command = [_program(name), "--no-password"]
+    if "host" in given:
+        command += ["--host", _listed(given["host"])]
+    elif "PGHOST" not in os.environ:
+        command += ["--host", _USUAL_HOSTS]
+    for option, value in (("--port", "port"), ("--username", "user"), ("--dbname", "database")):
+        if value in given:
+            command += [option, _listed(given[value])]
+    return command
 
 
-def _with_password(url: URL) -> dict[str, str]:
-    """Return an environment with the password, which no other user sees there."""
-    return os.environ | ({"PGPASSWORD": str(url.password)} if url.password else {})
+def _listed(value: object) -> str:
+    """Return one value, or one for each of several servers."""
+    return ",".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _environment(url: URL) -> dict[str, str]:
+    """Return an environment with what is no option; no other user sees a password there."""
+    given = _given(url)
+    return os.environ | {variable: str(given[name]) for name, variable in _SETTINGS.items() if name in given}
 
 
 def _run(command: list[str], url: URL | None = None, output: IO[bytes] | None = None) -> str:
@@ -181,7 +242,7 @@ def _run(command: list[str], url: URL | None = None, output: IO[bytes] | None = 
         command,
         stdout=output or subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=None if url is None else _with_password(url),
+        env=None if url is None else _environment(url),
         check=False,
     )
     if done.returncode != 0:

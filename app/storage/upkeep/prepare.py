@@ -38,7 +38,7 @@ async def prepare_database(url: str, *, may_upgrade: bool) -> None:
         if present == newest:
             return
         if present is None:
-            await _check_that_empty(url)
+            await check_that_empty(url)
         elif not await asyncio.to_thread(migrate.is_known, present):
             raise of_another_version(url, present, newest)
         if not may_upgrade:
@@ -103,9 +103,11 @@ def keep_for_owner(files: Iterable[Path]) -> None:
         log.warning("every user of this machine may put files beside the database", folder=str(folder.resolve()))
 
 
-async def _check_that_empty(url: str) -> None:
+async def check_that_empty(url: str) -> None:
+    """Raise DatabaseNotReadyError when a database without a revision holds other tables: it is another program's."""
     tables = await migrate.tables(url)
-    if tables:
+    # Another process may have made them since the revision was read: whole, with it, or not at all.
+    if tables and await migrate.current(url) is None:
         some = ", ".join(tables[:3]) + (", …" if len(tables) > 3 else "")
         raise DatabaseNotReadyError(
             f"the database {name_of(url)} is not one of bathyfleet: it holds other tables ({some}); "

@@ -7,18 +7,22 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from sqlalchemy import text
 
-from app.missions.errors import ConflictError, MissionElsewhereError
+from app.missions.errors import ConflictError, MissionElsewhereError, ProcessApartError
 from app.missions.operations.history import events_after
 from app.missions.running import registry
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.states import MissionState
 from app.missions.views.mission import Level, MissionSummary
+from app.storage.database import CONNECTIONS, Database
 from app.storage.models import MissionRow
+from app.storage.processes.membership import HEARD
+from app.storage.upkeep import migrate
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
-from tests.support.storage.databases import Databases, query
+from tests.support.storage.databases import Databases, postgres_server, query
 from tests.support.waiting import until
 
 
@@ -179,6 +183,124 @@ async def test_a_database_that_goes_away_for_a_while_stops_the_vehicles_until_it
         assert any("out of reach" in words for words in told)
     finally:
         await harbour.close()
+
+
+async def test_a_server_that_changes_places_with_its_standby_leaves_no_mission_without_anybody_who_flies_it(
+    make_settings: Callable[..., ServiceSettings],
+) -> None:
+    with postgres_server() as server:
+        url = server.create("fleet")
+        await migrate.upgrade(url)
+        harbour = Harbour(lambda **changes: make_settings(database_url=url, **changes))
+        service = await harbour.open()
+        try:
+            mission = await service.create(sim_spec(steps=500))
+            await act(service, mission.id, "start", actor="Ana")
+            await until_step(service, mission.id, 1)
+
+            async def watch() -> tuple[bool, str]:
+                well, components = await service.ready()
+                return well, components["watch"]
+
+            with server.as_standby():
+                await until(lambda: mission.id not in service._runs, "its vehicles are stopped")
+
+                async def refused() -> bool:
+                    return "cannot execute LISTEN during recovery" in (await watch())[1]
+
+                await until(refused, "it tried to enter")
+            await until(lambda: mission.id in service._runs, "they go on")
+            await until_step(service, mission.id, (await view_of(service, mission.id)).progress.step + 1)
+            assert await watch() == (True, "ok")
+        finally:
+            await harbour.close()
+
+
+async def looks(url: str, number: int, times: int) -> None:
+    """Wait until a process asked the server so often, as each does that does not hang."""
+
+    async def heard() -> object:
+        return dict(await asyncio.to_thread(query, url, HEARD))[number]
+
+    for _ in range(times):
+        before = await heard()
+
+        async def asked(before: object = before) -> bool:
+            return await heard() != before
+
+        await until(asked, "the process looks after the others", 15.0)
+
+
+async def test_viewers_that_have_every_connection_do_not_hold_up_the_watch(
+    make_settings: Callable[..., ServiceSettings], databases: Databases
+) -> None:
+    url = databases.fresh("postgresql")
+    harbour = Harbour(lambda **changes: make_settings(database_url=url, **changes))
+    service = await harbour.open()
+    try:
+        async with AsyncExitStack() as viewers:
+            for _ in range(CONNECTIONS):
+                session = await viewers.enter_async_context(harbour.database.reading())
+                await session.execute(text("select 1"))
+            await looks(url, service.process.number, 2)
+            assert (await service.ready())[0]
+    finally:
+        await harbour.close()
+
+
+async def test_a_mission_that_cannot_be_read_for_a_while_does_not_hold_up_who_takes_it_up(
+    make_settings: Callable[..., ServiceSettings], databases: Databases
+) -> None:
+    url = databases.fresh("postgresql")
+    async with AsyncExitStack() as stack:
+        services = []
+        for _ in range(2):
+            harbour = Harbour(lambda **changes: make_settings(database_url=url, **changes))
+            services.append(await harbour.open())
+            stack.push_async_callback(harbour.close)
+        one = services[0]
+        mission = (await one.create(make_spec())).id
+        await act(one, mission, "start")
+        await act(one, mission, "pause")
+        beside = Database(url)
+        stack.push_async_callback(beside.close)
+        async with beside.writing() as session:
+            await session.execute(text("lock table events, soundings"))
+            await asyncio.to_thread(query, url, "delete from mission_owners")
+
+            async def begun() -> bool:
+                return bool(await asyncio.to_thread(query, url, "select 1 from mission_owners"))
+
+            await until(begun, "one of them takes it up")
+            for service in services:
+                await looks(url, service.process.number, 2)
+
+
+async def test_a_watch_that_ended_is_told_of_and_begun_again(harbour: Harbour) -> None:
+    (watch,) = [task for task in asyncio.all_tasks() if task.get_name() == "watch"]
+    watch.cancel()
+    await until(watch.done, "it ended")
+    well, components = await harbour.service.ready()
+    assert (well, components["watch"]) == (False, "ended by a cancellation, begun again")
+
+    async def is_well() -> bool:
+        return (await harbour.service.ready())[0]
+
+    await until(is_well, "it looks again")
+
+
+async def test_who_is_no_process_of_the_database_stores_no_mission(open_service: Callable[[], Harbour]) -> None:
+    harbour = open_service()
+    service = await harbour.open()
+    await service._failover.end()  # it would enter again
+    stored = (await service.create(make_spec())).id
+    await asyncio.to_thread(query, harbour.database.url, "delete from processes")
+    with pytest.raises(ProcessApartError, match="none of those that share the database"):
+        await service.create(make_spec())
+    assert query(harbour.database.url, "select id from missions") == [(stored,)]
+    service._registry.drop()
+    with pytest.raises(ProcessApartError):
+        await service.get(stored)
 
 
 async def test_a_guest_that_only_looks_takes_nothing(

@@ -14,7 +14,7 @@ from sqlalchemy.exc import DBAPIError
 from app.storage.database import Database
 from app.storage.processes import membership
 from app.storage.processes.membership import Membership, MembershipLostError, Silence, alive_beside, make_membership
-from tests.support.storage.databases import Databases
+from tests.support.storage.databases import Databases, postgres_server
 
 HOLDER = """
 import asyncio, sys
@@ -111,6 +111,17 @@ async def test_whose_connection_broke_is_told_so(databases: Databases) -> None:
             await one.alive([1])
         await one.enter(1)
         assert await two.alive([1, 2]) == {1, 2}
+
+
+async def test_a_server_that_is_a_standby_lets_nobody_in_until_it_is_promoted() -> None:
+    with postgres_server() as server:
+        url = server.create("fleet")
+        waiting = make_membership(url, lambda: None)
+        with server.as_standby(), pytest.raises(MembershipLostError, match="during recovery"):
+            await waiting.enter(1)
+        await waiting.enter(1)
+        assert await waiting.alive([1]) == {1}
+        await waiting.leave()
 
 
 async def test_who_hangs_does_not_live_for_who_looks_on(databases: Databases, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import re
+import resource
 import shutil
 import sqlite3
 import subprocess
@@ -19,6 +20,7 @@ from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
 from app.storage.processes.membership import make_membership
+from app.storage.upkeep import migrate
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
 from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
 from tests.support.storage.databases import Databases, query
@@ -122,6 +124,19 @@ async def test_restoring_over_a_database_moves_it_aside_and_never_one_that_is_in
     assert (await counts(sqlite.url))["missions"] == 0
     assert aside is not None
     assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
+
+
+async def test_a_full_disk_keeps_nothing_of_a_copy(sqlite: Database, tmp_path: Path) -> None:
+    async with sqlite.writing() as session:
+        session.add(mission("m1", reason="x" * 4_000_000))
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, most[1]))
+    try:
+        with pytest.raises(BackupError, match="cannot be written"):
+            back_up(sqlite.url, tmp_path / "copies" / "x.db")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, most)
+    assert list((tmp_path / "copies").iterdir()) == []
 
 
 class InterruptedFiles(PingFiles):
@@ -305,6 +320,34 @@ async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
     assert query(url, statement) == waiting, "over the row that named a process"
 
 
+@pytest.mark.parametrize("revision", ["0006", "0018"])  # before the audit log, and of a release
+async def test_the_backup_of_an_older_version_replaces_a_newer_database(
+    databases: Databases, tmp_path: Path, capsys: pytest.CaptureFixture[str], revision: str
+) -> None:
+    """The way back after an upgrade; what others keep beside it stays."""
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    older, newer, files = databases.empty("postgresql"), databases.fresh("postgresql"), PingFiles(str(tmp_path / "p"))
+    await migrate.upgrade(older, revision)
+    query(older, "insert into tokens (id, name, role, token_hash, created_at) values ('t', 'Ana', 'admin', 'd', now())")
+    copy, _ = await asyncio.to_thread(back_up, older, tmp_path / "older.dump", files)
+    database = Database(newer)
+    await fill(database, files)
+    await database.close()
+    query(newer, "create table notes (mission varchar(36) references missions)")
+    query(newer, "insert into notes values ('m1')")
+
+    await asyncio.to_thread(restore_to, newer, copy, replace=True, pings=files)
+    assert await migrate.current(newer) == revision
+    assert await migrate.tables(newer) == sorted([*await migrate.tables(older), "notes"])
+    assert query(newer, "select mission from notes") == [("m1",)]
+    assert "tables stay that this version does not know" in (said := capsys.readouterr().out)
+    assert "notes" in said
+    await migrate.upgrade(newer)
+    assert query(newer, "select name from tokens") == [("Ana",)]
+    assert (await counts(newer))["missions"] == 0
+
+
 async def test_an_archive_goes_into_postgresql_as_a_whole_or_not_at_all(databases: Databases, tmp_path: Path) -> None:
     if shutil.which("pg_dump") is None:
         pytest.skip("pg_dump is not installed")
@@ -325,8 +368,26 @@ async def test_a_password_is_given_to_no_command_line(tmp_path: Path, monkeypatc
     with pytest.raises(BackupError, match="pg_dump failed"):
         back_up("postgresql+asyncpg://fleet:hunter2@db:5433/fleet", tmp_path / "x.dump")
     assert "hunter2" not in (tmp_path / "arguments").read_text()
-    assert "--host db --port 5433" in (tmp_path / "arguments").read_text()
+    assert "--host db --port 5433 --username fleet --dbname fleet" in (tmp_path / "arguments").read_text()
     assert (tmp_path / "word").read_text() == "hunter2\n"
+
+
+async def test_a_server_is_found_and_spoken_to_as_its_url_says(databases: Databases, tmp_path: Path) -> None:
+    if shutil.which("pg_dump") is None:
+        pytest.skip("pg_dump is not installed")
+    url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "files"))
+    by_socket = databases.server.socket_url.format(url.rpartition("/")[2])
+    assert await migrate.current(by_socket) == migrate.head()
+    copy, _ = await asyncio.to_thread(back_up, by_socket, tmp_path / "fleet.dump", files)
+    await asyncio.to_thread(restore_to, by_socket, copy, replace=True, pings=files)
+    # It has no certificate: what must be encrypted does not go there in the clear.
+    for mode in ("require", "verify-full"):
+        with pytest.raises(BackupError, match="SSL"):
+            await asyncio.to_thread(back_up, f"{url}?ssl={mode}", tmp_path / "open.dump", files)
+        with pytest.raises(BackupError, match="SSL"):
+            await asyncio.to_thread(restore_to, f"{url}?ssl={mode}", copy, replace=True, pings=files)
+    with pytest.raises(BackupError, match="has sslmode, which PostgreSQL's programs cannot be told"):
+        back_up(f"{url}?sslmode=require", tmp_path / "x.dump", files)
 
 
 async def test_missions_that_ended_long_ago_go_and_give_their_space_back(database: Database) -> None:

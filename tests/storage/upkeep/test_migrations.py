@@ -1,6 +1,8 @@
 """Models and migrations agree, and every migration goes both ways."""
 
+import asyncio
 import sqlite3
+import sys
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,8 +16,10 @@ from app.missions.team import Withdrawal, WithdrawalCause
 from app.storage.database import Database, make_engine
 from app.storage.models import Base, MissionRow, MissionVehicleRow, WaypointRow
 from app.storage.upkeep import migrate
-from app.storage.upkeep.prepare import prepare_database
+from app.storage.upkeep.prepare import check_that_empty, prepare_database
+from tests.support.storage.databases import Databases, query
 from tests.support.storage.rows import one_of_each
+from tests.support.waiting import until
 
 EARLIER = sorted(path.name.partition("_")[0] for path in Path(migrate.MIGRATIONS, "versions").glob("0*.py"))[:-1]
 
@@ -119,6 +123,36 @@ async def test_database_of_every_earlier_revision_keeps_its_rows(empty_url: str,
     await database.close()
     await migrate.downgrade(empty_url, revision)
     assert await _on(empty_url, lambda connection: _kept(connection, columns)) == before
+
+
+PREPARE = "import asyncio, sys; from app.storage.upkeep.prepare import prepare_database as prepare; "
+PREPARE += "asyncio.run(prepare(sys.argv[1], may_upgrade=True))"
+
+
+async def test_processes_that_bring_an_empty_database_up_to_date_at_the_same_time_wait_for_each_other(
+    databases: Databases,
+) -> None:
+    url = databases.empty("postgresql")
+    database = Database(url)
+    async with database.writing() as session:
+        # Whoever comes waits for this, here or in the line.
+        await session.execute(text("create table alembic_version (version_num varchar(32) primary key)"))
+        begun = [await asyncio.create_subprocess_exec(sys.executable, "-c", PREPARE, url) for _ in range(2)]
+
+        async def waiting() -> bool:
+            asked = "select count(*) from pg_stat_activity where wait_event_type = 'Lock' and datname = :name"
+            return await asyncio.to_thread(query, url, asked, name=url.rpartition("/")[2]) == [(2,)]
+
+        await until(waiting, "both of them wait")
+        await session.rollback()
+    assert [await process.wait() for process in begun] == [0, 0]
+    await database.close()
+    assert await _on(url, _differences) == []
+
+
+async def test_tables_that_another_process_has_just_made_are_not_taken_for_a_stranger_s(empty_url: str) -> None:
+    await migrate.upgrade(empty_url)
+    await check_that_empty(empty_url)
 
 
 async def test_upgrading_twice_keeps_the_data(url: str) -> None:

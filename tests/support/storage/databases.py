@@ -8,9 +8,10 @@ import shutil
 import socket
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -94,14 +95,32 @@ def _elsewhere(work: Any) -> Any:
 class PostgresServer:
     """A private server on a free port of this machine."""
 
-    def __init__(self, url: str, command: list[str]) -> None:
+    def __init__(self, url: str, command: list[str], data: Path, control: Callable[..., None]) -> None:
         self.url = url
         self._command = command
+        self._data = data
+        self._control = control
+
+    @property
+    def socket_url(self) -> str:
+        """Where it is on this machine without a network."""
+        rest, _, port = self.url.rpartition(":")
+        return f"{rest.rpartition('@')[0]}@/{{}}?host={self._data.parent}&port={port}"
 
     def create(self, name: str, *, template: str = "template0") -> str:
         """Make a database; returns its URL."""
         subprocess.run([*self._command, "-T", template, name], check=True)
         return f"{self.url}/{name}"
+
+    @contextmanager
+    def as_standby(self) -> Iterator[None]:
+        """Start it anew as a standby, as after a change of servers; it is promoted in the end."""
+        (self._data / "standby.signal").touch()
+        self._control("-m", "fast", "restart")
+        try:
+            yield
+        finally:
+            self._control("promote")
 
 
 @contextmanager
@@ -139,12 +158,13 @@ def postgres_server() -> Iterator[PostgresServer]:
             f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={folder} -c max_connections=300 "
             "-c fsync=off -c synchronous_commit=off -c full_page_writes=off"
         )
-        run("pg_ctl", "-D", str(data), "-w", "-l", str(folder / "log"), "-o", options, "start", **silent)
+        control = partial(run, "pg_ctl", "-D", str(data), "-w", "-l", str(folder / "log"), **silent)
+        control("-o", options, "start")
         try:
             create = [str(binaries / "createdb"), "-h", "127.0.0.1", "-p", str(port), "-U", "fleet"]
-            yield PostgresServer(f"postgresql+asyncpg://fleet@127.0.0.1:{port}", create)
+            yield PostgresServer(f"postgresql+asyncpg://fleet@127.0.0.1:{port}", create, data, control)
         finally:
-            run("pg_ctl", "-D", str(data), "-w", "-m", "immediate", "stop", **silent)
+            control("-m", "immediate", "stop")
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
