@@ -222,16 +222,18 @@ class StationNode:
         )
         neighbours = [k for _, k in by_distance[:MAX_NEIGHBOURS]]
         member.waypoint = np.asarray(waypoint, dtype=np.float64)
-        member.sent = self._choose(number, member)
+        entries, answers = self._choose(number, member), member.heard_at == self._count
+        if answers:
+            member.sent = entries  # vehicles acknowledge the answer to their last report, no other order
         return self._wire.encode_order(
             MoveOrder(
                 member.step,
                 number,
                 waypoint,
-                member.heard_at == self._count,
+                answers,
                 np.array(neighbours, dtype=np.int64),
                 np.array([self.position(k) for k in neighbours]).reshape(-1, 3),
-                member.sent,
+                entries,
             )
         )
 
