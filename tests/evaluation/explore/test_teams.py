@@ -112,6 +112,11 @@ def test_no_leg_is_longer_than_a_step_though_the_station_plans_from_an_old_posit
 def test_what_cannot_be_run_is_said(smooth: Terrain) -> None:
     with pytest.raises(ValueError, match="65536 landmarks"):
         ExploreScenario(smooth, landmarks=70_000, capacity=10)
+    newcomers = TeamSchedule(joining=((200, 2), (54, 3)))
+    with pytest.raises(ValueError, match="256 vehicles, not 257; let 1 fewer join"):
+        ExploreScenario(smooth, landmarks=10, capacity=3, changes=newcomers)
+    assert ExploreScenario(smooth, landmarks=10, robots=2, capacity=3, changes=newcomers).changes is newcomers
+    assert ExploreScenario(smooth, landmarks=10, changes=newcomers).capacity is None
     with pytest.raises(ValueError, match="set a capacity"):
         ExploreScenario(smooth, message_loss=0.1)
     with pytest.raises(ValueError, match="leave the capacity out"):
