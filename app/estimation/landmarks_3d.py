@@ -1,10 +1,10 @@
 """Landmarks whose whole position is unknown: an extended Kalman filter per landmark, from ranges (MED13, NGCUV12).
 
-A range says nothing of the direction. The first look therefore starts a bundle of filters, spread evenly over the half
-sphere below the vehicle; every further look updates all of them and weighs each by how well it predicted the range, as
-in a Gaussian-sum filter. Once the bundle as a whole is narrow enough to be linearised about, it becomes a single filter
-with the bundle's mean and covariance. The predicted range's mean and variance are of second order, which keeps the
-covariance honest while a point is still uncertain across the beam.
+A range says nothing of the direction. The first look therefore starts a bundle of filters, spread evenly over the
+sphere round the vehicle, as far as it lies where landmarks may be; every further look updates all of them and weighs
+each by how well it predicted the range, as in a Gaussian-sum filter. Once the bundle as a whole is narrow enough to be
+linearised about, it becomes a single filter with the bundle's mean and covariance. The predicted range's mean and
+variance are of second order, which keeps the covariance honest while a point is still uncertain across the beam.
 """
 
 from dataclasses import dataclass
@@ -12,12 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy.special import ndtr
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.estimation.depth_posterior import STEEP, TYPICAL_SLOPE
 from app.estimation.sensors import RangeSensor, Ranging
 
-BUNDLE = 48
-"""Filters that a first look starts."""
+BUNDLE = 96
+"""Filters that a first look starts on a whole sphere; those where no landmark may be have no weight."""
+
+OUTSIDE = 0.1
+"""A filter of which less than this part lies where landmarks may be is not started."""
 
 NARROW = 0.15
 """A bundle becomes one filter when its standard deviation, all axes together, is below this part of the range."""
@@ -97,11 +102,15 @@ class Landmark3DEstimator:
         A landmark belongs to ``A`` once all three standard deviations are below this (MED13 footnote 3).
     visit_cap : int
         A landmark measured more often than this counts as accurate too (AURO15 footnote 3).
+    low_m, high_m : (3,)
+        Box in which the landmarks are known to lie.
     """
 
     sensor: Ranging = RangeSensor()  # noqa: RUF009 - frozen
     accuracy_sd_m: float = 0.02
     visit_cap: int = 200
+    low_m: tuple[float, float, float] = (-np.inf, -np.inf, -np.inf)
+    high_m: tuple[float, float, float] = (np.inf, np.inf, np.inf)
 
     def update(
         self,
@@ -111,6 +120,7 @@ class Landmark3DEstimator:
         index: IntArray,
         ranges: FloatArray,
         position_sd_m: float = 0.0,
+        floor_m: float = np.nan,
     ) -> Landmarks3D:
         """Take in the ranges that one vehicle measured.
 
@@ -127,13 +137,16 @@ class Landmark3DEstimator:
         position_sd_m : float
             Standard deviation of the vehicle's own place, along east and along north. It blurs every range, and a
             landmark is not accurate before both together are, because all ranges of a dive share that error.
+        floor_m : float
+            Depth of the sea floor under the vehicle, where landmarks lie on it: they are first looked for where it
+            need not be steep to reach them. NaN where they may lie in the water.
         """
         noise = self.sensor.relative_noise
         where = np.asarray(position, dtype=np.float64)
         mean, covariance, looks = landmarks.position_m.copy(), landmarks.covariance_m2.copy(), landmarks.looks.copy()
         first = index[looks[index] == 0]
         spread = np.concatenate([landmarks.spread, first])
-        means, covariances, weights = _start(where, ranges[looks[index] == 0], noise)
+        means, covariances, weights = self._start(where, ranges[looks[index] == 0], floor_m)
         covariances[..., range(2), range(2)] += position_sd_m**2
         means = np.concatenate([landmarks.means, means])
         covariances = np.concatenate([landmarks.covariances, covariances])
@@ -164,21 +177,29 @@ class Landmark3DEstimator:
             weights[still],
         )
 
-
-def _start(position: FloatArray, ranges: FloatArray, noise: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return bundles on the lower half sphere about ``position`` (3,), one for each of ``ranges`` (k,)."""
-    i = np.arange(BUNDLE) + 0.5
-    down = i / BUNDLE
-    azimuth = np.pi * (1.0 + np.sqrt(5.0)) * i
-    flat = np.sqrt(1.0 - down**2)
-    u = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), down])
-    # Half the side of a filter's share of the half sphere, in ranges: neighbours overlap without a gap.
-    across = 0.5 * np.sqrt(2.0 * np.pi / BUNDLE)
-    along = u[:, :, None] * u[:, None, :]
-    shape = noise**2 * along + across**2 * (np.eye(3) - along)
-    means = position + ranges[:, None, None] * (1.0 - across**2) * u
-    covariances = ranges[:, None, None, None] ** 2 * shape
-    return means, covariances, np.full((len(ranges), BUNDLE), 1.0 / BUNDLE)
+    def _start(
+        self, position: FloatArray, ranges: FloatArray, floor_m: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return bundles on the sphere about ``position`` (3,), one for each of ``ranges`` (k,)."""
+        i = np.arange(BUNDLE) + 0.5
+        down = 2.0 * i / BUNDLE - 1.0
+        azimuth = np.pi * (1.0 + np.sqrt(5.0)) * i
+        flat = np.sqrt(1.0 - down**2)
+        u = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), down])
+        # Half the side of a filter's share of the sphere, in ranges: neighbours overlap without a gap.
+        across = 0.5 * np.sqrt(4.0 * np.pi / BUNDLE)
+        along = u[:, :, None] * u[:, None, :]
+        shape = self.sensor.relative_noise**2 * along + across**2 * (np.eye(3) - along)
+        means = position + ranges[:, None, None] * (1.0 - across**2) * u
+        covariances = ranges[:, None, None, None] ** 2 * shape
+        sd = ranges[:, None, None] * np.sqrt(np.diagonal(shape, axis1=1, axis2=2))
+        inside = (ndtr((self.high_m - means) / sd) - ndtr((self.low_m - means) / sd)).prod(axis=-1)
+        weights = np.where(inside < OUTSIDE, 0.0, inside)
+        if np.isfinite(floor_m):
+            steepness = np.abs(means[..., 2] - floor_m) / (ranges[:, None] * flat)
+            weights *= np.exp(-steepness / TYPICAL_SLOPE) + STEEP
+        weights[weights.sum(axis=1) == 0.0] = 1.0  # a range that leads out of the box: anywhere
+        return means, covariances, weights / weights.sum(axis=1, keepdims=True)
 
 
 class _Measured(NamedTuple):
@@ -282,7 +303,12 @@ def _match(
     mean[:] = 0.0
     covariance[:] = 0.0
     for h in range(len(weights)):
-        mean += weights[h] * means[h]
+        if weights[h] > 0.0:
+            for i in range(3):
+                mean[i] += weights[h] * means[h, i]
     for h in range(len(weights)):
-        d = means[h] - mean
-        covariance += weights[h] * (covariances[h] + np.outer(d, d))
+        if weights[h] > 0.0:
+            for i in range(3):
+                for j in range(3):
+                    off = (means[h, i] - mean[i]) * (means[h, j] - mean[j])
+                    covariance[i, j] += weights[h] * (covariances[h, i, j] + off)

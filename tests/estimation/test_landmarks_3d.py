@@ -94,11 +94,47 @@ def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed: 
         last = known
 
 
+@pytest.mark.parametrize("depths", [(0.2, 0.45), (0.75, 1.0), (0.45, 0.75)], ids=["above", "below", "beside"])
+def test_errors_are_as_large_as_the_filter_says_wherever_it_was_looked_from(depths: tuple[float, float]) -> None:
+    """Landmarks about a depth of 0.6: from below, the first look must not presume that they lie deeper."""
+    errors, wrong = [], 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        truth = np.column_stack([rng.uniform(-0.1, 0.1, (30, 2)), rng.uniform(0.58, 0.62, 30)])
+        known, estimator = Landmarks3D.unknown(30), Landmark3DEstimator(SENSOR, 0.1)
+        for _ in range(50):
+            position = np.array([*rng.uniform(-0.25, 0.25, 2), rng.uniform(*depths)])
+            known = estimator.update(known, 0, position, np.arange(30), SENSOR.measure(position, truth, rng))
+        errors.append(nees(truth, known))
+        wrong += int((known.accurate & (np.linalg.norm(known.position_m - truth, axis=1) > 0.3)).sum())
+    flat = np.concatenate(errors)
+    assert 0.8 * 3.0 < flat.mean() < 1.25 * 3.0
+    assert (flat < chi2.ppf(0.99, 3)).mean() > 0.96
+    assert wrong == 0
+
+
+def once(depth: float = 0.0, floor: float = np.nan, **box: Any) -> Landmarks3D:
+    """What is known after one range of 0.3."""
+    place, index = np.array([0.0, 0.0, depth]), np.array([0])
+    estimator = Landmark3DEstimator(SENSOR, **box)
+    return estimator.update(Landmarks3D.unknown(1), 0, place, index, np.array([0.3]), floor_m=floor)
+
+
 def test_a_single_range_leaves_the_direction_open() -> None:
-    known = Landmark3DEstimator(SENSOR).update(Landmarks3D.unknown(1), 0, np.zeros(3), np.array([0]), np.array([0.3]))
+    known = once()
     assert not known.fixed[0]
-    np.testing.assert_allclose(known.position_m[0], [0.0, 0.0, 0.15], atol=0.02)
-    assert (known.sd_m[0] > 0.07).all()
+    np.testing.assert_allclose(known.position_m[0], 0.0, atol=0.01)
+    np.testing.assert_allclose(known.sd_m[0], 0.3 / np.sqrt(3.0), rtol=0.1)
+
+
+def test_a_first_look_finds_landmarks_where_they_may_be() -> None:
+    low, high = (-1.0, -1.0, 0.0), (1.0, 1.0, 1.0)
+    np.testing.assert_allclose(once(0.0, low_m=low, high_m=high).position_m[0], [0.0, 0.0, 0.15], atol=0.02)
+    np.testing.assert_allclose(once(1.0, low_m=low, high_m=high).position_m[0], [0.0, 0.0, 0.85], atol=0.02)
+    assert np.isfinite(once(5.0, low_m=low, high_m=high).position_m).all()
+    over, under = once(0.5, 0.7), once(0.5, 0.3)  # the floor 0.2 below the vehicle; above, to see that it is asked
+    assert 0.6 < over.position_m[0, 2] < 0.72
+    assert under.position_m[0, 2] == pytest.approx(1.0 - over.position_m[0, 2], abs=0.01)
 
 
 def test_looks_along_a_line_cannot_tell_its_sides_apart() -> None:
@@ -131,4 +167,5 @@ def test_the_order_of_landmarks_does_not_matter() -> None:
     straight = estimator.update(Landmarks3D.unknown(6), 0, np.zeros(3), index, ranges)
     mixed = estimator.update(Landmarks3D.unknown(6), 0, np.zeros(3), shuffled, ranges[shuffled])
     np.testing.assert_array_equal(straight.position_m, mixed.position_m)
-    assert straight.position_m[:, 2] == pytest.approx(ranges / 2, rel=0.1)
+    np.testing.assert_allclose(straight.position_m, 0.0, atol=0.01)
+    np.testing.assert_allclose(straight.sd_m[:, 2], ranges / np.sqrt(3.0), rtol=0.1)

@@ -178,7 +178,7 @@ def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(
     lines = (tmp_path / "tracking.jsonl").read_text().splitlines()
     assert len(lines) == 1
     assert "incomplete" not in (tmp_path / "tracking.md").read_text()
-    assert (tmp_path / "tracking.md").read_text().count("| 4 |") == 5
+    assert (tmp_path / "tracking.md").read_text().count("| 4 |") == 6
     assert call(*arguments, "0:2", "--no-run").exit_code == 0
     assert "1 of 2 runs are still missing" in (tmp_path / "tracking.md").read_text()
     assert (tmp_path / "tracking.jsonl").read_text().splitlines() == lines
