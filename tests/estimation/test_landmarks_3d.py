@@ -169,3 +169,76 @@ def test_the_order_of_landmarks_does_not_matter() -> None:
     np.testing.assert_array_equal(straight.position_m, mixed.position_m)
     np.testing.assert_allclose(straight.position_m, 0.0, atol=0.01)
     np.testing.assert_allclose(straight.sd_m[:, 2], ranges / np.sqrt(3.0), rtol=0.1)
+
+
+def dive(seed: int, sd: float, looks: int, *, grows: bool = False) -> tuple[FloatArray, Landmarks3D, Any]:
+    """A vehicle that is wrong about its place all along a dive, by its deviation; 30 landmarks about (0, 0, 0.6)."""
+    rng = np.random.default_rng(seed)
+    truth = np.column_stack([rng.uniform(-0.1, 0.1, (30, 2)), rng.uniform(0.55, 0.65, 30)])
+    known, estimator = Landmarks3D.unknown(30), Landmark3DEstimator(SENSOR)
+
+    def look(off: FloatArray, sd: float, known: Landmarks3D, vehicle: int = 0) -> Landmarks3D:
+        position = np.array([*rng.uniform(-0.25, 0.25, 2), rng.uniform(0.2, 0.45)])
+        ranges = SENSOR.measure(position - np.append(off, 0.0), truth, rng)
+        return estimator.update(known, vehicle, position, np.arange(30), ranges, sd)
+
+    off = np.zeros(2) if grows else sd * rng.standard_normal(2)
+    for k in range(looks):
+        now = sd
+        if grows:
+            off = off + sd / np.sqrt(looks) * rng.standard_normal(2)
+            now = sd * np.sqrt((k + 1) / looks)
+        known = look(off, float(now), known)
+    return truth, known, look
+
+
+@pytest.mark.parametrize("grows", [False, True])
+def test_the_error_of_a_dive_does_not_average_out_nor_vanish_with_a_fix(grows: bool) -> None:
+    """It is the same for all landmarks of a dive: only dives are independent."""
+    under, fixed, later = [], [], []
+    for seed in range(40):
+        truth, known, look = dive(seed, 0.03, 60, grows=grows)
+        under.append(nees(truth, known).mean())
+        known = look(np.zeros(2), 0.0, known)
+        fixed.append(nees(truth, known).mean())
+        for _ in range(60):
+            known = look(np.zeros(2), 0.0, known)
+        later.append(nees(truth, known).mean())
+        assert (np.linalg.eigvalsh(known.covariance_m2) > 0.0).all()
+    for values in (under, fixed, later):
+        assert 0.6 * 3.0 < np.mean(values) < 1.4 * 3.0
+
+
+def test_nothing_enters_a_that_is_known_no_better_than_the_vehicles_place() -> None:
+    _, known, look = dive(1, 0.03, 150)
+    assert not known.accurate.any()
+    assert (known.sd_m[:, :2] > 0.029).all()
+    known = look(np.zeros(2), 0.0, known)
+    assert not known.accurate.any()
+    for _ in range(150):
+        known = look(np.zeros(2), 0.0, known)
+    assert known.accurate.mean() > 0.9
+
+
+def test_looks_after_a_fix_count_in_full() -> None:
+    """A dive says little of a landmark, what comes after it says all that it would have said alone."""
+    ratios = []
+    for seed in range(4):
+        _, known, look = dive(seed, 0.3, 20)
+        alone = Landmarks3D.unknown(30)
+        for _ in range(100):
+            known, alone = look(np.zeros(2), 0.0, known), look(np.zeros(2), 0.0, alone)
+        ratios.append(known.sd_m / alone.sd_m)
+    assert 0.8 < np.mean(ratios) < 1.1
+
+
+def test_vehicles_that_share_their_error_do_not_average_it_out_between_them() -> None:
+    errors = []
+    for seed in range(40):
+        truth, known, look = dive(seed, 0.03, 1)
+        off = 0.03 * np.random.default_rng([seed, 1]).standard_normal(2)
+        known = Landmarks3D.unknown(30)
+        for k in range(60):
+            known = look(off, 0.03, known, k % 3)
+        errors.append(nees(truth, known).mean())
+    assert 0.6 * 3.0 < np.mean(errors) < 1.4 * 3.0
