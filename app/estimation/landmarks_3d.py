@@ -33,6 +33,10 @@ NARROW = 0.15
 """A bundle becomes one filter when its standard deviation, all axes together, is below this part of the range."""
 
 
+LEAST_NOISE = 1e-6
+"""Of a range, relative: with less, rounding would make covariances that are none."""
+
+
 @dataclass(frozen=True)
 class Landmarks3D:
     """What is known of ``n`` points; every update returns a new object.
@@ -154,7 +158,7 @@ class Landmark3DEstimator:
             Depth of the sea floor under the vehicle, where landmarks lie on it: they are first looked for where it
             need not be steep to reach them. NaN where they may lie in the water.
         """
-        noise = self.sensor.relative_noise
+        noise = max(self.sensor.relative_noise, LEAST_NOISE)
         where = np.asarray(position, dtype=np.float64)
         mean, covariance, looks = landmarks.position_m.copy(), landmarks.covariance_m2.copy(), landmarks.looks.copy()
         first = index[looks[index] == 0]
@@ -209,7 +213,7 @@ class Landmark3DEstimator:
         # Half the side of a filter's share of the sphere, in ranges: neighbours overlap without a gap.
         across = 0.5 * np.sqrt(4.0 * np.pi / BUNDLE)
         along = u[:, :, None] * u[:, None, :]
-        shape = self.sensor.relative_noise**2 * along + across**2 * (np.eye(3) - along)
+        shape = max(self.sensor.relative_noise, LEAST_NOISE) ** 2 * along + across**2 * (np.eye(3) - along)
         means = position + ranges[:, None, None] * (1.0 - across**2) * u
         covariances = ranges[:, None, None, None] ** 2 * shape
         sd = ranges[:, None, None] * np.sqrt(np.diagonal(shape, axis1=1, axis2=2))

@@ -137,6 +137,20 @@ def test_a_first_look_finds_landmarks_where_they_may_be() -> None:
     assert under.position_m[0, 2] == pytest.approx(1.0 - over.position_m[0, 2], abs=0.01)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-4])
+@pytest.mark.parametrize("size", [1.0, 1000.0])
+def test_ranges_without_noise_make_a_filter_too(noise: float, size: float) -> None:
+    rng, sensor = np.random.default_rng(2), RangeSensor(np.inf, noise)
+    truth = size * np.array([[0.05, 0.02, 0.6]])
+    known, estimator = Landmarks3D.unknown(1), Landmark3DEstimator(sensor)
+    for _ in range(60):
+        position = size * np.array([*rng.uniform(-0.25, 0.25, 2), rng.uniform(0.2, 0.45)])
+        known = estimator.update(known, 0, position, np.array([0]), sensor.measure(position, truth, rng))
+    assert (np.linalg.eigvalsh(known.covariance_m2[0]) > 0.0).all()
+    assert (known.sd_m < 1e-3 * size).all()
+    np.testing.assert_allclose(known.position_m, truth, atol=1e-3 * size)
+
+
 def test_looks_along_a_line_cannot_tell_its_sides_apart() -> None:
     """A straight leg leaves two mirror images: the estimate must not settle on one of them."""
     rng = np.random.default_rng(0)
