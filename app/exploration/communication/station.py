@@ -18,8 +18,7 @@ from app.exploration.communication.messages import (
     WireFormat,
 )
 from app.exploration.communication.selection import fill, reachable
-from app.exploration.communication.shared import Contribution, fuse
-from app.exploration.communication.vehicle import WORTH_TELLING
+from app.exploration.communication.shared import Contribution, fuse, news
 
 NOTHING = np.zeros(0, dtype=np.int64)
 
@@ -256,8 +255,8 @@ class StationNode:
     def _choose(self, number: int, member: _Member) -> Entries:
         others = [self._members[k].reported for k in self.members if k != number]
         depth, information = fuse(others, len(self._xy))
-        news = information > WORTH_TELLING * member.confirmed
-        waiting = np.flatnonzero(~member.finished & (self._known | news))
+        told = news(information, member.confirmed)
+        waiting = np.flatnonzero(~member.finished & (self._known | told))
         distance = np.hypot(*(self._xy[waiting] - member.position[:2]).T)
         chosen = fill(waiting[np.argsort(distance, kind="stable")], self._xy, self._capacity, self._apart_m)
         with np.errstate(divide="ignore"):

@@ -9,10 +9,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks
 from app.exploration.communication.messages import MAX_ENTRIES, STEPS, Entries, MoveOrder, StatusReport, WireFormat
 from app.exploration.communication.selection import distance_to_receivers, fill
-from app.exploration.communication.shared import Contribution, fuse
-
-WORTH_TELLING = 1.1
-"""An estimate is sent again when its information has grown by this factor since the receiver confirmed it."""
+from app.exploration.communication.shared import Contribution, fuse, news
 
 REMEMBERED = 16
 """Reports of which a vehicle still knows what was in them, should an order answer one of them late."""
@@ -156,10 +153,9 @@ class VehicleNode:
 
     def _choose(self, position: FloatArray) -> IntArray:
         information = 1.0 / self.own.variance_m2
-        news = information > WORTH_TELLING * self._confirmed
         sendable = self.own.variance_m2 < self._wire.largest_sd_m**2
         finished = self._done & ~self._settled & self.own.seen
-        unfinished = ~self._done & news & sendable
+        unfinished = ~self._done & news(information, self._confirmed) & sendable
         waiting = np.flatnonzero(finished | unfinished)
         receivers = self._receivers if len(self._receivers) else position[None]
         distance = distance_to_receivers(self.own.xy_m[waiting], receivers[:, :2])

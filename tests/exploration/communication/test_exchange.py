@@ -1,6 +1,7 @@
 """Vehicles and station together, over links that lose messages."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -348,3 +349,23 @@ def test_what_came_in_a_late_order_is_not_taken_for_what_came_in_the_last_one() 
     vehicle.report(fleet.step + 2, fleet.positions[0])
     fleet.exchange()
     assert WIRE.decode_report(vehicle.report(fleet.step + 1, fleet.positions[0])).acknowledges
+
+
+def test_who_becomes_less_sure_says_so_and_is_believed() -> None:
+    """Looks may speak for another depth than those before: the station and the others then know less, too."""
+    fleet = Fleet(10, vehicles=2, n=1)
+    first, second = fleet.vehicles
+
+    def know(depth: float, sd: float) -> None:
+        first.own = replace(first.own, depth_m=np.array([depth]), variance_m2=np.array([sd**2]))
+        for _ in range(3):
+            fleet.exchange()
+
+    for depth, sd in ((0.6, 0.03), (0.4, 0.09), (0.4, 0.04)):
+        know(depth, sd)
+        assert fleet.station.depth_m[0] == pytest.approx(depth, abs=1e-3)
+        assert fleet.station.known_sd_m[0] == pytest.approx(sd, rel=0.05)
+        assert second.knowledge.depth_m[0] == pytest.approx(depth, abs=1e-3)
+        assert np.sqrt(second.knowledge.variance_m2[0]) == pytest.approx(sd, rel=0.1)
+    know(0.4, 0.0405)
+    assert not told_in(first.report(99, fleet.positions[0]))  # no news
