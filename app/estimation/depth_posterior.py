@@ -20,6 +20,13 @@ CELLS = 96
 REACH_SD = 5.0
 """How many deviations a range may be short of the truth when the first look lays out the depths."""
 
+STRANGE_SD = 6.0
+"""A range that is this many deviations off all depths that were likely speaks of one that a grid does not hold."""
+
+DISBELIEF = 10.0
+"""What such a range takes from the logarithm of the likelihood of the depths that it does not fit, at most: one alone
+does not move an estimate, another one that agrees does."""
+
 LOST = 20.0
 """Depths whose logarithm of likelihood lies this far below the best are given up when a grid narrows."""
 
@@ -47,9 +54,13 @@ Cells = NDArray[np.float32]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lay_out(vehicle_depth: float, measured: float, noise: float, below: bool) -> tuple[float, float]:
-    """Return the first depth and the spacing of a grid that holds whatever a first range may mean."""
+def lay_out(vehicle_depth: float, measured: float, noise: float, below: bool, h2: float) -> tuple[float, float]:
+    """Return the first depth and the spacing of a grid that holds whatever a first range may mean.
+
+    However short it is, the landmark is no closer than its horizontal distance, whose square is ``h2``.
+    """
     reach = max(measured, NEAREST_M) / max(1.0 - REACH_SD * noise, 0.25)
+    reach = max(reach, np.sqrt(h2))
     lowest = vehicle_depth if below else vehicle_depth - reach
     return lowest, (vehicle_depth + reach - lowest) / (CELLS - 1)
 
@@ -61,6 +72,69 @@ def _fit(z: float, h2: float, vehicle_depth: float, measured: float, noise: floa
     r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
     sd = np.sqrt((noise * r) ** 2 + (0.5 * spacing * drop / r) ** 2)
     return float(-0.5 * ((measured - r) / sd) ** 2 - np.log(sd))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _kept(z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float) -> float:
+    """Return what is kept of a range at depth ``z``: the logarithm of its likelihood, no sharper than a cell."""
+    drop = z - vehicle_depth
+    r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
+    sd = max(noise * r, 0.5 * spacing * abs(drop) / r)
+    return float(-0.5 * ((measured - r) / sd) ** 2 - np.log(sd))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _strange(
+    fit: Cells,
+    grid: tuple[float, float],
+    h2: float,
+    vehicle_depth: float,
+    measured: float,
+    noise: float,
+    below: bool,
+) -> bool:
+    """Return whether a range fits none of the depths that were likely so far, or best the last of a grid."""
+    lowest, spacing = grid
+    best, where, closest = -np.inf, 0, np.inf
+    for c in range(CELLS):
+        drop = lowest + c * spacing - vehicle_depth
+        r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
+        sd = np.sqrt((noise * r) ** 2 + (0.5 * spacing * drop / r) ** 2)
+        off = abs(measured - r) / sd
+        value = fit[c] - 0.5 * off * off - np.log(sd)
+        if value > best:
+            best, where = value, c
+        if fit[c] > -1.5 * LOST:
+            closest = min(closest, off)
+    return closest > STRANGE_SD or where == CELLS - 1 or (where == 0 and not below)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _widen(fit: Cells, steepness: Cells, grid: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    """Lay a grid out again in place so that it holds ``other`` too; return first depth and spacing.
+
+    Beyond the old one depths are as likely as at its end, but not less than when they were given up.
+    """
+    lowest = min(grid[0], other[0])
+    last = max(grid[0] + (CELLS - 1) * grid[1], other[0] + (CELLS - 1) * other[1])
+    spacing = (last - lowest) / (CELLS - 1)
+    old, slopes = fit.copy(), steepness.copy()
+    best = -np.inf
+    for c in range(CELLS):
+        at = (lowest + c * spacing - grid[0]) / grid[1]
+        near = int(min(max(np.round(at), 0.0), CELLS - 1.0))
+        steepness[c] = slopes[near]
+        fit[c] = old[near]
+        if abs(at - near) > 0.5:
+            fit[c] = max(fit[c], -LOST)
+        elif spacing > grid[1]:  # the best of what the cell holds
+            reach = int(np.ceil(0.5 * spacing / grid[1]))
+            for k in range(max(near - reach, 0), min(near + reach, CELLS - 1) + 1):
+                fit[c] = max(fit[c], old[k])
+        best = max(best, fit[c])
+    for c in range(CELLS):
+        fit[c] -= best
+    return lowest, spacing
 
 
 @njit(cache=True, nogil=True)
@@ -115,9 +189,14 @@ def take_range(
     below : bool
         The sensor looks down only.
     """
-    lowest, spacing = grid
     noise = max(noise, NEAREST_M)
+    strange = _strange(fit, grid, h2, vehicle_depth, measured, noise, below)
+    if strange:
+        grid = _widen(fit, steepness, grid, lay_out(vehicle_depth, measured, noise, below, h2))
+    lowest, spacing = grid
     for _ in range(40):
+        if strange:
+            break  # what is likely is not known yet
         best = -np.inf
         for c in range(CELLS):
             z = lowest + c * spacing
@@ -130,11 +209,15 @@ def take_range(
         if 3 * (last - first) > CELLS:
             break
         lowest, spacing = _narrow(fit, steepness, lowest, spacing, 0.5 * (first + last))
-    best = -np.inf
+    best, most = -np.inf, -np.inf
     h = max(np.sqrt(h2), NEAREST_M)
+    if strange:
+        for c in range(CELLS):
+            most = max(most, _kept(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing))
     for c in range(CELLS):
         rise = vehicle_depth - (lowest + c * spacing)
-        value = fit[c] + _fit(lowest + c * spacing, h2, vehicle_depth, measured, noise, 0.0)
+        told = _kept(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing)
+        value = fit[c] + max(told, most - DISBELIEF)
         if rise > 0.0:
             steepness[c] = max(steepness[c], rise / h)
             value = NEVER if below else value

@@ -232,7 +232,7 @@ def _take(
         m = index[k]
         grid = (lowest[m], spacing[m])
         if spacing[m] == 0.0:
-            grid = lay_out(vehicle_depth, ranges[k], noise, below)
+            grid = lay_out(vehicle_depth, ranges[k], noise, below, h2[k])
         lowest[m], spacing[m] = take_range(fit[m], steepness[m], grid, h2[k], vehicle_depth, ranges[k], noise, below)
 
 

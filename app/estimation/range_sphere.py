@@ -12,7 +12,14 @@ import numpy as np
 from app.arrays import FloatArray
 
 AROUND, UPWARDS = 32, 9
-"""Parts of a sphere by azimuth and by elevation."""
+"""Parts of a sphere by azimuth and by elevation, at least."""
+
+MOST_AROUND, MOST_UPWARDS = 64, 32
+"""The same at most: as many as it takes that no part is bent."""
+
+BENT = 0.3
+"""A part of a sphere is bent when it departs from a plane by more than this many deviations of its range. A filter
+would take that for another error at every range, and average it out."""
 
 THICK = 0.3
 """A sphere is this thick to begin with, in radii: the range itself, taken after that, makes it thin."""
@@ -29,7 +36,9 @@ class SphereParts(NamedTuple):
     share: FloatArray
 
 
-def sphere_parts(centre_m: FloatArray, radius_m: float, sd_m: float, low_m: float, high_m: float) -> SphereParts:
+def sphere_parts(
+    centre_m: FloatArray, radius_m: float, sd_m: float, low_m: float, high_m: float, *, straight: bool = False
+) -> SphereParts:
     """Return the parts of a sphere between two depths.
 
     Parameters
@@ -40,18 +49,25 @@ def sphere_parts(centre_m: FloatArray, radius_m: float, sd_m: float, low_m: floa
         How exactly its radius is known.
     low_m, high_m
         Least and greatest depth. A sphere that does not reach them ends at its nearest place.
+    straight
+        As many parts as it takes that none is bent, up to ``MOST_AROUND`` by ``MOST_UPWARDS``.
     """
     below_m = np.clip(np.array([low_m, high_m]) - centre_m[2], -radius_m, radius_m)
     lowest, highest = np.arcsin(below_m / radius_m)
-    edges = np.linspace(lowest, highest, UPWARDS + 1)
-    elevation = np.repeat(0.5 * (edges[1:] + edges[:-1]), AROUND)
-    azimuth = np.tile(2.0 * np.pi / AROUND * np.arange(AROUND), UPWARDS)
+    upwards_count, around = UPWARDS, AROUND
+    if straight:
+        widest = 2.0 * np.sqrt(BENT * np.sqrt(2.0) * max(sd_m / radius_m, 1e-9))
+        upwards_count = int(np.clip(np.ceil((highest - lowest) / widest), UPWARDS, MOST_UPWARDS))
+        around = int(np.clip(np.ceil(2.0 * np.pi / widest), AROUND, MOST_AROUND))
+    edges = np.linspace(lowest, highest, upwards_count + 1)
+    elevation = np.repeat(0.5 * (edges[1:] + edges[:-1]), around)
+    azimuth = np.tile(2.0 * np.pi / around * np.arange(around), upwards_count)
     zero, level = np.zeros_like(azimuth), np.cos(elevation)
     outwards = np.column_stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(elevation)])
     sideways = np.column_stack([np.cos(azimuth), -np.sin(azimuth), zero])
     upwards = np.cross(outwards, sideways)
     # Neighbours overlap without a gap: half of the way between them is one standard deviation.
-    aside_m = np.maximum(np.pi / AROUND * radius_m * level, sd_m)
+    aside_m = np.maximum(np.pi / around * radius_m * level, sd_m)
     up_m = max(0.5 * (edges[1] - edges[0]) * radius_m, sd_m)
     thick_m = max(THICK * radius_m, sd_m)
     covariance = (

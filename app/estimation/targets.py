@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from app.arrays import FloatArray
-from app.estimation.range_filter import update_by_range
-from app.estimation.range_sphere import on_sphere, sphere_parts
+from app.estimation.range_filter import NEAREST_M, update_by_range
+from app.estimation.range_sphere import BENT, on_sphere, sphere_parts
 from app.estimation.sensors import RangeSensor
 
 EVERYWHERE = np.inf
@@ -26,7 +26,8 @@ PER_AXIS = (8, 8, 6)
 """Filters that a first range starts, along east, north and depth."""
 
 NARROW = 0.15
-"""A mixture becomes one filter when its standard deviation, all axes together, is below this part of the range."""
+"""A mixture becomes one filter when its standard deviation, all axes together, is below this part of the range, and
+so small that no sphere of a range bends within it."""
 
 WIDE = 0.7
 """Filters whose standard deviations, all axes together, are above this part of a range are cut into parts on its
@@ -37,6 +38,9 @@ FORGOTTEN = 1e-6
 
 DOUBT = 0.95
 """Power to which weights are taken before each step: linearised filters are surer of each other than they may be."""
+
+FINE, DOUBT_FINE = 0.03, 0.8
+"""Ranges of which a deviation is a smaller part than the first leave filters that are still surer of each other."""
 
 MEMORY = 0.9
 """Weight of the past in the running mean of squared normalised innovations, which is 1 while a filter is right."""
@@ -209,7 +213,8 @@ class TargetEstimator:
         if track.parts_m > WIDE * range_m > 0.0:
             track = self._cut(track, place, range_m, sd_m)
         means, covariances = track.means.copy(), track.covariances.copy()
-        weights = track.weights**DOUBT / (track.weights**DOUBT).sum()
+        weights = track.weights ** (DOUBT_FINE if sd_m < FINE * range_m else DOUBT)
+        weights /= weights.sum()
         surprise = _take(
             means, covariances, weights, np.ascontiguousarray(positions[heard], dtype=np.float64), ranges[heard],
             self.sensor.relative_noise, np.ascontiguousarray(blur[heard], dtype=np.float64),
@@ -220,19 +225,23 @@ class TargetEstimator:
             mean = surprise / len(heard)
             kept = MEMORY ** (len(heard) / MEMORY_RANGES)
             return replace(mixture, surprise=mean, unease=kept * track.unease + (1.0 - kept) * mean)
-        if np.sqrt((mixture.sd_m**2).sum()) < NARROW * float(np.abs(ranges[heard]).min()):
+        closest = float(np.abs(ranges[heard]).min())
+        straight_m = np.sqrt(3.0 * BENT * closest * sd_m)
+        if np.sqrt((mixture.sd_m**2).sum()) < min(NARROW * closest, straight_m):
             return TargetTrack(mixture.state[None], mixture.covariance[None], np.ones(1))
         return mixture
 
     def _begun(self, place_m: FloatArray, range_m: float, sd_m: float) -> TargetTrack:
         """Return filters spread over where a target may be whose first range is heard at a place (3,).
 
-        Those of the whole box, or of the sphere alone where they are wide beside it.
+        Those of the whole box, or of the sphere alone where they are wide beside it or it bends within one by more than
+        its deviation.
         """
         anywhere = self._anywhere()
-        if not anywhere.parts_m > WIDE * range_m > 0.0:
+        bend_m = anywhere.parts_m**2 / (3.0 * max(range_m, NEAREST_M))
+        if not (anywhere.parts_m > WIDE * range_m > 0.0 or bend_m > sd_m > 0.0):
             return anywhere
-        parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2])
+        parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2], straight=True)
         low, high = np.array(self.low_m[:2]), np.array(self.high_m[:2])
         inside = ((parts.place_m[:, :2] >= low) & (parts.place_m[:, :2] <= high)).all(axis=1)
         inside |= not inside.any()

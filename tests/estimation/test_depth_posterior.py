@@ -174,3 +174,47 @@ def test_landmarks_at_one_place_and_a_landmark_alone_have_neighbours_as_far_as_t
         others = grids.neighbours[m][np.isfinite(grids.apart_m[m])]
         assert sorted(others) == [k for k in range(4) if k != m]
     assert np.isinf(Landmarks.unknown(np.zeros((1, 2))).grids.apart_m).all()
+
+
+def round_about(rng: np.random.Generator, looks: int) -> FloatArray:
+    return np.column_stack([rng.uniform(-0.2, 0.2, (looks, 2)), rng.uniform(0.2, 0.45, looks)])
+
+
+@pytest.mark.parametrize(("noise", "deviations"), [(0.3, -3.3), (0.3, -2.7), (0.2, -4.2), (0.1, -10.0)])
+def test_a_first_range_that_is_far_too_short_is_got_over(noise: float, deviations: float) -> None:
+    """The depths laid out by it do not hold the truth; the last one is a range of nothing."""
+    rng = np.random.default_rng(11)
+    truth, sensor = np.array([[0.0, 0.0, 0.65]]), RangeSensor(0.9, noise)
+    places = round_about(rng, 600)
+    looks = [(place, sensor.measure(place, truth, rng)) for place in places]
+    looks[0] = (places[0], np.linalg.norm(truth - places[0], axis=1) * (1.0 + deviations * noise))
+    assert not taken(truth[:, :2], looks[:1], sensor).accurate[0]
+    state = taken(truth[:, :2], looks, sensor)
+    assert abs(state.depth_m[0] - 0.65) < 4.0 * np.sqrt(state.variance_m2[0])
+    assert np.sqrt(state.variance_m2[0]) < 0.03
+
+
+@pytest.mark.parametrize("noise", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_the_finer_the_ranges_the_finer_the_depths(noise: float) -> None:
+    rng, errors, most = np.random.default_rng(12), [], 0.0
+    for _ in range(60):
+        truth, sensor = np.array([[0.0, 0.0, rng.uniform(0.55, 0.7)]]), RangeSensor(0.9, noise)
+        looks = [(place, sensor.measure(place, truth, rng)) for place in round_about(rng, 10)]
+        state = taken(truth[:, :2], looks, sensor)
+        errors.append((state.depth_m[0] - truth[0, 2]) ** 2 / state.variance_m2[0])
+        most = max(most, float(state.variance_m2[0]))
+    assert 0.5 < np.mean(errors) < 1.7
+    assert max(errors) < 16.0
+    assert np.sqrt(most) < 3.0 * noise
+
+
+@pytest.mark.parametrize("false", [0.0, 0.05, 2.0])
+def test_a_single_false_echo_makes_nobody_sure_of_something_else(false: float) -> None:
+    """The depths laid out again may be coarse beside what was known, which the deviation says."""
+    rng = np.random.default_rng(13)
+    truth = np.array([[0.0, 0.0, 0.65]])
+    looks = [(place, SENSOR.measure(place, truth, rng)) for place in round_about(rng, 200)]
+    echo = (np.array([0.05, 0.0, 0.3]), np.array([false]))
+    for later in (0, 40):
+        state = taken(truth[:, :2], [*looks, echo, *looks[:later]])
+        assert abs(state.depth_m[0] - 0.65) < min(0.05, 4.0 * np.sqrt(state.variance_m2[0]))

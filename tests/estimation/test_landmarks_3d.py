@@ -94,11 +94,61 @@ def test_what_is_known_accurately_stays_so_and_single_filters_only_narrow(seed: 
         last = known
 
 
+@pytest.mark.parametrize("depths", [(0.2, 0.45), (0.75, 1.0), (0.45, 0.75)], ids=["above", "below", "beside"])
+def test_errors_are_as_large_as_the_filter_says_wherever_it_was_looked_from(depths: tuple[float, float]) -> None:
+    """Landmarks about a depth of 0.6: from below, the first look must not presume that they lie deeper."""
+    errors, wrong = [], 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        truth = np.column_stack([rng.uniform(-0.1, 0.1, (30, 2)), rng.uniform(0.58, 0.62, 30)])
+        known, estimator = Landmarks3D.unknown(30), Landmark3DEstimator(SENSOR, 0.1)
+        for _ in range(50):
+            position = np.array([*rng.uniform(-0.25, 0.25, 2), rng.uniform(*depths)])
+            known = estimator.update(known, 0, position, np.arange(30), SENSOR.measure(position, truth, rng))
+        errors.append(nees(truth, known))
+        wrong += int((known.accurate & (np.linalg.norm(known.position_m - truth, axis=1) > 0.3)).sum())
+    flat = np.concatenate(errors)
+    assert 0.8 * 3.0 < flat.mean() < 1.25 * 3.0
+    assert (flat < chi2.ppf(0.99, 3)).mean() > 0.96
+    assert wrong == 0
+
+
+def once(depth: float = 0.0, floor: float = np.nan, **box: Any) -> Landmarks3D:
+    """What is known after one range of 0.3."""
+    place, index = np.array([0.0, 0.0, depth]), np.array([0])
+    estimator = Landmark3DEstimator(SENSOR, **box)
+    return estimator.update(Landmarks3D.unknown(1), 0, place, index, np.array([0.3]), floor_m=floor)
+
+
 def test_a_single_range_leaves_the_direction_open() -> None:
-    known = Landmark3DEstimator(SENSOR).update(Landmarks3D.unknown(1), 0, np.zeros(3), np.array([0]), np.array([0.3]))
+    known = once()
     assert not known.fixed[0]
-    np.testing.assert_allclose(known.position_m[0], [0.0, 0.0, 0.15], atol=0.02)
-    assert (known.sd_m[0] > 0.07).all()
+    np.testing.assert_allclose(known.position_m[0], 0.0, atol=0.01)
+    np.testing.assert_allclose(known.sd_m[0], 0.3 / np.sqrt(3.0), rtol=0.1)
+
+
+def test_a_first_look_finds_landmarks_where_they_may_be() -> None:
+    low, high = (-1.0, -1.0, 0.0), (1.0, 1.0, 1.0)
+    np.testing.assert_allclose(once(0.0, low_m=low, high_m=high).position_m[0], [0.0, 0.0, 0.15], atol=0.02)
+    np.testing.assert_allclose(once(1.0, low_m=low, high_m=high).position_m[0], [0.0, 0.0, 0.85], atol=0.02)
+    assert np.isfinite(once(5.0, low_m=low, high_m=high).position_m).all()
+    over, under = once(0.5, 0.7), once(0.5, 0.3)  # the floor 0.2 below the vehicle; above, to see that it is asked
+    assert 0.6 < over.position_m[0, 2] < 0.72
+    assert under.position_m[0, 2] == pytest.approx(1.0 - over.position_m[0, 2], abs=0.01)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-4])
+@pytest.mark.parametrize("size", [1.0, 1000.0])
+def test_ranges_without_noise_make_a_filter_too(noise: float, size: float) -> None:
+    rng, sensor = np.random.default_rng(2), RangeSensor(np.inf, noise)
+    truth = size * np.array([[0.05, 0.02, 0.6]])
+    known, estimator = Landmarks3D.unknown(1), Landmark3DEstimator(sensor)
+    for _ in range(60):
+        position = size * np.array([*rng.uniform(-0.25, 0.25, 2), rng.uniform(0.2, 0.45)])
+        known = estimator.update(known, 0, position, np.array([0]), sensor.measure(position, truth, rng))
+    assert (np.linalg.eigvalsh(known.covariance_m2[0]) > 0.0).all()
+    assert (known.sd_m < 1e-3 * size).all()
+    np.testing.assert_allclose(known.position_m, truth, atol=1e-3 * size)
 
 
 def test_looks_along_a_line_cannot_tell_its_sides_apart() -> None:
@@ -131,4 +181,78 @@ def test_the_order_of_landmarks_does_not_matter() -> None:
     straight = estimator.update(Landmarks3D.unknown(6), 0, np.zeros(3), index, ranges)
     mixed = estimator.update(Landmarks3D.unknown(6), 0, np.zeros(3), shuffled, ranges[shuffled])
     np.testing.assert_array_equal(straight.position_m, mixed.position_m)
-    assert straight.position_m[:, 2] == pytest.approx(ranges / 2, rel=0.1)
+    np.testing.assert_allclose(straight.position_m, 0.0, atol=0.01)
+    np.testing.assert_allclose(straight.sd_m[:, 2], ranges / np.sqrt(3.0), rtol=0.1)
+
+
+def dive(seed: int, sd: float, looks: int, *, grows: bool = False) -> tuple[FloatArray, Landmarks3D, Any]:
+    """A vehicle that is wrong about its place all along a dive, by its deviation; 30 landmarks about (0, 0, 0.6)."""
+    rng = np.random.default_rng(seed)
+    truth = np.column_stack([rng.uniform(-0.1, 0.1, (30, 2)), rng.uniform(0.55, 0.65, 30)])
+    known, estimator = Landmarks3D.unknown(30), Landmark3DEstimator(SENSOR)
+
+    def look(off: FloatArray, sd: float, known: Landmarks3D, vehicle: int = 0) -> Landmarks3D:
+        position = np.array([*rng.uniform(-0.25, 0.25, 2), rng.uniform(0.2, 0.45)])
+        ranges = SENSOR.measure(position - np.append(off, 0.0), truth, rng)
+        return estimator.update(known, vehicle, position, np.arange(30), ranges, sd)
+
+    off = np.zeros(2) if grows else sd * rng.standard_normal(2)
+    for k in range(looks):
+        now = sd
+        if grows:
+            off = off + sd / np.sqrt(looks) * rng.standard_normal(2)
+            now = sd * np.sqrt((k + 1) / looks)
+        known = look(off, float(now), known)
+    return truth, known, look
+
+
+@pytest.mark.parametrize("grows", [False, True])
+def test_the_error_of_a_dive_does_not_average_out_nor_vanish_with_a_fix(grows: bool) -> None:
+    """It is the same for all landmarks of a dive: only dives are independent."""
+    under, fixed, later = [], [], []
+    for seed in range(40):
+        truth, known, look = dive(seed, 0.03, 60, grows=grows)
+        under.append(nees(truth, known).mean())
+        known = look(np.zeros(2), 0.0, known)
+        fixed.append(nees(truth, known).mean())
+        for _ in range(60):
+            known = look(np.zeros(2), 0.0, known)
+        later.append(nees(truth, known).mean())
+        assert (np.linalg.eigvalsh(known.covariance_m2) > 0.0).all()
+    for values in (under, fixed, later):
+        assert 0.6 * 3.0 < np.mean(values) < 1.4 * 3.0
+
+
+def test_nothing_enters_a_that_is_known_no_better_than_the_vehicles_place() -> None:
+    _, known, look = dive(1, 0.03, 150)
+    assert not known.accurate.any()
+    assert (known.sd_m[:, :2] > 0.029).all()
+    known = look(np.zeros(2), 0.0, known)
+    assert not known.accurate.any()
+    for _ in range(150):
+        known = look(np.zeros(2), 0.0, known)
+    assert known.accurate.mean() > 0.9
+
+
+def test_looks_after_a_fix_count_in_full() -> None:
+    """A dive says little of a landmark, what comes after it says all that it would have said alone."""
+    ratios = []
+    for seed in range(4):
+        _, known, look = dive(seed, 0.3, 20)
+        alone = Landmarks3D.unknown(30)
+        for _ in range(100):
+            known, alone = look(np.zeros(2), 0.0, known), look(np.zeros(2), 0.0, alone)
+        ratios.append(known.sd_m / alone.sd_m)
+    assert 0.8 < np.mean(ratios) < 1.1
+
+
+def test_vehicles_that_share_their_error_do_not_average_it_out_between_them() -> None:
+    errors = []
+    for seed in range(40):
+        truth, known, look = dive(seed, 0.03, 1)
+        off = 0.03 * np.random.default_rng([seed, 1]).standard_normal(2)
+        known = Landmarks3D.unknown(30)
+        for k in range(60):
+            known = look(off, 0.03, known, k % 3)
+        errors.append(nees(truth, known).mean())
+    assert 0.6 * 3.0 < np.mean(errors) < 1.4 * 3.0

@@ -93,6 +93,28 @@ def test_a_target_is_found_from_nothing() -> None:
     assert right >= 38
 
 
+@pytest.mark.parametrize(("noise", "vehicles"), [(0.01, 1), (0.02, 1), (0.01, 2), (0.1, 1)])
+def test_fine_ranges_do_not_make_a_filter_sure_of_a_wrong_place(noise: float, vehicles: int) -> None:
+    """From nothing, also by ranges of one vehicle: a filter takes the bend of their spheres for nothing else."""
+    nees = []
+    for seed in range(24):
+        rng = np.random.default_rng([7, seed])
+        estimator, track = TargetEstimator(RangeSensor(np.inf, noise)), TargetTrack.unknown()
+        course = rng.standard_normal(3)
+        truth = np.array([*rng.uniform(-0.6, 0.6, 3), *(course / np.linalg.norm(course) * 0.00075)])
+        phase = rng.uniform(0.0, 2.0 * np.pi, vehicles)
+        for step in range(1, 101):
+            truth = transition() @ truth
+            angle = phase + 0.1 * step
+            places = np.column_stack([0.5 * np.cos(angle), 0.5 * np.sin(angle), 0.4 * np.sin(0.7 * angle + phase)])
+            ranges = np.linalg.norm(places - truth[:3], axis=1) * (1.0 + noise * rng.standard_normal(vehicles))
+            track = estimator.update(estimator.predict(track), places, ranges)
+        error = truth - track.state
+        nees.append(error @ np.linalg.solve(track.covariance, error))
+    assert np.mean(nees) < 8.0
+    assert (np.array(nees) > chi2.ppf(0.999, 6)).sum() <= 1
+
+
 def test_it_counts_as_accurate_only_while_it_is_heard() -> None:
     estimator = TargetEstimator()
     *_, (_, track, _) = pursuit(0, 60, estimator)

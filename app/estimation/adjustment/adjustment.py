@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from app.arrays import BoolArray, FloatArray
-from app.estimation.adjustment.drift import DriftModel, Nodes
+from app.estimation.adjustment.drift import LEAST_FIX_M, DriftModel, Nodes
 from app.estimation.adjustment.least_squares import DriftModels, LeastSquares, Solution, WeighedTies
 from app.estimation.adjustment.ties import Known, Matcher, Outcome, Relief, Sections, Tie, rms
 from app.estimation.adjustment.tracks import Fixes, TrackSoundings
@@ -25,6 +25,9 @@ WORTHWHILE = 0.92
 """So much of their RMS by fixes alone they may have left at most."""
 
 LEAST_HELD_OUT = 4
+LEAST_OFFSET_M = 1e-3
+"""Of a depth that a section as a whole is off by: less stands for none."""
+
 CAUCHY = 2.4
 """Ties that are off by so many deviations count half."""
 
@@ -146,7 +149,7 @@ def adjusted(
         As :func:`thinned` returns them, to about ``cell_m``.
     fixes
     model
-        How positions drift; None: the usual.
+        How positions drift; None: the usual. An error of 0 is one that there is not.
     cell_m, reach_m
         Side of cells that bottoms are compared on; how far a sounding tells of the bottom around it.
     node_s, section_s
@@ -161,19 +164,22 @@ def adjusted(
     Raises
     ------
     ValueError
-        Without a sounding.
+        Without a sounding; for a deviation that is none.
     """
     if not len(soundings):
         raise ValueError("there is no sounding along which a track could be adjusted")
+    if not 0.0 <= offset_sd_m < np.inf:
+        raise ValueError(f"offset_sd_m: {offset_sd_m} is no standard deviation; 0 or more is, 0 for none")
     nodes = Nodes.along(soundings, fixes, node_s)
-    models = DriftModels(nodes, fixes, model or DriftModel())
+    fixes = replace(fixes, sd_m=np.maximum(fixes.sd_m, LEAST_FIX_M))
+    models = DriftModels(nodes, fixes, (model or DriftModel()).usable())
     problem = LeastSquares(nodes, fixes, models.typical())
     by_fixes = problem.solve(WeighedTies.none())
     weights = nodes.interpolation(soundings.vehicle, soundings.time_s)
     dive = nodes.dive[nodes.weights(soundings.vehicle, soundings.time_s)[0][:, 1]]
     sections = Sections.of_tracks(soundings, dive, section_s)
     relief = Relief.of_sections(soundings, sections)
-    matcher = Matcher(soundings, sections, nodes, relief, cell_m, reach_m, apart_s, offset_sd_m)
+    matcher = Matcher(soundings, sections, nodes, relief, cell_m, reach_m, apart_s, max(offset_sd_m, LEAST_OFFSET_M))
     found = _Adjustment(matcher, problem, weights, most_m)
     held = np.arange(len(sections)) % HELD_OUT_EACH == HELD_OUT_EACH // 2
     with ThreadPoolExecutor(THREADS) as pool:

@@ -17,6 +17,19 @@ FACTORS = (0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
 FACTOR_LOG_SD = 1.0
 """Vehicles drift more or less than usual by a factor whose logarithm has this deviation."""
 
+LEAST = {
+    "walk_m": 1e-3,
+    "rate_mph": 1e-3,
+    "rate_time_s": 1e-3,
+    "start_sd_m": 1e-3,
+    "scale_sd": 1e-6,
+    "heading_sd_rad": 1e-6,
+}
+"""What is less stands for none: a millimetre, in an hour or on a way of a kilometre."""
+
+LEAST_FIX_M = 1e-3
+"""The same of a fix."""
+
 RATE_TIMES_S = (200.0, 500.0, 1200.0)
 """So long currents and headings last, about; each is as probable."""
 
@@ -51,6 +64,20 @@ class DriftModel:
     start_sd_m: float = 1.0
     scale_sd: float = 0.003
     heading_sd_rad: float = 0.01
+
+    def usable(self) -> "DriftModel":
+        """Return the same with errors that are not there (0) as small as can be reckoned with.
+
+        Raises
+        ------
+        ValueError
+            For one that is negative or no number.
+        """
+        for name in LEAST:
+            value = getattr(self, name)
+            if not 0.0 <= value < np.inf:
+                raise ValueError(f"{name}: {value} is no standard deviation or time; 0 or more is, 0 for none")
+        return DriftModel(**{name: max(getattr(self, name), least) for name, least in LEAST.items()})
 
     def variants(self) -> list[tuple["DriftModel", float]]:
         """Return the models that may hold where this is what is usual, each with the logarithm of its probability.

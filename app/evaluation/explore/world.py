@@ -12,7 +12,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks, RangeSensor, in_sight, landmark_sets
 from app.evaluation.explore.keep_out import draw_keep_out
 from app.evaluation.explore.team_changes import TeamSchedule, launch_site
-from app.exploration.communication.messages import MAX_LANDMARKS
+from app.exploration.communication.messages import MAX_LANDMARKS, MAX_VEHICLES
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.objective import Objective, ObjectiveWeights, VehicleProgress, objective
@@ -141,6 +141,12 @@ class ExploreScenario:
         count = np.isfinite(self.terrain.z_m).sum() if self.landmarks is None else self.landmarks
         if count > MAX_LANDMARKS:
             raise ValueError(f"capacity: messages can name {MAX_LANDMARKS} landmarks, not {count}; use fewer landmarks")
+        vehicles = self.robots + sum(number for number, _ in self.changes.joining)
+        if vehicles > MAX_VEHICLES:
+            raise ValueError(
+                f"capacity: messages can name {MAX_VEHICLES} vehicles, not {vehicles}; "
+                f"let {vehicles - MAX_VEHICLES} fewer join or take part, or leave the capacity out"
+            )
 
     @cached_property
     def constraints(self) -> Constraints:

@@ -39,7 +39,8 @@ def consistency(runs: int = 100, seed: int = 0) -> list[Consistency]:
         _judge("target, NIS of three ranges", 3, targets[:, 1]),
         _judge("team of three, dead reckoning, NEES", 6, np.array([_team(rng, ranges=False) for rng in rngs])),
         _judge("team of three with ranges and fixes, NEES", 6, np.array([_team(rng, ranges=True) for rng in rngs])),
-        _judge("landmark in three dimensions, NEES", 3, np.array([_landmark(rng) for rng in rngs])),
+        _judge("landmark in three dimensions, NEES", 3, np.array([_landmark(rng, 0.3) for rng in rngs])),
+        _judge("the same, seen from below, NEES", 3, np.array([_landmark(rng, 0.9) for rng in rngs])),
     ]
 
 
@@ -92,16 +93,16 @@ def _team(rng: np.random.Generator, *, ranges: bool) -> float:
     return float(error @ np.linalg.solve(team.covariance[np.ix_(at, at)], error))
 
 
-def _landmark(rng: np.random.Generator) -> float:
-    """Let three vehicles wander above a landmark within sight."""
+def _landmark(rng: np.random.Generator, depth: float) -> float:
+    """Let three vehicles wander about a depth, above or below a landmark within sight."""
     sensor = RangeSensor()
     truth = np.array([[*rng.uniform(-0.1, 0.1, 2), rng.uniform(0.5, 0.7)]])
-    places = np.column_stack([rng.uniform(-0.2, 0.2, (3, 2)), np.full(3, 0.3)])
+    places = np.column_stack([rng.uniform(-0.2, 0.2, (3, 2)), np.full(3, depth)])
     known, estimator = Landmarks3D.unknown(1), Landmark3DEstimator(sensor)
     for _ in range(STEPS):
         move = rng.standard_normal((3, 3))
         places = places + STEP_LENGTH * move / np.linalg.norm(move, axis=1, keepdims=True)
-        places = np.clip(places, [-0.2, -0.2, 0.2], [0.2, 0.2, 0.4])
+        places = np.clip(places, [-0.2, -0.2, depth - 0.1], [0.2, 0.2, depth + 0.1])
         for j in np.flatnonzero(sensor.visible(places, truth)[:, 0]):
             ranges = sensor.measure(places[j], truth, rng)
             known = estimator.update(known, int(j), places[j], np.array([0]), ranges)

@@ -40,8 +40,9 @@ class PlainEkf:
         index: IntArray,
         ranges: FloatArray,
         position_sd_m: float = 0.0,
+        floor_m: float = np.nan,
     ) -> Landmarks3D:
-        """Take in the ranges that one vehicle measured; arguments as for the other estimator."""
+        """Take in the ranges that one vehicle measured; arguments as for the other estimator, the floor left alone."""
         mean, covariance, looks = landmarks.position_m.copy(), landmarks.covariance_m2.copy(), landmarks.looks.copy()
         first = index[looks[index] == 0]
         mean[first] = self.box_m.mean(axis=0)

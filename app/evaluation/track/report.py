@@ -27,6 +27,7 @@ COLUMNS = (
     ("resurfacings", "risings", 1),
     ("needless_resurfacings", "of them needless", 2),
     ("wrongly_accurate_pct", "wrongly in A, %", 2),
+    ("accurate_nees", "NEES of A (3)", 1),
     ("broken_constraints", "limits broken", 1),
 )
 PUBLISHED = {
@@ -77,11 +78,13 @@ def _of(jobs: Sequence[TrackReportJob], runs: Mapping[str, Run], setup: str, pla
 
 
 def _table(of: Mapping[str, Sequence[Run]]) -> list[str]:
-    there = [c for c in COLUMNS if any(run[c[0]] is not None for rows in of.values() for run in rows)]
+    there = [c for c in COLUMNS if any(run.get(c[0]) is not None for rows in of.values() for run in rows)]
     lines = ["| planner | seeds | " + " | ".join(title for _, title, _ in there) + " |"]
     lines.append("|" + " --- |" * (2 + len(there)))
     for planner, rows in of.items():
-        cells = [mean_text([run[name] for run in rows if run[name] is not None], digits) for name, _, digits in there]
+        cells = [
+            mean_text([run[name] for run in rows if run.get(name) is not None], digits) for name, _, digits in there
+        ]
         lines.append(f"| {planner} | {len(rows)} | " + " | ".join(cells) + " |")
     return [*lines, ""]
 

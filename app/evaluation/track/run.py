@@ -20,7 +20,7 @@ SETTLED_AFTER = 100
 """Steps after which the figures of tracking begin."""
 
 CHI3_99 = 3.37
-"""An error norm beyond this many standard deviations happens by chance once in a hundred."""
+"""An error norm beyond this many standard deviations (the same along all axes) happens by chance once in a hundred."""
 
 
 class Chooser(Protocol):
@@ -39,7 +39,9 @@ class TrackRun:
     of all landmarks and targets summed over the steps, J summed over the steps, J at the end, and how many landmarks
     are not accurately known at the end. ``target_tracked_pct`` and ``target_error`` count from step 100 on. A
     ``needless`` rising came before it was needed. ``wrongly_accurate_pct``: landmarks of ``A`` that are farther from
-    their estimates than their deviations explain. ``error`` is the norm of the landmarks' error per step.
+    their estimates than ``CHI3_99`` times the accuracy that ``A`` asks for. ``accurate_nees``: mean squared error of
+    the landmarks of ``A``, normalised by their claimed covariances (3 while these hold, more where the filter is too
+    sure); None where ``A`` is empty. ``error`` is the norm of the landmarks' error per step.
     ``broken_constraints`` counts the steps of single vehicles that broke a limit as they were flown, which may not be
     as they were sent: altimeters lift vehicles off ground that lies higher than estimated.
     """
@@ -64,6 +66,7 @@ class TrackRun:
     resurfacings: int
     needless_resurfacings: int
     wrongly_accurate_pct: float
+    accurate_nees: float | None
     history: list[float]
     error: list[float]
     distance: float
@@ -142,6 +145,7 @@ def run_track(
         resurfacings=world.resurfacings,
         needless_resurfacings=world.needless,
         wrongly_accurate_pct=_wrongly_accurate_pct(world),
+        accurate_nees=_accurate_nees(world),
         history=history,
         error=landmark_error,
         distance=distance,
@@ -158,3 +162,12 @@ def _wrongly_accurate_pct(world: TrackWorld) -> float:
         return 0.0
     beyond = CHI3_99 * world.scenario.accuracy
     return 100.0 * float((world.landmark_errors()[accurate] > beyond).mean())
+
+
+def _accurate_nees(world: TrackWorld) -> float | None:
+    accurate = world.known.accurate
+    if not accurate.any():
+        return None
+    error = world.known.position_m[accurate] - world.truth[accurate]
+    information = np.linalg.pinv(world.known.covariance_m2[accurate], hermitian=True)
+    return float(np.einsum("ki,kij,kj->k", error, information, error).mean())

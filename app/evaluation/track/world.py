@@ -153,7 +153,10 @@ class TrackWorld:
         self.half = np.ones(2) if self._cube is None else self._cube.half
         self.truth = self._scatter(rng)
         self.known = Landmarks3D.unknown(len(self.truth))
-        self.estimator: Landmark3DEstimator | PlainEkf = Landmark3DEstimator(scenario.sensor, scenario.accuracy, NEVER)
+        low, high = self._presumed_area().tolist()
+        self.estimator: Landmark3DEstimator | PlainEkf = Landmark3DEstimator(
+            scenario.sensor, scenario.accuracy, NEVER, tuple(low), tuple(high)
+        )
         if scenario.plain_ekf:
             self.estimator = PlainEkf(
                 scenario.sensor.relative_noise, scenario.accuracy, self._presumed_area(), scenario.fixed_noise
@@ -275,11 +278,11 @@ class TrackWorld:
         self._localize(rng)
         places, fading = self.estimated, self.scenario.fading
         sd = np.zeros(len(places)) if fading is None else self.team.sd_m
+        floor = self._floor_under(places)
         for j, seen in enumerate(self.visible()):
             index = np.flatnonzero(seen)
             ranges = self.scenario.sensor.measure(self.positions[j], self.truth[index], rng)
-            self.known = self.estimator.update(self.known, j, places[j], index, ranges, float(sd[j]))
-        floor = self._floor_under(places)
+            self.known = self.estimator.update(self.known, j, places[j], index, ranges, float(sd[j]), float(floor[j]))
         if self._cube is not None:
             self._felt = np.vstack([self._felt, np.column_stack([places[:, :2], floor])[np.isfinite(floor)]])
         self.presumed.look(places, self._floor_in_cells(floor))

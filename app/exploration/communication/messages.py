@@ -7,10 +7,10 @@ byte   bits content
 ====== ==== ==============================================================================
 0      2    version of the format (1)
 0      1    0: vehicle to station, 1: station to vehicle
-0      1    acknowledgement: the last message of the other side arrived
+0      1    acknowledgement: this step's report arrived, or: the answer to the last report arrived
 0      4    number of neighbours appended (station to vehicle only)
 1      8    number of the vehicle
-2-3    16   step, modulo 65536
+2-3    16   step, modulo 65536; of an order that of the last report that arrived
 4-12   3x24 east, north, depth: the vehicle's own position, or its next waypoint
 13     8    number of entries
 ====== ==== ==============================================================================

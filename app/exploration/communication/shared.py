@@ -4,16 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import BoolArray, FloatArray
 from app.exploration.communication.messages import Entries
+
+WORTH_TELLING = 1.1
+"""An estimate is sent again when its information has changed by this factor since the receiver confirmed it: a look may
+also make it less sure, where it speaks for another depth."""
 
 
 @dataclass
 class Contribution:
     """What one party is known to have found out, (n,) each: ``depth_m`` (0 where nothing) and ``information``.
 
-    A later entry replaces an earlier one, because it sums up all looks of its sender; one that knows less arrived late
-    and is ignored, so information never decreases.
+    A later entry replaces an earlier one, because it sums up all looks of its sender, also where these made it less
+    sure; messages that arrive late are not taken in at all.
     """
 
     depth_m: FloatArray
@@ -26,11 +30,13 @@ class Contribution:
 
     def take(self, entries: Entries) -> None:
         """Take in what the party sent."""
-        information = np.where(np.isfinite(entries.sd_m), 1.0 / entries.sd_m**2, 0.0)
-        more = information >= self.information[entries.index]
-        index = entries.index[more]
-        self.depth_m[index] = entries.depth_m[more]
-        self.information[index] = information[more]
+        self.depth_m[entries.index] = entries.depth_m
+        self.information[entries.index] = np.where(np.isfinite(entries.sd_m), 1.0 / entries.sd_m**2, 0.0)
+
+
+def news(information: FloatArray, confirmed: FloatArray) -> BoolArray:
+    """Return whether information (n,) differs enough from what was ``confirmed`` (n,) to be told again."""
+    return np.asarray((information > WORTH_TELLING * confirmed) | (WORTH_TELLING * information < confirmed))
 
 
 def fuse(contributions: list[Contribution], n: int) -> tuple[FloatArray, FloatArray]:

@@ -18,8 +18,7 @@ from app.exploration.communication.messages import (
     WireFormat,
 )
 from app.exploration.communication.selection import fill, reachable
-from app.exploration.communication.shared import Contribution, fuse
-from app.exploration.communication.vehicle import WORTH_TELLING
+from app.exploration.communication.shared import Contribution, fuse, news
 
 NOTHING = np.zeros(0, dtype=np.int64)
 
@@ -222,16 +221,18 @@ class StationNode:
         )
         neighbours = [k for _, k in by_distance[:MAX_NEIGHBOURS]]
         member.waypoint = np.asarray(waypoint, dtype=np.float64)
-        member.sent = self._choose(number, member)
+        entries, answers = self._choose(number, member), member.heard_at == self._count
+        if answers:
+            member.sent = entries  # vehicles acknowledge the answer to their last report, no other order
         return self._wire.encode_order(
             MoveOrder(
                 member.step,
                 number,
                 waypoint,
-                member.heard_at == self._count,
+                answers,
                 np.array(neighbours, dtype=np.int64),
                 np.array([self.position(k) for k in neighbours]).reshape(-1, 3),
-                member.sent,
+                entries,
             )
         )
 
@@ -254,8 +255,8 @@ class StationNode:
     def _choose(self, number: int, member: _Member) -> Entries:
         others = [self._members[k].reported for k in self.members if k != number]
         depth, information = fuse(others, len(self._xy))
-        news = information > WORTH_TELLING * member.confirmed
-        waiting = np.flatnonzero(~member.finished & (self._known | news))
+        told = news(information, member.confirmed)
+        waiting = np.flatnonzero(~member.finished & (self._known | told))
         distance = np.hypot(*(self._xy[waiting] - member.position[:2]).T)
         chosen = fill(waiting[np.argsort(distance, kind="stable")], self._xy, self._capacity, self._apart_m)
         with np.errstate(divide="ignore"):

@@ -1,6 +1,7 @@
 """A vehicle under limited communication: what it has measured, received, and has yet to report."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,10 +9,18 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.estimation import LandmarkEstimator, Landmarks
 from app.exploration.communication.messages import MAX_ENTRIES, STEPS, Entries, MoveOrder, StatusReport, WireFormat
 from app.exploration.communication.selection import distance_to_receivers, fill
-from app.exploration.communication.shared import Contribution, fuse
+from app.exploration.communication.shared import Contribution, fuse, news
 
-WORTH_TELLING = 1.1
-"""An estimate is sent again when its information has grown by this factor since the receiver confirmed it."""
+REMEMBERED = 16
+"""Reports of which a vehicle still knows what was in them, should an order answer one of them late."""
+
+
+class _Report(NamedTuple):
+    """What was in a report: landmarks (k,), their information as it was sent, and whether they were told as done."""
+
+    landmarks: IntArray
+    information: FloatArray
+    done: BoolArray
 
 
 class VehicleNode:
@@ -65,7 +74,9 @@ class VehicleNode:
         self._confirmed = np.zeros(n)
         self._in_sight = np.zeros(n, dtype=np.bool_)
         self._receivers: FloatArray = np.zeros((0, 3))
-        self._sent = np.zeros(0, dtype=np.int64)
+        self._reports: dict[int, _Report] = {}
+        self._reported: int | None = None
+        self._newest: int | None = None
         self._heard = False
 
     @property
@@ -89,34 +100,48 @@ class VehicleNode:
 
     def report(self, step: int, position: FloatArray) -> bytes:
         """Return the message to the station after the looks of this step."""
-        self._sent = self._choose(position)
-        entries = Entries(
-            self._sent,
-            self.own.depth_m[self._sent],
-            np.sqrt(self.own.variance_m2[self._sent]),
-            self._done[self._sent],
-        )
+        sent = self._choose(position)
+        entries = Entries(sent, self.own.depth_m[sent], np.sqrt(self.own.variance_m2[sent]), self._done[sent])
+        self._reported = step % STEPS
+        self._reports[self._reported] = _Report(sent, 1.0 / self.own.variance_m2[sent], entries.accurate)
+        while len(self._reports) > REMEMBERED:
+            del self._reports[next(iter(self._reports))]
         acknowledges, self._heard = self._heard, False
-        return self._wire.encode_report(StatusReport(step % STEPS, self.number, position, acknowledges, entries))
+        return self._wire.encode_report(StatusReport(self._reported, self.number, position, acknowledges, entries))
 
     def receive(self, message: bytes) -> MoveOrder:
-        """Take in the station's answer to the last report, and return it."""
+        """Take in an order of the station, and return it; one that is older than the newest changes nothing.
+
+        An order names the last report that reached the station: what was in that one is confirmed, and nothing else.
+        Only the answer to the last report is acknowledged in the next one; what came in another is sent again.
+        """
         order = self._wire.decode_order(message)
         if order.vehicle != self.number:
             raise ValueError(f"order: meant for vehicle {order.vehicle}, received by {self.number}")
-        self._heard = True
+        if self._newest is not None and (order.step - self._newest) % STEPS >= STEPS // 2:
+            return order
+        self._newest = order.step
+        self._heard |= order.acknowledges and order.step == self._reported
         self.waypoint = order.waypoint
         self._receivers = order.neighbour_positions
-        if order.acknowledges:
-            self._confirmed[self._sent] = 1.0 / self.own.variance_m2[self._sent]
-            self._settled[self._sent] |= self._done[self._sent]
-        self._sent = np.zeros(0, dtype=np.int64)
+        self._confirm(order.step)
         self._told.take(order.entries)
         finished = order.entries.index[order.entries.accurate]
         self._done[finished] = True
         self._settled[finished] = True  # the station knows already
         self._finish()
         return order
+
+    def _confirm(self, step: int) -> None:
+        """Note that the report of a step has reached the station; earlier ones may be lost."""
+        report = self._reports.get(step)
+        if report is None:
+            return
+        self._confirmed[report.landmarks] = report.information
+        self._settled[report.landmarks] |= report.done
+        while next(iter(self._reports)) != step:
+            del self._reports[next(iter(self._reports))]
+        del self._reports[step]
 
     def _fused(self) -> tuple[FloatArray, FloatArray]:
         own = Contribution(np.nan_to_num(self.own.depth_m), 1.0 / self.own.variance_m2)
@@ -128,10 +153,9 @@ class VehicleNode:
 
     def _choose(self, position: FloatArray) -> IntArray:
         information = 1.0 / self.own.variance_m2
-        news = information > WORTH_TELLING * self._confirmed
         sendable = self.own.variance_m2 < self._wire.largest_sd_m**2
         finished = self._done & ~self._settled & self.own.seen
-        unfinished = ~self._done & news & sendable
+        unfinished = ~self._done & news(information, self._confirmed) & sendable
         waiting = np.flatnonzero(finished | unfinished)
         receivers = self._receivers if len(self._receivers) else position[None]
         distance = distance_to_receivers(self.own.xy_m[waiting], receivers[:, :2])

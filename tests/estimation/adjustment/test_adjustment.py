@@ -1,6 +1,7 @@
 """Tracks are adjusted where the terrain tells by how much, and only there."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,38 @@ def test_a_flat_bottom_tells_nothing() -> None:
 def test_nothing_is_adjusted_without_soundings() -> None:
     with pytest.raises(ValueError, match="no sounding"):
         adjusted(TrackSoundings.joined([]), Fixes.none())
+
+
+NONE = ("walk_m", "rate_mph", "rate_time_s", "start_sd_m", "scale_sd", "heading_sd_rad")
+
+
+@pytest.mark.parametrize("none", [*((name,) for name in NONE), NONE])
+def test_an_error_that_there_is_not_is_left_out(none: tuple[str, ...]) -> None:
+    """As a very small one is."""
+    soundings, fixes = swaths(flat)
+    soundings = soundings.take(np.flatnonzero(soundings.vehicle == 1)[::10])
+    found = adjusted(soundings, fixes, replace(DriftModel(), **dict.fromkeys(none, 0.0)))
+    near = adjusted(soundings, fixes, replace(DriftModel(), **dict.fromkeys(none, 1e-5)))
+    assert np.isfinite(found.offset_m).all()
+    assert (found.sd_m > 0.0).all()
+    np.testing.assert_allclose(found.sd_m, near.sd_m, rtol=0.05, atol=0.01)
+
+
+def test_fixes_and_sections_without_an_error_are_taken_at_their_word() -> None:
+    soundings, fixes = swaths(hills)
+    soundings = soundings.take(np.flatnonzero(soundings.vehicle == 1)[::10])
+    found = adjusted(soundings, replace(fixes, sd_m=np.zeros(3)), offset_sd_m=0.0)
+    assert np.isfinite(found.offset_m).all()
+    assert (found.sd_m > 0.0).all()
+
+
+@pytest.mark.parametrize("name", NONE)
+def test_a_deviation_that_is_none_is_refused_by_name(name: str) -> None:
+    soundings, fixes = swaths(flat)
+    with pytest.raises(ValueError, match=f"{name}: -1.0 is no"):
+        adjusted(soundings, fixes, replace(DriftModel(), **{name: -1.0}))
+    with pytest.raises(ValueError, match="offset_sd_m: nan is no"):
+        adjusted(soundings, fixes, offset_sd_m=np.nan)
 
 
 @settings(max_examples=10, deadline=None)

@@ -17,8 +17,9 @@ from app.evaluation.cli import evaluate_app
 from app.evaluation.track import consistency
 from app.evaluation.track.plain_ekf import PlainEkf
 from app.evaluation.track.presumed import Presumed
+from app.evaluation.track.report import markdown
 from app.evaluation.track.run import run_track
-from app.evaluation.track.setups import TrackJob
+from app.evaluation.track.setups import TrackJob, experiments, report_jobs
 from app.evaluation.track.trace_greedy import foretold_trace
 from app.evaluation.track.world import TrackScenario, TrackWorld
 from app.exploration.core.problem import Proposal
@@ -148,6 +149,41 @@ def test_a_filter_that_takes_its_noise_to_be_fixed_believes_ranges_from_afar_too
     assert np.trace(believes.covariance_m2[0]) < np.trace(knows.covariance_m2[0])
 
 
+@pytest.mark.parametrize(("part", "expected"), [(1.0, 3.0), (0.2, 75.0)])
+def test_a_run_tells_whether_claimed_deviations_hold(part: float, expected: float) -> None:
+    """Claimed at a fifth, deviations make the normalised squared error 25 times as large; all errors stay small."""
+
+    class Known(TrackWorld):
+        def sense(self, rng: np.random.Generator) -> None:
+            n = len(self.truth)
+            covariance = np.repeat((part * 0.02) ** 2 * np.eye(3)[None], n, axis=0)
+            place = self.truth + 0.02 * np.random.default_rng(0).standard_normal((n, 3))
+            known = Landmarks3D.unknown(n)
+            self.known = replace(known, position_m=place, covariance_m2=covariance, accurate=np.arange(n) > 20)
+
+    with patch("app.evaluation.track.run.TrackWorld", Known):
+        run = run_track(replace(SMALL, steps=1), "lawnmower", OPTIONS)
+    assert run.accurate_nees == pytest.approx(expected, rel=0.2)
+    assert run.wrongly_accurate_pct == 0.0
+
+
+def test_who_knows_nothing_accurately_has_no_deviations_to_hold() -> None:
+    assert run_track(replace(SMALL, steps=1), "random", OPTIONS).accurate_nees is None
+
+
+def test_runs_that_were_kept_without_a_figure_are_reported_too() -> None:
+    experiment = experiments(12)[0]
+    jobs = list(report_jobs([experiment], FLOOR, [0, 1], 5))
+    job = next(job for job in jobs if job.planner == "random")
+    kept = {**asdict(run_track(SMALL, "random", OPTIONS)), "key": job.key}
+    del kept["accurate_nees"]
+    text = markdown(jobs, {job.key: kept}, [experiment], {}, [], {})
+    assert "NEES of A" not in text
+    text = markdown(jobs, {job.key: {**kept, "accurate_nees": 3.21}}, [experiment], {}, [], {})
+    assert "| NEES of A (3) |" in text
+    assert "| 3.2 |" in text
+
+
 def test_runs_that_were_kept_before_a_scenario_learned_more_are_found_again() -> None:
     assert "fixed_noise" not in TrackJob("figure1", "cao", SMALL, OPTIONS).key
     assert "fixed_noise" in TrackJob("figure1", "cao", replace(SMALL, fixed_noise=0.1), OPTIONS).key
@@ -178,7 +214,7 @@ def test_a_report_is_made_taken_up_again_and_counts_what_is_missing(
     lines = (tmp_path / "tracking.jsonl").read_text().splitlines()
     assert len(lines) == 1
     assert "incomplete" not in (tmp_path / "tracking.md").read_text()
-    assert (tmp_path / "tracking.md").read_text().count("| 4 |") == 5
+    assert (tmp_path / "tracking.md").read_text().count("| 4 |") == 6
     assert call(*arguments, "0:2", "--no-run").exit_code == 0
     assert "1 of 2 runs are still missing" in (tmp_path / "tracking.md").read_text()
     assert (tmp_path / "tracking.jsonl").read_text().splitlines() == lines

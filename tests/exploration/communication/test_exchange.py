@@ -1,6 +1,7 @@
 """Vehicles and station together, over links that lose messages."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -256,3 +257,115 @@ def test_an_order_for_another_vehicle_is_refused() -> None:
     fleet.exchange()
     with pytest.raises(ValueError, match="meant for vehicle 1, received by 0"):
         fleet.vehicles[0].receive(fleet.station.order(1, fleet.positions[1]))
+
+
+def alone(*, capacity: int = 10) -> tuple[Fleet, Any, Any]:
+    """One vehicle that has looked often at one half of the landmarks, its report of step 1 arrived; the order to it."""
+    fleet = Fleet(9, vehicles=1, capacity=capacity)
+    look(fleet, np.arange(30))
+    fleet.station.begin()
+    fleet.station.receive(fleet.vehicles[0].report(1, fleet.positions[0]))
+    fleet.station.conclude()
+    return fleet, fleet.vehicles[0], fleet.station.order(0, np.array([0.1, 0.0, 0.3]))
+
+
+def look(fleet: Fleet, index: Any) -> None:
+    """Let the vehicle range to landmarks from many places, without a word."""
+    for _ in range(60):
+        place = np.array([*fleet.rng.uniform(-0.3, 0.3, 2), fleet.rng.uniform(0.2, 0.4)])
+        fleet.vehicles[0].sense(place, index, SENSOR.measure(place, fleet.truth[index], fleet.rng))
+
+
+def told_in(message: bytes) -> set[int]:
+    return set(WIRE.decode_report(message).entries.index.tolist())
+
+
+def test_a_late_order_does_not_confirm_a_newer_report_that_was_lost() -> None:
+    fleet, vehicle, late = alone()
+    arrived = set(np.flatnonzero(np.isfinite(fleet.station.known_sd_m)))
+    look(fleet, np.arange(30, 60))
+    lost = told_in(vehicle.report(2, fleet.positions[0])) - arrived
+    assert lost
+    vehicle.receive(late)
+    for step in range(3, 40):
+        fleet.station.begin()
+        fleet.station.receive(vehicle.report(step, fleet.positions[0]))
+        fleet.station.conclude()
+        vehicle.receive(fleet.station.order(0, fleet.positions[0]))
+    assert np.isfinite(fleet.station.known_sd_m[sorted(lost)]).all()
+
+
+def test_a_late_order_confirms_the_report_that_it_answers_as_it_was() -> None:
+    fleet, vehicle, late = alone()
+    first = set(np.flatnonzero(np.isfinite(fleet.station.known_sd_m)))
+    again = told_in(vehicle.report(2, fleet.positions[0]))
+    assert again == first  # not confirmed yet
+    vehicle.receive(late)
+    assert not told_in(vehicle.report(3, fleet.positions[0])) & first
+    other, vehicle, late = alone(capacity=1)
+    told = np.flatnonzero(np.isfinite(other.station.known_sd_m))
+    sent = 1.0 / vehicle.own.variance_m2[told]
+    look(other, told)  # what is learned after the report, the station does not know
+    vehicle.receive(late)
+    np.testing.assert_array_equal(vehicle._confirmed[told], sent)
+
+
+@pytest.mark.parametrize("step", [5, 65_534])
+def test_orders_older_than_the_newest_are_ignored(step: int) -> None:
+    """Also where the count of steps begins anew."""
+    fleet = Fleet(4, vehicles=1)
+    vehicle, goals = fleet.vehicles[0], [np.array([0.1 * k, 0.0, 0.3]) for k in range(4)]
+    orders = []
+    for k, goal in enumerate(goals):
+        fleet.sense()
+        fleet.station.begin()
+        fleet.station.receive(vehicle.report(step + k, fleet.positions[0]))
+        fleet.station.conclude()
+        orders.append(fleet.station.order(0, goal))
+    for taken, expected in ((1, 1), (0, 1), (3, 3), (2, 3), (3, 3)):
+        vehicle.receive(orders[taken])
+        np.testing.assert_allclose(vehicle.waypoint, goals[expected], atol=1e-6)
+
+
+def test_what_came_in_a_late_order_is_not_taken_for_what_came_in_the_last_one() -> None:
+    """The vehicle acknowledges nothing but the answer to its last report, so that the station sends the rest again."""
+    fleet = Fleet(3, vehicles=2)
+    for _ in range(3):
+        fleet.move()
+        fleet.sense()
+        fleet.exchange()
+    vehicle = fleet.vehicles[0]
+    orders = []
+    for _ in range(2):
+        fleet.step += 1
+        fleet.station.begin()
+        for each in fleet.vehicles:
+            fleet.station.receive(each.report(fleet.step, fleet.positions[each.number]))
+        fleet.station.conclude()
+        orders.append(fleet.station.order(0, fleet.positions[0]))
+    vehicle.receive(orders[0])
+    assert not WIRE.decode_report(vehicle.report(fleet.step + 1, fleet.positions[0])).acknowledges
+    fleet.station.order(0, fleet.positions[0])  # nothing heard: no answer to a report
+    vehicle.report(fleet.step + 2, fleet.positions[0])
+    fleet.exchange()
+    assert WIRE.decode_report(vehicle.report(fleet.step + 1, fleet.positions[0])).acknowledges
+
+
+def test_who_becomes_less_sure_says_so_and_is_believed() -> None:
+    """Looks may speak for another depth than those before: the station and the others then know less, too."""
+    fleet = Fleet(10, vehicles=2, n=1)
+    first, second = fleet.vehicles
+
+    def know(depth: float, sd: float) -> None:
+        first.own = replace(first.own, depth_m=np.array([depth]), variance_m2=np.array([sd**2]))
+        for _ in range(3):
+            fleet.exchange()
+
+    for depth, sd in ((0.6, 0.03), (0.4, 0.09), (0.4, 0.04)):
+        know(depth, sd)
+        assert fleet.station.depth_m[0] == pytest.approx(depth, abs=1e-3)
+        assert fleet.station.known_sd_m[0] == pytest.approx(sd, rel=0.05)
+        assert second.knowledge.depth_m[0] == pytest.approx(depth, abs=1e-3)
+        assert np.sqrt(second.knowledge.variance_m2[0]) == pytest.approx(sd, rel=0.1)
+    know(0.4, 0.0405)
+    assert not told_in(first.report(99, fleet.positions[0]))  # no news
