@@ -920,7 +920,7 @@ async def test_missions_are_listed_newest_first_and_survive_leaving_memory(servi
 
 
 async def test_readiness_and_planners(service: MissionService) -> None:
-    assert await service.ready() == (True, {"links": "ok", "database": "ok"})
+    assert await service.ready() == (True, {"links": "ok", "watch": "ok", "database": "ok"})
     planners = {planner.name: planner for planner in planner_views()}
     assert set(planners) == {*PLANNERS, *COVERERS}
     assert all(planner.summary and "properties" in planner.options for planner in planners.values())
