@@ -239,7 +239,7 @@ class TargetEstimator:
         """
         anywhere = self._anywhere()
         bend_m = anywhere.parts_m**2 / (3.0 * max(range_m, NEAREST_M))
-        if not (anywhere.parts_m > WIDE * range_m > 0.0 or bend_m > sd_m > 0.0):
+        if not (range_m > 0.0 and (anywhere.parts_m > WIDE * range_m or bend_m > sd_m > 0.0)):
             return anywhere
         parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2], straight=True)
         low, high = np.array(self.low_m[:2]), np.array(self.high_m[:2])

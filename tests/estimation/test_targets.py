@@ -236,3 +236,11 @@ def test_no_range_makes_a_filter_that_is_none(place: Any, measured: float, seed:
             assert np.linalg.eigvalsh(P).min() > -1e-9 * np.abs(P).max()
         place, measured = tuple(np.array(place) + rng.normal(0, 30, 3)), float(rng.uniform(1e-3, 900.0))
         track = estimator.predict(track, 5.0)
+
+
+def test_a_range_of_nothing_leaves_a_filter_that_goes_on() -> None:
+    estimator, place, blur = close_by(), np.array([[0.0, 0.0, 5.0]]), np.full((1, 3), 0.25)
+    track = estimator.update(TargetTrack.unknown(), place, np.zeros(1), blur)
+    track = estimator.update(track, place, np.ones(1), blur)
+    assert np.isfinite(track.state).all()
+    assert np.isfinite(track.sd_m).all()

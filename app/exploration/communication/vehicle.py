@@ -110,9 +110,10 @@ class VehicleNode:
         return self._wire.encode_report(StatusReport(self._reported, self.number, position, acknowledges, entries))
 
     def receive(self, message: bytes) -> MoveOrder:
-        """Take in an order of the station, and return it; one that is older than the newest changes nothing.
+        """Take in an order of the station, and return it; one that answers an earlier report changes nothing.
 
         An order names the last report that reached the station: what was in that one is confirmed, and nothing else.
+        Orders that name the same one follow each other as they arrive.
         Only the answer to the last report is acknowledged in the next one; what came in another is sent again.
         """
         order = self._wire.decode_order(message)

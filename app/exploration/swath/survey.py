@@ -111,7 +111,8 @@ class SwathSurvey:
         reach_m
             Lines farther away than this take more than one leg to get to.
         """
-        self._sweeps = {name: sweep for name, sweep in self._sweeps.items() if name in team}
+        for name in self._sweeps.keys() - team.keys():
+            self._return_crossline(self._sweeps.pop(name))
         for name in team:
             self._sweeps.setdefault(name, Assignment())
         sweep = self._sweeps[vehicle]
@@ -156,9 +157,13 @@ class SwathSurvey:
                 sweep.course.path = np.vstack([piece, sweep.course.path[1:]])
         sweep.refused = 0
         if not keeps_line:
-            if sweep.course is not None and sweep.course.sign == 0 and self._across is not None:
-                self._across.append(sweep.course.path)
+            self._return_crossline(sweep)
             sweep.course = None
+
+    def _return_crossline(self, sweep: Assignment) -> None:
+        """Let somebody else fly what is left of a line across all others; what other lines see shows by itself."""
+        if sweep.course is not None and sweep.course.sign == 0 and self._across is not None:
+            self._across.append(sweep.course.path)
 
     def skip_line(self, vehicle: str, here_m: FloatArray) -> bool:
         """Leave out what is left of a vehicle's line, from where it is (2,); returns False where it has none."""

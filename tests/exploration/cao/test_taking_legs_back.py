@@ -64,6 +64,21 @@ def test_legs_of_one_vehicle_are_taken_back_while_the_others_keep_theirs() -> No
     assert after["flown_m"] < before["flown_m"]
 
 
+def test_legs_of_who_left_before_go_the_way_of_its_rest() -> None:
+    """A vehicle that was out of reach while its rest was handed on is taken out with legs that it did not fly."""
+    planner, both = surveyor(), make_situation()
+    ends_m = flown(planner, both, 3)[-1][1:, :2]
+    alone = make_situation(vehicles=both.vehicles[:1])
+    flown(planner, alone, 1)
+    planner.put_back(both.vehicles[1], ends_m, None)
+    for routes in (memory(planner)["plan"], memory(planner)["backbone"]):
+        assert routes[both.vehicles[1]] == ends_m.tolist()
+    flown(planner, alone, 1)
+    assert memory(planner)["plan"].keys() == set(alone.vehicles)
+    backbone_m = np.array(memory(planner)["backbone"][both.vehicles[0]])
+    assert np.abs(backbone_m - ends_m).sum(axis=1).min() < 1e-6
+
+
 def test_more_than_was_given_is_not_taken_back() -> None:
     situation, planner = make_situation(), surveyor()
     flown(planner, situation, 2)

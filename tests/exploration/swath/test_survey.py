@@ -532,3 +532,24 @@ def test_what_is_left_out_of_a_line_is_not_seen_and_all_else_is(skips: bool) -> 
     assert (missing > 200) is skips
     assert missing < 0.1 * sea.seen.size
     assert not survey.skip_line("a", pose[:2]), "it is on no line any more"
+
+
+def test_a_crossline_of_who_leaves_is_flown_by_another() -> None:
+    sea = Sea(np.full((120, 200), 8.0))
+    sea.seen[:] = True
+    corner = np.array([2.0, 2.0, np.nan])
+
+    def flown_m(leaves_after: int) -> float:
+        """How far a second vehicle flies once a first one has got so many legs, and flew none of them."""
+        survey = SwathSurvey(0.0, 1.0, 8.0, 0.3)
+        for _ in range(leaves_after):
+            assert survey.next_leg("a", corner, FLYING, sea.coverage(), {"a": corner}, 20.0) is not None
+            survey.put_back("a", corner[None, :2], keeps_line=True)
+        pose, length_m = corner, 0.0
+        while (end := survey.next_leg("b", pose, FLYING, sea.coverage(), {"b": pose}, 20.0)) is not None:
+            length_m += float(np.hypot(*(end - pose[:2])))
+            pose = np.array([*end, math.atan2(*(end - pose[:2]))])
+        return length_m
+
+    assert flown_m(0) > 100.0
+    assert flown_m(1) >= 0.95 * flown_m(0)

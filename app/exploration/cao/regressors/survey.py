@@ -272,8 +272,11 @@ class SurveyRegressors:
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
-        if vehicle not in self._plan or vehicle not in self._backbone:
+        if not self._plan:
             return
+        # Its rest may be handed on already: then this is, too.
+        for routes in (self._plan, self._backbone):
+            routes.setdefault(vehicle, np.zeros((0, 2)))
         given = self._given.get(vehicle, [])
         last = np.array([leg.end_m for leg in given[-len(ends_m) :]]).reshape(-1, 2)
         known = len(ends_m) > 0 and last.shape == ends_m.shape and bool(np.allclose(last, ends_m, atol=SAME_M))

@@ -59,8 +59,12 @@ class UnflownLegs:
     # Lines that vehicles left
 
     def add_left_line(self, vehicle: str, place_m: FloatArray, ends_m: Ends) -> None:
-        """Note where a vehicle that surveys no more left its line, (2,), and the legs that it had."""
-        self._left_lines[vehicle] = place_m, _stacked(ends_m)
+        """Note where a vehicle that surveys no more left its line, (2,), and the legs that it had.
+
+        Of one that comes back and leaves again before the planner is told, the place counts where it first left.
+        """
+        place_m, before_m = self._left_lines.get(vehicle, (place_m, _stacked([])))
+        self._left_lines[vehicle] = place_m, np.vstack([before_m, _stacked(ends_m)])
 
     @property
     def any_left_line(self) -> bool:

@@ -42,6 +42,14 @@ def test_an_order_that_is_planned_anew_leaves_other_legs_as_they_are() -> None:
     assert not legs.is_barred_end("b", C)
 
 
+def test_who_leaves_twice_before_the_planner_is_told_leaves_nothing_out() -> None:
+    legs = UnflownLegs()
+    legs.add_left_line("a", A, [B, C])
+    legs.add_left_line("a", C, [])
+    ((_, place_m, ends_m),) = legs.take_left_lines()
+    assert (place_m.tolist(), ends_m.tolist()) == (A.tolist(), [B.tolist(), C.tolist()])
+
+
 def test_who_had_no_legs_may_have_left_a_line() -> None:
     legs = UnflownLegs()
     assert not legs.any_left_line
