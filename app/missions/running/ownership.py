@@ -127,7 +127,7 @@ class Ownership:
         await self._membership.leave()
 
     async def look(self) -> Sequence[str]:
-        """Look who lives. Returns the missions at sea that nobody has, oldest first.
+        """Look who lives. Returns the missions at sea that nobody has, or this process, oldest first.
 
         Raises
         ------
@@ -151,7 +151,7 @@ class Ownership:
             if row.id in alive and row.id != self._number
         }
         async with self._apart.reading() as session:
-            return await processes.orphans(session, AT_SEA)
+            return await processes.open_to(session, AT_SEA, self._number)
 
     async def owner(self, mission_id: str) -> Peer | None:
         """Return the other process that has a mission; None when it is ours, nobody's or unknown.

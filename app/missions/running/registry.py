@@ -102,9 +102,13 @@ class MissionRegistry:
         """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
         return None if mission_id in self._live else self._ended.get(mission_id)
 
+    def missing(self, mission_ids: Sequence[str]) -> list[str]:
+        """Return those of some missions that are not in memory, in the same order."""
+        return [one for one in mission_ids if one not in self._live]
+
     async def recall(self, mission_ids: Sequence[str]) -> None:
         """Learn how missions stood that left memory in an earlier run, or in another process."""
-        await self._ended.recall([one for one in mission_ids if one not in self._live])
+        await self._ended.recall(self.missing(mission_ids))
 
     async def check_exists(self, mission_id: str) -> None:
         """Raise MissionNotFoundError where there is no such mission; it is not taken up."""
@@ -128,6 +132,8 @@ class MissionRegistry:
 
     async def get(self, mission_id: str) -> LiveMission:
         """Return a mission, taken up if need be.
+
+        One that was taken and could not be loaded stays this process's: at sea, its watch takes it up again.
 
         Raises
         ------
@@ -153,14 +159,11 @@ class MissionRegistry:
                     row = await session.get_one(MissionRow, mission_id)
             with _opening(mission_id):
                 live = await take_up(database, self._hub, self._threads, row, self._ping_files, self._time_scale)
-            if row.summary is not None:
-                await store_summary(live, None)
-            live.ships.traffic = self._traffic
-            if self._compute is not None:
-                live.compute_by(self._compute)
-            if self._ownership is not None:
-                await live.pings.tidy()
-            await self._make_room()
+            try:
+                await self._complete(live, row)
+            except BaseException:
+                live.abandon("it could not be taken up")
+                raise
             self._live[mission_id] = live
             self._ended.forget(mission_id)
             self._maps.take_up(live)
@@ -169,6 +172,17 @@ class MissionRegistry:
                 self._maps.survey(live)
             await self._taken_up(live)
             return live
+
+    async def _complete(self, live: LiveMission, row: MissionRow) -> None:
+        """Do what is left before a mission that was opened may be in memory."""
+        if row.summary is not None:
+            await store_summary(live, None)
+        live.ships.traffic = self._traffic
+        if self._compute is not None:
+            live.compute_by(self._compute)
+        if self._ownership is not None:
+            await live.pings.tidy()
+        await self._make_room()
 
     async def _was_removed(self, live: LiveMission) -> bool:
         """Tell whether a mission that ended is stored no more, and put it away then."""

@@ -10,8 +10,9 @@ import pytest
 from sqlalchemy import text
 
 from app.missions.errors import ConflictError, MissionElsewhereError, ProcessApartError
+from app.missions.live.load import take_up
 from app.missions.operations.history import events_after
-from app.missions.running import registry
+from app.missions.running import failover, registry
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.states import MissionState
@@ -274,6 +275,57 @@ async def test_a_mission_that_cannot_be_read_for_a_while_does_not_hold_up_who_ta
             await until(begun, "one of them takes it up")
             for service in services:
                 await looks(url, service.process.number, 2)
+
+
+@pytest.mark.parametrize("trouble", [asyncio.CancelledError, OSError, ValueError])
+async def test_a_mission_that_could_not_be_loaded_is_taken_up_when_the_watch_looks_again(
+    two: tuple[Harbour, Harbour], monkeypatch: pytest.MonkeyPatch, trouble: type[BaseException]
+) -> None:
+    """It is its process's by then: no other one would take it up."""
+    times = 0
+
+    async def once_in_trouble(*arguments: Any) -> Any:
+        nonlocal times
+        times += 1
+        if times == 1:
+            raise trouble
+        return await take_up(*arguments)
+
+    one, other = [await harbour.open() for harbour in two]
+    mission = (await one.create(sim_spec(steps=500))).id
+    await act(one, mission, "start")
+    monkeypatch.setattr(registry, "take_up", once_in_trouble)
+    monkeypatch.setattr(failover, "AGAIN_S", 0.0, raising=False)
+    await two[0].close()
+    await until(lambda: mission in other._runs, "the other process flies it", 20.0)
+    assert times == 2
+
+
+async def test_a_process_whose_first_missions_are_cancelled_takes_them_up_later(
+    open_service: Callable[[], Harbour], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    harbour = open_service()
+    service = await harbour.open()
+    mission = (await service.create(sim_spec(steps=500))).id
+    await act(service, mission, "start")
+    await harbour.close()
+    times = 0
+
+    async def cancelled(*arguments: Any) -> Any:
+        nonlocal times
+        times += 1
+        if times > 1:
+            return await take_up(*arguments)
+        service = harbour.service
+        taking = service._failover._taking
+        assert taking is not None
+        await service._failover._stand_aside()
+        # The watch comes back meanwhile, and finds it cancelled, not ended.
+        return await asyncio.Event().wait()
+
+    monkeypatch.setattr(registry, "take_up", cancelled)
+    service = await harbour.open()
+    await until(lambda: mission in service._runs, "it flies", 20.0)
 
 
 async def test_a_watch_that_ended_is_told_of_and_begun_again(harbour: Harbour) -> None:
