@@ -60,8 +60,6 @@ class Failover:
         self._failed_s: dict[str, float] = {}
         """When a mission could not be taken up, by the fault of none but itself."""
         self._telling: set[asyncio.Task[None]] = set()
-        self._aside = False
-        """Whether the vehicles are stopped, because others may take this process for dead."""
         self._trouble = "did not begin yet"
 
     @property
@@ -138,14 +136,14 @@ class Failover:
                 pass
             self._ownership.called.clear()
             try:
-                if self._aside:
+                if self._ownership.aside:
                     await self._come_back()
                 missions = self._left_over(await self._ownership.look())
                 if missions and (self._taking is None or self._taking.done()):
                     self._taking = asyncio.create_task(self._try_to_take_up(missions), name="taking up")
             except MembershipLostError as error:
                 self._trouble = f"others may take this process for dead: {error}"
-                if self._aside:
+                if self._ownership.aside:
                     log.error("not among the living yet", error=str(error))
                 else:
                     log.error("others may take this process for dead: its vehicles are stopped", error=str(error))
@@ -194,7 +192,7 @@ class Failover:
 
     async def _stand_aside(self) -> None:
         """Stop the vehicles before others take the missions up. Raises nothing: the watch goes on."""
-        self._aside = True
+        self._ownership.aside = True
         if self._taking is not None:
             self._taking.cancel()
         ours = [live for live in self._registry if live.id in self._supervisor.runs]
@@ -207,7 +205,7 @@ class Failover:
     async def _come_back(self) -> None:
         """Go on as soon as that is allowed again. Raises MembershipLostError as long as it is not."""
         unchanged = await self._ownership.enter()
-        self._aside = False
+        self._ownership.aside = False
         if not unchanged:
             try:
                 for live in self._registry:

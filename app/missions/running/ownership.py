@@ -54,6 +54,10 @@ class Ownership:
         What others show who send a request on to this process.
     called
         Set when another process says that something changed.
+    aside
+        Whether others may take this process for dead: its vehicles are stopped, and no other begins to fly.
+    entries
+        How often this process became a new one. SQLite gives numbers again that others had.
     """
 
     def __init__(self, database: Database, url: str, certificate: str | None = None) -> None:
@@ -63,6 +67,8 @@ class Ownership:
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
         self.called = asyncio.Event()
+        self.aside = False
+        self.entries = 0
         self._membership = make_membership(database.url, self.called.set, database.application_name)
         self._number = 0
         self._mine: set[str] = set()
@@ -95,6 +101,7 @@ class Ownership:
             await self._membership.enter(self._number)
             if await self._is_known():
                 return True
+        self.entries += 1
         self._mine.clear()
         for _ in range(TRIES):
             row = ProcessRow(url=self._url, secret=self.secret, certificate=self._certificate, began_at=now())
@@ -173,6 +180,11 @@ class Ownership:
             except MembershipLostError as error:
                 raise _apart() from error
         return self._peers.get(number)
+
+    def check_together(self, entries: int) -> None:
+        """Raise ProcessApartError where this process stands aside, or is a new one since it had entered so often."""
+        if self.aside or entries != self.entries:
+            raise _apart()
 
     async def take(self, mission_id: str) -> bool:
         """Have a mission from now on; False when another process has it. Raises ProcessApartError."""

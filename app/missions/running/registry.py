@@ -150,7 +150,10 @@ class MissionRegistry:
             if row is None:
                 raise _not_found(mission_id)
             database = self._database
+            entries = 0
             if self._ownership is not None:
+                entries = self._ownership.entries
+                self._ownership.check_together(entries)
                 if not (await self._may_take_up(row) and await self._ownership.take(mission_id)):
                     raise MissionElsewhereError(f"another process has mission {mission_id}", "ask again in a moment")
                 database = database.guarded(self._ownership.guard(mission_id))
@@ -161,6 +164,9 @@ class MissionRegistry:
                 live = await take_up(database, self._hub, self._threads, row, self._ping_files, self._time_scale)
             try:
                 await self._complete(live, row)
+                if self._ownership is not None:
+                    # Others may have it meanwhile. From here until its vehicles fly nothing is waited for.
+                    self._ownership.check_together(entries)
             except BaseException:
                 live.abandon("it could not be taken up")
                 raise

@@ -328,6 +328,43 @@ async def test_a_process_whose_first_missions_are_cancelled_takes_them_up_later(
     await until(lambda: mission in service._runs, "it flies", 20.0)
 
 
+@pytest.mark.parametrize("comes_back", [False, True])
+async def test_what_a_request_takes_up_does_not_fly_where_others_may_have_it_meanwhile(
+    open_service: Callable[[], Harbour], monkeypatch: pytest.MonkeyPatch, *, comes_back: bool
+) -> None:
+    harbour = open_service()
+    service = await harbour.open()
+    watch = service._failover
+    mission = (await service.create(sim_spec(steps=500))).id
+    await act(service, mission, "start")
+    await watch.end()  # the test looks in its place
+    live = await service.get(mission)
+    await service._supervisor.halt(live)
+    service._claims.release_team(live)
+    service._registry.drop()
+    begun, go_on = asyncio.Event(), asyncio.Event()
+
+    async def slow(*arguments: Any) -> Any:
+        begun.set()
+        await go_on.wait()
+        return await take_up(*arguments)
+
+    monkeypatch.setattr(registry, "take_up", slow)
+    asking = asyncio.create_task(service.get(mission))
+    await begun.wait()
+    await watch._stand_aside()
+    if comes_back:
+        await asyncio.to_thread(query, harbour.database.url, "delete from processes")
+        await watch._come_back()
+    go_on.set()
+    with pytest.raises((ProcessApartError, MissionElsewhereError)):
+        await asking
+    assert mission not in service._runs
+    assert list(service._registry) == []
+    watch._begin_watch()
+    await until(lambda: mission in service._runs, "it flies again", 20.0)
+
+
 async def test_a_watch_that_ended_is_told_of_and_begun_again(harbour: Harbour) -> None:
     (watch,) = [task for task in asyncio.all_tasks() if task.get_name() == "watch"]
     watch.cancel()
