@@ -7,8 +7,10 @@ What an owner writes for a mission carries a guard, so that a process that was t
 
 import asyncio
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
@@ -26,6 +28,8 @@ PERIOD_S = 1.0
 
 TRIES = 5
 """Entering is tried again when another process looks at the wrong moment."""
+
+T = TypeVar("T")
 
 log = structlog.get_logger(__name__)
 
@@ -116,8 +120,17 @@ class Ownership:
         raise MembershipLostError(f"this process was taken for dead {TRIES} times while it began")
 
     async def _is_known(self) -> bool:
-        async with self._apart.reading() as session:
+        async def there(session: AsyncSession) -> bool:
             return await session.get(ProcessRow, self._number) is not None
+
+        return await self._ask(there)
+
+    async def _ask(self, query: Callable[[AsyncSession], Awaitable[T]]) -> T:
+        """Return what a query gives. Raises MembershipLostError where the answer does not come in time."""
+        try:
+            return await self._database.answer(self._membership.answer_s, query)
+        except TimeoutError as error:
+            raise MembershipLostError(f"the database does not answer: {error or type(error).__name__}") from error
 
     async def leave(self) -> None:
         """Give everything up and tell the others."""
@@ -141,8 +154,7 @@ class Ownership:
         MembershipLostError
             When the others may take this process for dead.
         """
-        async with self._apart.reading() as session:
-            known = await processes.all_processes(session)
+        known = await self._ask(processes.all_processes)
         alive = await self._membership.alive([row.id for row in known])
         if self._number not in alive:
             raise MembershipLostError("this process was taken for dead")
@@ -157,8 +169,7 @@ class Ownership:
             for row in known
             if row.id in alive and row.id != self._number
         }
-        async with self._apart.reading() as session:
-            return await processes.open_to(session, AT_SEA, self._number)
+        return await self._ask(partial(processes.open_to, states=AT_SEA, process=self._number))
 
     async def owner(self, mission_id: str) -> Peer | None:
         """Return the other process that has a mission; None when it is ours, nobody's or unknown.

@@ -23,6 +23,7 @@ from app.storage.processes.membership import HEARD
 from app.storage.upkeep import migrate
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
+from tests.support.storage.cable import cable_to
 from tests.support.storage.databases import Databases, postgres_server, query
 from tests.support.waiting import until
 
@@ -184,6 +185,24 @@ async def test_a_database_that_goes_away_for_a_while_stops_the_vehicles_until_it
         assert any("out of reach" in words for words in told)
     finally:
         await harbour.close()
+
+
+async def test_a_server_that_is_cut_off_without_a_word_stops_the_vehicles_in_time(
+    make_settings: Callable[..., ServiceSettings], databases: Databases
+) -> None:
+    async with AsyncExitStack() as stack:
+        cable, url = await stack.enter_async_context(cable_to(databases.fresh("postgresql")))
+        harbour = Harbour(lambda **changes: make_settings(database_url=url, **changes))
+        stack.push_async_callback(harbour.close)
+        service = await harbour.open()
+        mission = await service.create(sim_spec(steps=500))
+        await act(service, mission.id, "start")
+        await until_step(service, mission.id, 1)
+        stack.callback(cable.mend)
+        cable.cut()
+        await until(lambda: mission.id not in service._runs, "its vehicles are stopped", 20.0)
+        cable.mend()
+        await until(lambda: mission.id in service._runs, "they go on", 60.0)
 
 
 async def test_a_server_that_changes_places_with_its_standby_leaves_no_mission_without_anybody_who_flies_it(
