@@ -6,7 +6,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, nullcontext
 from copy import copy
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+from weakref import WeakSet
 
 from sqlalchemy import Connection, event, make_url, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, AsyncSession, create_async_engine
@@ -31,19 +32,27 @@ TURN_S = 30.0
 """How long a transaction waits for a connection that is free."""
 APART_CONNECTIONS = 2
 """Of what nobody else may hold up: the watch beside other processes, and whether the database can be reached."""
+CONNECT_S = 4.0
+"""How long opening one of these may take: a server that is cut off does not say so."""
 PING_S = 2.0
 """A database that does not answer for this long cannot be reached: before those who ask give up."""
 RECENT_S = 60.0
 """A trouble that did not show for this long is taken to be over."""
 
+T = TypeVar("T")
+
 
 def make_engine(
-    url: str, application_name: str = "", connections: int = CONNECTIONS, kept: int = KEPT_CONNECTIONS
+    url: str,
+    application_name: str = "",
+    connections: int = CONNECTIONS,
+    kept: int = KEPT_CONNECTIONS,
+    connect_s: float | None = None,
 ) -> AsyncEngine:
     """Return an engine for ``url``; SQLite is put into WAL mode with foreign keys and durable commits.
 
     ``application_name``: what PostgreSQL is told that its connections are called. ``connections``: how many it has at
-    most, ``kept`` of them also while they are not needed.
+    most, ``kept`` of them also while they are not needed. ``connect_s``: how long PostgreSQL may take to let us in.
 
     Raises
     ------
@@ -57,8 +66,10 @@ def make_engine(
         )
     pool: dict[str, Any] = {"pool_size": kept, "max_overflow": connections - kept, "pool_timeout": TURN_S}
     if parsed.get_backend_name() != "sqlite":
-        named = connect_arguments(application_name)
-        return create_async_engine(url, pool_pre_ping=True, connect_args=named, **pool)
+        arguments = connect_arguments(application_name)
+        if connect_s is not None:
+            arguments["timeout"] = connect_s
+        return create_async_engine(url, pool_pre_ping=True, connect_args=arguments, **pool)
     file = Path(parsed.database) if parsed.database and parsed.database != ":memory:" else None
     engine = create_async_engine(url, **(pool if file is not None else {}))
 
@@ -121,8 +132,10 @@ class Database:
         self._engine = make_engine(url, self.application_name)
         # In memory each engine has a database of its own.
         in_memory = not isinstance(self._engine.pool, QueuePool)
-        few = (APART_CONNECTIONS, APART_CONNECTIONS)
+        few = (APART_CONNECTIONS, APART_CONNECTIONS, CONNECT_S)
         self._engine_apart = self._engine if in_memory else make_engine(url, self.application_name, *few)
+        self._drivers_apart = _drivers(self._engine_apart)
+        self._asking: set[asyncio.Task[Any]] = set()
         self._pinging: asyncio.Task[None] | None = None
         # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
         # locked"). Those of this process stand in line instead; the timeout is left for other processes.
@@ -173,17 +186,37 @@ class Database:
 
     async def ping(self) -> None:
         """Raise when the database cannot be reached; within ``PING_S``, however many connections are in use."""
-        if self._pinging is None or self._pinging.done():
-            self._pinging = asyncio.create_task(self.apart()._reach(), name="ping")
-            self._pinging.add_done_callback(_look_at)
-        await asyncio.wait([self._pinging], timeout=PING_S)
-        if not self._pinging.done():
-            raise TimeoutError(f"it does not answer within {PING_S:g} s")
-        self._pinging.result()
+        # Another one may begin the next while this one waits.
+        pinging = self._pinging
+        if pinging is None or pinging.done():
+            pinging = self._pinging = asyncio.create_task(self.answer(PING_S, _ask_anything), name="ping")
+            pinging.add_done_callback(_look_at)
+        await asyncio.wait([pinging])
+        pinging.result()
 
-    async def _reach(self) -> None:
-        async with self._connected() as connection:
-            await connection.execute(text("SELECT 1"))
+    async def answer(self, limit_s: float | None, ask: Callable[[AsyncSession], Awaitable[T]]) -> T:
+        """Return what ``ask`` reads, by a connection apart.
+
+        Raises TimeoutError where that takes longer than ``limit_s``. A server that is cut off would be waited for
+        much longer: the connections apart are dropped then, and later questions are asked on others.
+        """
+        task = asyncio.create_task(self.apart()._read(ask), name="ask the database")
+        self._asking.add(task)
+        task.add_done_callback(self._asking.discard)
+        task.add_done_callback(_look_at)
+        await asyncio.wait([task], timeout=limit_s)
+        if not task.done():
+            self._drop_apart()
+            raise TimeoutError(f"it does not answer within {limit_s:g} s")
+        return task.result()
+
+    async def _read(self, ask: Callable[[AsyncSession], Awaitable[T]]) -> T:
+        async with self.reading() as session:
+            return await ask(session)
+
+    def _drop_apart(self) -> None:
+        for driver in list(self._drivers_apart):
+            driver.terminate()
 
     @asynccontextmanager
     async def _connected(self) -> AsyncIterator[AsyncConnection]:
@@ -197,12 +230,32 @@ class Database:
                 await to_the_end(connection.close())
 
     async def close(self) -> None:
-        """Close every connection."""
+        """Close every connection; what is still asked is not waited for longer than opening one takes."""
+        asking = [*self._asking, *([self._pinging] if self._pinging is not None else [])]
+        if any(not task.done() for task in asking):
+            self._drop_apart()
+            await asyncio.wait(asking, timeout=CONNECT_S)
         await self._engine.dispose()
         await self._engine_apart.dispose()
 
 
-def _look_at(done: asyncio.Task[None]) -> None:
+def _drivers(engine: AsyncEngine) -> WeakSet[Any]:
+    """Return an engine's connections as PostgreSQL's driver has them, now and later; none for SQLite."""
+    drivers: WeakSet[Any] = WeakSet()
+    if engine.dialect.name == "postgresql":
+        # The first: what follows asks the server already.
+        @event.listens_for(engine.sync_engine, "connect", insert=True)
+        def _note(connection: Any, _record: Any) -> None:
+            drivers.add(connection.driver_connection)
+
+    return drivers
+
+
+async def _ask_anything(session: AsyncSession) -> None:
+    await session.execute(text("SELECT 1"))
+
+
+def _look_at(done: asyncio.Task[Any]) -> None:
     """Look at a task's error, which nobody may be waiting for any more."""
     if not done.cancelled():
         done.exception()

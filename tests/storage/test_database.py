@@ -19,6 +19,8 @@ from app.storage import database as database_module
 from app.storage.database import CONNECTIONS, Database
 from app.storage.db_errors import trouble_of
 from app.storage.models import MissionRow, SoundingRow, StepRow, WaypointRow
+from tests.support.storage.cable import cable_to
+from tests.support.storage.databases import Databases
 from tests.support.storage.rows import TIME, mission, one_of_each, step, waypoint
 from tests.support.waiting import until
 
@@ -285,3 +287,53 @@ async def test_a_server_that_does_not_answer_is_told_of_in_time(monkeypatch: pyt
                 await database.ping()
     await until(lambda: database._pinging is not None and database._pinging.done(), "it gave up")
     await database.close()
+
+
+async def test_pings_that_overlap_are_answered(database: Database) -> None:
+    async def ask() -> None:
+        for _ in range(50):
+            await database.ping()
+
+    await asyncio.gather(*(ask() for _ in range(8)))
+
+
+async def test_a_server_that_was_cut_off_is_reached_again_by_new_connections(
+    databases: Databases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that were open would not end for many minutes."""
+    monkeypatch.setattr(database_module, "PING_S", 0.5)
+    async with cable_to(databases.fresh("postgresql")) as (cable, url):
+        database = Database(url)
+        try:
+            await database.ping()
+            cable.cut()
+            for _ in range(2):
+                with pytest.raises(TimeoutError, match="does not answer within"):
+                    await database.ping()
+            cable.mend(lost=True)
+
+            async def answers() -> bool:
+                try:
+                    await database.ping()
+                except TimeoutError:
+                    return False
+                return True
+
+            await until(answers, "it is reached", 15.0)
+        finally:
+            await database.close()
+
+
+async def test_closing_ends_a_ping_under_way(databases: Databases) -> None:
+    async with cable_to(databases.fresh("postgresql")) as (cable, url):
+        database = Database(url)
+        await database.ping()
+        cable.cut()
+        ping = asyncio.create_task(database.ping())
+        await until(lambda: database._pinging is not None and not database._pinging.done(), "it asks")
+        async with asyncio.timeout(15):
+            await database.close()
+            assert database._pinging is not None
+            assert database._pinging.done()
+            with pytest.raises((SQLAlchemyError, OSError)):
+                await ping

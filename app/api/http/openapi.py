@@ -25,7 +25,7 @@ TAGS = [
         "`/api/v1/missions/{mission_id}/live`: it sends `LiveMessage` objects as JSON text, first a `SnapshotMessage`. "
         "Programs send their token in the header, browsers their session's cookie; the address holds neither. "
         "Close codes: 4401 no valid token, 4403 forbidden, 4404 no such mission, "
-        "4429 too many viewers, 1013 fell behind (reconnect), 1001 the service ends.",
+        "4429 too many viewers, 1013 fell behind or not to be had at the moment (reconnect), 1001 the service ends.",
     },
     {"name": "alarms", "description": "What somebody on watch has to take, who has taken it, and who was told."},
     {"name": "session", "description": "Who asks, and signing in and out from a browser."},

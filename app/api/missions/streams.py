@@ -21,7 +21,7 @@ from app.api.http.problems import ProblemError, problems
 from app.api.mission import Mission
 from app.api.schemas import API, is_mission_id
 from app.api.state import EdgeState, State, edge_state
-from app.missions.errors import MissionError, MissionNotFoundError
+from app.missions.errors import MissionElsewhereError, MissionError, MissionNotFoundError, ProcessApartError
 from app.missions.live.watchers.broadcast import WatchEndedError
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import followed, watched
@@ -204,7 +204,8 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
     """Send LiveMessage objects as JSON text: first a snapshot, then what changes.
 
     Closes with 4401 (no valid token in the Authorization header and no session), 4403, 4404 (no such mission),
-    4429 (too many viewers), 1013 (fell behind: reconnect) or 1001 (the service ends).
+    4429 (too many viewers), 1013 (fell behind, or the mission cannot be had at the moment: reconnect) or 1001 (the
+    service ends).
     """
     state = edge_state(websocket)
     await websocket.accept()
@@ -219,10 +220,18 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
             "too-many-streams": CLOSE_TOO_MANY,
         }
         await _close(websocket, codes[error.kind], error.detail)
+    except (MissionElsewhereError, ProcessApartError) as error:
+        await _close(websocket, CLOSE_TRY_AGAIN, str(error))
     except MissionError as error:
         await _close(websocket, CLOSE_NOT_FOUND, str(error))
     except WatchEndedError as error:
         await _close(websocket, CLOSE_TRY_AGAIN, f"{error}: reconnect")
+    except (SQLAlchemyError, sqlite3.Error) as error:
+        trouble = trouble_of(error)
+        if not trouble:
+            raise
+        log.warning("a live view ended", mission=mission_id, why=trouble)
+        await _close(websocket, CLOSE_TRY_AGAIN, trouble)
     except WebSocketDisconnect:
         pass
 

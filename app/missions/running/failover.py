@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+import time
 from collections.abc import Sequence
 
 import structlog
@@ -22,6 +23,9 @@ from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.processes.membership import MembershipLostError
 from app.storage.queries import missions as mission_queries
+
+AGAIN_S = 60.0
+"""After this long a mission is tried again that could not be taken up, though the database answered."""
 
 log = structlog.get_logger(__name__)
 
@@ -53,9 +57,9 @@ class Failover:
         self._task: asyncio.Task[None] | None = None
         self._taking: asyncio.Task[None] | None = None
         """Takes missions up, beside the watch: what it reads may be locked for longer than others wait."""
+        self._failed_s: dict[str, float] = {}
+        """When a mission could not be taken up, by the fault of none but itself."""
         self._telling: set[asyncio.Task[None]] = set()
-        self._aside = False
-        """Whether the vehicles are stopped, because others may take this process for dead."""
         self._trouble = "did not begin yet"
 
     @property
@@ -66,12 +70,16 @@ class Failover:
     async def begin(self) -> None:
         """Take up what nobody has, and keep watch from now on."""
         await self._ownership.enter()
-        self._taking = asyncio.create_task(self._take_up(await self._ownership.look()), name="taking up")
+        taking = asyncio.create_task(self._take_up(await self._ownership.look()), name="taking up")
+        self._taking = taking
         self._trouble = ""
         self._begin_watch()
-        await asyncio.wait([self._taking])
-        if not self._taking.cancelled():
-            self._taking.result()
+        # The watch may cancel it, and take up by another one what is left over.
+        await asyncio.wait([taking])
+        if taking.cancelled():
+            log.warning("not every mission was taken up at the start: the watch tries again")
+        else:
+            taking.result()
 
     async def end(self) -> None:
         """Keep watch no longer."""
@@ -128,14 +136,14 @@ class Failover:
                 pass
             self._ownership.called.clear()
             try:
-                if self._aside:
+                if self._ownership.aside:
                     await self._come_back()
-                missions = await self._ownership.look()
+                missions = self._left_over(await self._ownership.look())
                 if missions and (self._taking is None or self._taking.done()):
                     self._taking = asyncio.create_task(self._try_to_take_up(missions), name="taking up")
             except MembershipLostError as error:
                 self._trouble = f"others may take this process for dead: {error}"
-                if self._aside:
+                if self._ownership.aside:
                     log.error("not among the living yet", error=str(error))
                 else:
                     log.error("others may take this process for dead: its vehicles are stopped", error=str(error))
@@ -149,6 +157,13 @@ class Failover:
             else:
                 self._trouble = ""
 
+    def _left_over(self, missions: Sequence[str]) -> Sequence[str]:
+        """Return which of the missions at sea that are open to this process it has to take up now."""
+        missing = self._registry.missing(missions)
+        latest_s = time.monotonic() - AGAIN_S
+        self._failed_s = {one: at_s for one, at_s in self._failed_s.items() if one in missing and at_s > latest_s}
+        return [one for one in missing if one not in self._failed_s]
+
     async def _try_to_take_up(self, missions: Sequence[str]) -> None:
         """Take missions up; what is left over is found again when the watch looks next."""
         try:
@@ -159,7 +174,7 @@ class Failover:
             log.exception("missions cannot be taken up")
 
     async def _take_up(self, missions: Sequence[str]) -> None:
-        """Take up missions at sea that nobody has, as far as this process may."""
+        """Take up missions at sea that nobody has, or that this one took and did not load, as far as it may."""
         # Where several processes take up what one left behind, each comes by its share.
         for mission_id in random.sample(missions, len(missions)):
             try:
@@ -170,13 +185,14 @@ class Failover:
                 raise  # that concerns all of them
             except Exception:
                 # One that cannot be read, as when a newer version wrote it, is not the others' trouble.
+                self._failed_s[mission_id] = time.monotonic()
                 log.exception("a mission cannot be taken up", mission=mission_id)
                 continue
             log.warning("mission taken up", mission=mission_id)
 
     async def _stand_aside(self) -> None:
         """Stop the vehicles before others take the missions up. Raises nothing: the watch goes on."""
-        self._aside = True
+        self._ownership.aside = True
         if self._taking is not None:
             self._taking.cancel()
         ours = [live for live in self._registry if live.id in self._supervisor.runs]
@@ -189,7 +205,7 @@ class Failover:
     async def _come_back(self) -> None:
         """Go on as soon as that is allowed again. Raises MembershipLostError as long as it is not."""
         unchanged = await self._ownership.enter()
-        self._aside = False
+        self._ownership.aside = False
         if not unchanged:
             try:
                 for live in self._registry:

@@ -7,8 +7,10 @@ What an owner writes for a mission carries a guard, so that a process that was t
 
 import asyncio
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
@@ -26,6 +28,8 @@ PERIOD_S = 1.0
 
 TRIES = 5
 """Entering is tried again when another process looks at the wrong moment."""
+
+T = TypeVar("T")
 
 log = structlog.get_logger(__name__)
 
@@ -54,6 +58,10 @@ class Ownership:
         What others show who send a request on to this process.
     called
         Set when another process says that something changed.
+    aside
+        Whether others may take this process for dead: its vehicles are stopped, and no other begins to fly.
+    entries
+        How often this process became a new one. SQLite gives numbers again that others had.
     """
 
     def __init__(self, database: Database, url: str, certificate: str | None = None) -> None:
@@ -63,6 +71,8 @@ class Ownership:
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
         self.called = asyncio.Event()
+        self.aside = False
+        self.entries = 0
         self._membership = make_membership(database.url, self.called.set, database.application_name)
         self._number = 0
         self._mine: set[str] = set()
@@ -95,6 +105,7 @@ class Ownership:
             await self._membership.enter(self._number)
             if await self._is_known():
                 return True
+        self.entries += 1
         self._mine.clear()
         for _ in range(TRIES):
             row = ProcessRow(url=self._url, secret=self.secret, certificate=self._certificate, began_at=now())
@@ -109,8 +120,17 @@ class Ownership:
         raise MembershipLostError(f"this process was taken for dead {TRIES} times while it began")
 
     async def _is_known(self) -> bool:
-        async with self._apart.reading() as session:
+        async def there(session: AsyncSession) -> bool:
             return await session.get(ProcessRow, self._number) is not None
+
+        return await self._ask(there)
+
+    async def _ask(self, query: Callable[[AsyncSession], Awaitable[T]]) -> T:
+        """Return what a query gives. Raises MembershipLostError where the answer does not come in time."""
+        try:
+            return await self._database.answer(self._membership.answer_s, query)
+        except TimeoutError as error:
+            raise MembershipLostError(f"the database does not answer: {error or type(error).__name__}") from error
 
     async def leave(self) -> None:
         """Give everything up and tell the others."""
@@ -127,15 +147,14 @@ class Ownership:
         await self._membership.leave()
 
     async def look(self) -> Sequence[str]:
-        """Look who lives. Returns the missions at sea that nobody has, oldest first.
+        """Look who lives. Returns the missions at sea that nobody has, or this process, oldest first.
 
         Raises
         ------
         MembershipLostError
             When the others may take this process for dead.
         """
-        async with self._apart.reading() as session:
-            known = await processes.all_processes(session)
+        known = await self._ask(processes.all_processes)
         alive = await self._membership.alive([row.id for row in known])
         if self._number not in alive:
             raise MembershipLostError("this process was taken for dead")
@@ -150,8 +169,7 @@ class Ownership:
             for row in known
             if row.id in alive and row.id != self._number
         }
-        async with self._apart.reading() as session:
-            return await processes.orphans(session, AT_SEA)
+        return await self._ask(partial(processes.open_to, states=AT_SEA, process=self._number))
 
     async def owner(self, mission_id: str) -> Peer | None:
         """Return the other process that has a mission; None when it is ours, nobody's or unknown.
@@ -173,6 +191,11 @@ class Ownership:
             except MembershipLostError as error:
                 raise _apart() from error
         return self._peers.get(number)
+
+    def check_together(self, entries: int) -> None:
+        """Raise ProcessApartError where this process stands aside, or is a new one since it had entered so often."""
+        if self.aside or entries != self.entries:
+            raise _apart()
 
     async def take(self, mission_id: str) -> bool:
         """Have a mission from now on; False when another process has it. Raises ProcessApartError."""

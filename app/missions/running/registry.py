@@ -102,9 +102,13 @@ class MissionRegistry:
         """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
         return None if mission_id in self._live else self._ended.get(mission_id)
 
+    def missing(self, mission_ids: Sequence[str]) -> list[str]:
+        """Return those of some missions that are not in memory, in the same order."""
+        return [one for one in mission_ids if one not in self._live]
+
     async def recall(self, mission_ids: Sequence[str]) -> None:
         """Learn how missions stood that left memory in an earlier run, or in another process."""
-        await self._ended.recall([one for one in mission_ids if one not in self._live])
+        await self._ended.recall(self.missing(mission_ids))
 
     async def check_exists(self, mission_id: str) -> None:
         """Raise MissionNotFoundError where there is no such mission; it is not taken up."""
@@ -129,6 +133,8 @@ class MissionRegistry:
     async def get(self, mission_id: str) -> LiveMission:
         """Return a mission, taken up if need be.
 
+        One that was taken and could not be loaded stays this process's: at sea, its watch takes it up again.
+
         Raises
         ------
         MissionNotFoundError, MissionElsewhereError, MissionUnreadableError, ProcessApartError
@@ -144,7 +150,10 @@ class MissionRegistry:
             if row is None:
                 raise _not_found(mission_id)
             database = self._database
+            entries = 0
             if self._ownership is not None:
+                entries = self._ownership.entries
+                self._ownership.check_together(entries)
                 if not (await self._may_take_up(row) and await self._ownership.take(mission_id)):
                     raise MissionElsewhereError(f"another process has mission {mission_id}", "ask again in a moment")
                 database = database.guarded(self._ownership.guard(mission_id))
@@ -153,14 +162,14 @@ class MissionRegistry:
                     row = await session.get_one(MissionRow, mission_id)
             with _opening(mission_id):
                 live = await take_up(database, self._hub, self._threads, row, self._ping_files, self._time_scale)
-            if row.summary is not None:
-                await store_summary(live, None)
-            live.ships.traffic = self._traffic
-            if self._compute is not None:
-                live.compute_by(self._compute)
-            if self._ownership is not None:
-                await live.pings.tidy()
-            await self._make_room()
+            try:
+                await self._complete(live, row)
+                if self._ownership is not None:
+                    # Others may have it meanwhile. From here until its vehicles fly nothing is waited for.
+                    self._ownership.check_together(entries)
+            except BaseException:
+                live.abandon("it could not be taken up")
+                raise
             self._live[mission_id] = live
             self._ended.forget(mission_id)
             self._maps.take_up(live)
@@ -169,6 +178,17 @@ class MissionRegistry:
                 self._maps.survey(live)
             await self._taken_up(live)
             return live
+
+    async def _complete(self, live: LiveMission, row: MissionRow) -> None:
+        """Do what is left before a mission that was opened may be in memory."""
+        if row.summary is not None:
+            await store_summary(live, None)
+        live.ships.traffic = self._traffic
+        if self._compute is not None:
+            live.compute_by(self._compute)
+        if self._ownership is not None:
+            await live.pings.tidy()
+        await self._make_room()
 
     async def _was_removed(self, live: LiveMission) -> bool:
         """Tell whether a mission that ended is stored no more, and put it away then."""

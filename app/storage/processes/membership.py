@@ -58,6 +58,10 @@ class MembershipLostError(Exception):
 class Membership(Protocol):
     """One process among those that share a database."""
 
+    @property
+    def answer_s(self) -> float | None:
+        """Who gets no answer from the database for this long may be taken for dead; None where nobody is for that."""
+
     async def enter(self, number: int) -> None:
         """Hold the lock of this number. Raises MembershipLostError when it cannot be had."""
 
@@ -95,6 +99,8 @@ async def alive_beside(session: AsyncSession, url: str, numbers: Iterable[int]) 
 
 class FileMembership:
     """Processes on one machine that share an SQLite file: each holds a locked file beside it."""
+
+    answer_s: float | None = None
 
     def __init__(self, database: Path) -> None:
         self._database = database
@@ -176,6 +182,7 @@ class AdvisoryMembership:
     """Processes that share a PostgreSQL database: each holds an advisory lock on a connection of its own."""
 
     def __init__(self, url: str, on_call: Callable[[], None], application_name: str = "") -> None:
+        self.answer_s = ANSWER_S
         self._engine = create_async_engine(url, poolclass=NullPool, connect_args=connect_arguments(application_name))
         self._number = 0
         self._silence = Silence()

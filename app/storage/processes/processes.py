@@ -50,13 +50,10 @@ async def release(session: AsyncSession, mission_ids: Iterable[str], process: in
     )
 
 
-async def orphans(session: AsyncSession, states: Sequence[str]) -> Sequence[str]:
-    """Return the missions in any of ``states`` that no process has, oldest first."""
-    query = (
-        select(MissionRow.id)
-        .where(MissionRow.state.in_(states), ~exists().where(MissionOwnerRow.mission_id == MissionRow.id))
-        .order_by(MissionRow.created_at)
-    )
+async def open_to(session: AsyncSession, states: Sequence[str], process: int) -> Sequence[str]:
+    """Return the missions in any of ``states`` that no process has but perhaps this one, oldest first."""
+    others = exists().where(MissionOwnerRow.mission_id == MissionRow.id, MissionOwnerRow.process_id != process)
+    query = select(MissionRow.id).where(MissionRow.state.in_(states), ~others).order_by(MissionRow.created_at)
     return (await session.scalars(query)).all()
 
 

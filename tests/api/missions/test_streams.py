@@ -5,16 +5,20 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Callable
 from typing import Any
+from unittest.mock import AsyncMock
 
 import httpx
 import pytest
 import websockets
 from httpx_sse import ServerSentEvent, aconnect_sse
 from pydantic import TypeAdapter
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import TimeoutError as NoFreeConnectionError
 
 from app.api.accounts.roles import Role
 from app.api.accounts.tokens import TokenStore
 from app.main import Server
+from app.missions.errors import MissionElsewhereError, ProcessApartError
 from app.missions.views.messages import LiveMessage
 from app.missions.views.mission import Level
 from app.settings import Settings
@@ -129,6 +133,25 @@ async def test_an_unknown_mission_closes_the_socket_with_a_reason(server: Server
             await socket.recv()
     assert closed.value.rcvd is not None
     assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (4404, "there is no mission 'nowhere'")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ProcessApartError("apart"),
+        MissionElsewhereError("elsewhere"),
+        NoFreeConnectionError("none is free"),
+        OperationalError("select", None, ConnectionError("gone")),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+async def test_a_mission_that_cannot_be_had_at_the_moment_is_asked_for_again(
+    server: Server, mission: dict[str, Any], monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    monkeypatch.setattr(server.config.app.state.edge.service, "get", AsyncMock(side_effect=error))
+    async with websockets.connect(live_url(server, mission["id"])) as socket:
+        await socket.wait_closed()
+        assert socket.close_code == 1013
 
 
 async def test_viewers_are_counted_and_limited(make_settings: Callable[..., Settings]) -> None:

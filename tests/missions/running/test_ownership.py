@@ -10,8 +10,9 @@ import pytest
 from sqlalchemy import text
 
 from app.missions.errors import ConflictError, MissionElsewhereError, ProcessApartError
+from app.missions.live.load import take_up
 from app.missions.operations.history import events_after
-from app.missions.running import registry
+from app.missions.running import failover, registry
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
 from app.missions.states import MissionState
@@ -22,6 +23,7 @@ from app.storage.processes.membership import HEARD
 from app.storage.upkeep import migrate
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
+from tests.support.storage.cable import cable_to
 from tests.support.storage.databases import Databases, postgres_server, query
 from tests.support.waiting import until
 
@@ -185,6 +187,24 @@ async def test_a_database_that_goes_away_for_a_while_stops_the_vehicles_until_it
         await harbour.close()
 
 
+async def test_a_server_that_is_cut_off_without_a_word_stops_the_vehicles_in_time(
+    make_settings: Callable[..., ServiceSettings], databases: Databases
+) -> None:
+    async with AsyncExitStack() as stack:
+        cable, url = await stack.enter_async_context(cable_to(databases.fresh("postgresql")))
+        harbour = Harbour(lambda **changes: make_settings(database_url=url, **changes))
+        stack.push_async_callback(harbour.close)
+        service = await harbour.open()
+        mission = await service.create(sim_spec(steps=500))
+        await act(service, mission.id, "start")
+        await until_step(service, mission.id, 1)
+        stack.callback(cable.mend)
+        cable.cut()
+        await until(lambda: mission.id not in service._runs, "its vehicles are stopped", 20.0)
+        cable.mend()
+        await until(lambda: mission.id in service._runs, "they go on", 60.0)
+
+
 async def test_a_server_that_changes_places_with_its_standby_leaves_no_mission_without_anybody_who_flies_it(
     make_settings: Callable[..., ServiceSettings],
 ) -> None:
@@ -274,6 +294,94 @@ async def test_a_mission_that_cannot_be_read_for_a_while_does_not_hold_up_who_ta
             await until(begun, "one of them takes it up")
             for service in services:
                 await looks(url, service.process.number, 2)
+
+
+@pytest.mark.parametrize("trouble", [asyncio.CancelledError, OSError, ValueError])
+async def test_a_mission_that_could_not_be_loaded_is_taken_up_when_the_watch_looks_again(
+    two: tuple[Harbour, Harbour], monkeypatch: pytest.MonkeyPatch, trouble: type[BaseException]
+) -> None:
+    """It is its process's by then: no other one would take it up."""
+    times = 0
+
+    async def once_in_trouble(*arguments: Any) -> Any:
+        nonlocal times
+        times += 1
+        if times == 1:
+            raise trouble
+        return await take_up(*arguments)
+
+    one, other = [await harbour.open() for harbour in two]
+    mission = (await one.create(sim_spec(steps=500))).id
+    await act(one, mission, "start")
+    monkeypatch.setattr(registry, "take_up", once_in_trouble)
+    monkeypatch.setattr(failover, "AGAIN_S", 0.0, raising=False)
+    await two[0].close()
+    await until(lambda: mission in other._runs, "the other process flies it", 20.0)
+    assert times == 2
+
+
+async def test_a_process_whose_first_missions_are_cancelled_takes_them_up_later(
+    open_service: Callable[[], Harbour], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    harbour = open_service()
+    service = await harbour.open()
+    mission = (await service.create(sim_spec(steps=500))).id
+    await act(service, mission, "start")
+    await harbour.close()
+    times = 0
+
+    async def cancelled(*arguments: Any) -> Any:
+        nonlocal times
+        times += 1
+        if times > 1:
+            return await take_up(*arguments)
+        service = harbour.service
+        taking = service._failover._taking
+        assert taking is not None
+        await service._failover._stand_aside()
+        # The watch comes back meanwhile, and finds it cancelled, not ended.
+        return await asyncio.Event().wait()
+
+    monkeypatch.setattr(registry, "take_up", cancelled)
+    service = await harbour.open()
+    await until(lambda: mission in service._runs, "it flies", 20.0)
+
+
+@pytest.mark.parametrize("comes_back", [False, True])
+async def test_what_a_request_takes_up_does_not_fly_where_others_may_have_it_meanwhile(
+    open_service: Callable[[], Harbour], monkeypatch: pytest.MonkeyPatch, *, comes_back: bool
+) -> None:
+    harbour = open_service()
+    service = await harbour.open()
+    watch = service._failover
+    mission = (await service.create(sim_spec(steps=500))).id
+    await act(service, mission, "start")
+    await watch.end()  # the test looks in its place
+    live = await service.get(mission)
+    await service._supervisor.halt(live)
+    service._claims.release_team(live)
+    service._registry.drop()
+    begun, go_on = asyncio.Event(), asyncio.Event()
+
+    async def slow(*arguments: Any) -> Any:
+        begun.set()
+        await go_on.wait()
+        return await take_up(*arguments)
+
+    monkeypatch.setattr(registry, "take_up", slow)
+    asking = asyncio.create_task(service.get(mission))
+    await begun.wait()
+    await watch._stand_aside()
+    if comes_back:
+        await asyncio.to_thread(query, harbour.database.url, "delete from processes")
+        await watch._come_back()
+    go_on.set()
+    with pytest.raises((ProcessApartError, MissionElsewhereError)):
+        await asking
+    assert mission not in service._runs
+    assert list(service._registry) == []
+    watch._begin_watch()
+    await until(lambda: mission in service._runs, "it flies again", 20.0)
 
 
 async def test_a_watch_that_ended_is_told_of_and_begun_again(harbour: Harbour) -> None:
