@@ -308,11 +308,13 @@ def _take(
         if b < 0:
             _filter(mean[m], covariance[m], shared[m], measured, y, gains[0], ways[0])
             _share(shared[m], measured, certain, gains, ways)
+            _bound(shared[m], covariance[m], measured.errors)
             continue
         if looks[m] > 0:
             _weigh(means[b], covariances[b], weights[b], shared[m], measured, y, gains, ways)
             _share(shared[m], measured, weights[b], gains, ways)
         _match(means[b], covariances[b], weights[b], mean[m], covariance[m])
+        _bound(shared[m], covariance[m], measured.errors)
         spread = covariance[m, 0, 0] + covariance[m, 1, 1] + covariance[m, 2, 2]
         single[b] = spread < (NARROW * y) ** 2
     return single
@@ -339,14 +341,16 @@ def _filter(
     # Covariance of landmark minus vehicle, which is what the range sees, and of the landmark with that.
     D = covariance.copy()
     Pu = np.zeros(3)
+    part = _possible(covariance, shared[seer], measured.errors[seer, seer]) if seer >= 0 else 0.0
     for i in range(3):
         for j in range(3):
             Pu[i] += covariance[i, j] * u[j]
         if seer >= 0:
             for j in range(2):
-                Pu[i] -= shared[seer, i, j] * u[j]
-                D[i, j] -= shared[seer, i, j]
-                D[j, i] -= shared[seer, i, j]
+                common = part * shared[seer, i, j]
+                Pu[i] -= common * u[j]
+                D[i, j] -= common
+                D[j, i] -= common
     if seer >= 0:
         for j in range(2):
             D[j, j] += measured.errors[seer, seer]
@@ -389,6 +393,49 @@ def _share(shared: FloatArray, measured: _Measured, weights: FloatArray, gains: 
                     for i in range(3):
                         less[i, j] += weights[h] * gains[h, i] * told
         shared[v] -= less
+
+
+@njit(cache=True, nogil=True)
+def _bound(shared: FloatArray, covariance: FloatArray, errors: FloatArray) -> None:
+    """Leave a landmark no more covariance with a vehicle's error (n_vehicles, 3, 2) than there can be, in place.
+
+    What is taken to be common to vehicles may say more: they have fixes at different times.
+    """
+    for v in range(len(shared)):
+        shared[v] *= _possible(covariance, shared[v], errors[v, v])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _possible(covariance: FloatArray, shared: FloatArray, error: float) -> float:
+    """Return which part of a covariance with a vehicle's error (3, 2) there can be: 1 where all of it.
+
+    ``covariance`` (3, 3) less what the error, of variance ``error`` along either axis, explains of it is one, too.
+    """
+    if error <= 0.0:
+        return 0.0
+    a, b, c = covariance[0, 0], covariance[0, 1], covariance[0, 2]
+    d, e, f = covariance[1, 1], covariance[1, 2], covariance[2, 2]
+    inverse = np.array(
+        (
+            (d * f - e * e, c * e - b * f, b * e - c * d),
+            (c * e - b * f, a * f - c * c, b * c - a * e),
+            (b * e - c * d, b * c - a * e, a * d - b * b),
+        )
+    )
+    determinant = a * inverse[0, 0] + b * inverse[0, 1] + c * inverse[0, 2]
+    if determinant <= 0.0:
+        return 0.0
+    explained = np.zeros((2, 2))
+    for p in range(2):
+        for q in range(2):
+            for i in range(3):
+                for j in range(3):
+                    explained[p, q] += shared[i, p] * inverse[i, j] * shared[j, q]
+    explained /= determinant * error
+    half = 0.5 * (explained[0, 0] + explained[1, 1])
+    off = 0.25 * (explained[0, 0] - explained[1, 1]) ** 2 + explained[0, 1] * explained[1, 0]
+    most = half + np.sqrt(max(off, 0.0))
+    return 1.0 if most <= 1.0 else 1.0 / np.sqrt(most)
 
 
 @njit(cache=True, nogil=True)

@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -256,3 +257,18 @@ def test_vehicles_that_share_their_error_do_not_average_it_out_between_them() ->
             known = look(off, 0.03, known, k % 3)
         errors.append(nees(truth, known).mean())
     assert 0.6 * 3.0 < np.mean(errors) < 1.4 * 3.0
+
+
+def test_no_more_is_shared_with_a_vehicles_error_than_there_can_be() -> None:
+    """What vehicles have in common is taken to be as much as it can be, which may be more than there is.
+
+    Missions of NGCUV12 had variances below 0, and estimates far outside of the area.
+    """
+    _, known, look = dive(1, 0.1, 12)
+    known = replace(known, shared_m2=3.0 * known.shared_m2)
+    for _ in range(20):
+        known = look(np.zeros(2), 0.1, known)
+        assert (np.linalg.eigvalsh(known.covariance_m2) > 0.0).all()
+        assert (np.linalg.norm(known.position_m - [0.0, 0.0, 0.6], axis=1) < 1.0).all()
+        for shared, covariance in zip(known.shared_m2[:, 0], known.covariance_m2, strict=True):
+            assert np.linalg.eigvalsh(covariance - shared @ shared.T / 0.1**2).min() > -1e-9
