@@ -85,7 +85,7 @@ async def test_vehicles_go_over_into_the_next_block_clear_of_zones_and_of_each_o
                 ways[name] = (time, east_north, depth)
                 assert not any(LineString(leg).intersects(zone) for leg in pairwise(east_north)), name
                 assert east_north[0, 0] < 40.0, "it came from the first block"
-                assert east_north[-1, 0] > 65.0
+                assert east_north[-1, 0] > 60.0, "it goes to the second one, past the zone between them"
             for one, other in combinations(ways.values(), 2):
                 apart_m = distances(one, other)
                 # At the end of the first block they may lie beside each other, one above the other.
