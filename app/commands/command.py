@@ -70,7 +70,7 @@ def this_user() -> str:
 
 
 @contextmanager
-def unnoted_said(result: str = "done") -> Iterator[None]:
+def audit_failure_told(result: str = "done") -> Iterator[None]:
     """Say in a line that a command is not in the audit log, where that cannot be written, and go on: it was given."""
     import sqlite3
 
@@ -93,7 +93,7 @@ async def noted(
 
     Where that fails it is said: the command's own result is told all the same.
     """
-    with unnoted_said("done" if refused is None else "refused"):
+    with audit_failure_told("done" if refused is None else "refused"):
         await _note(settings, action, target, mission_id, refused)
 
 

@@ -20,10 +20,10 @@ CELLS = 96
 REACH_SD = 5.0
 """How many deviations a range may be short of the truth when the first look lays out the depths."""
 
-STRANGE_SD = 6.0
+OUTLIER_SD = 6.0
 """A range that is this many deviations off all depths that were likely speaks of one that a grid does not hold."""
 
-DISBELIEF = 10.0
+OUTLIER_LOSS = 10.0
 """What such a range takes from the logarithm of the likelihood of the depths that it does not fit, at most: one alone
 does not move an estimate, another one that agrees does."""
 
@@ -66,16 +66,25 @@ def lay_out(vehicle_depth: float, measured: float, noise: float, below: bool, h2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fit(z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float) -> float:
-    """Return the logarithm of the likelihood of a range at depth ``z``, blurred by half a ``spacing``."""
+def _deviation(
+    z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float
+) -> tuple[float, float]:
+    """Return by how many deviations a range is off at depth ``z``, and the deviation, blurred by half a ``spacing``."""
     drop = z - vehicle_depth
     r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
     sd = np.sqrt((noise * r) ** 2 + (0.5 * spacing * drop / r) ** 2)
-    return float(-0.5 * ((measured - r) / sd) ** 2 - np.log(sd))
+    return (measured - r) / sd, sd
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _kept(z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float) -> float:
+def _fit(z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float) -> float:
+    """Return the logarithm of the likelihood of a range at depth ``z``, blurred by half a ``spacing``."""
+    off, sd = _deviation(z, h2, vehicle_depth, measured, noise, spacing)
+    return float(-0.5 * off**2 - np.log(sd))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stored(z: float, h2: float, vehicle_depth: float, measured: float, noise: float, spacing: float) -> float:
     """Return what is kept of a range at depth ``z``: the logarithm of its likelihood, no sharper than a cell."""
     drop = z - vehicle_depth
     r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
@@ -84,7 +93,7 @@ def _kept(z: float, h2: float, vehicle_depth: float, measured: float, noise: flo
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _strange(
+def _is_outlier(
     fit: Cells,
     grid: tuple[float, float],
     h2: float,
@@ -97,16 +106,13 @@ def _strange(
     lowest, spacing = grid
     best, where, closest = -np.inf, 0, np.inf
     for c in range(CELLS):
-        drop = lowest + c * spacing - vehicle_depth
-        r = max(np.sqrt(h2 + drop * drop), NEAREST_M)
-        sd = np.sqrt((noise * r) ** 2 + (0.5 * spacing * drop / r) ** 2)
-        off = abs(measured - r) / sd
-        value = fit[c] - 0.5 * off * off - np.log(sd)
+        off, sd = _deviation(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing)
+        value = fit[c] - 0.5 * off**2 - np.log(sd)
         if value > best:
             best, where = value, c
         if fit[c] > -1.5 * LOST:
-            closest = min(closest, off)
-    return closest > STRANGE_SD or where == CELLS - 1 or (where == 0 and not below)
+            closest = min(closest, abs(off))
+    return closest > OUTLIER_SD or where == CELLS - 1 or (where == 0 and not below)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -190,12 +196,12 @@ def take_range(
         The sensor looks down only.
     """
     noise = max(noise, NEAREST_M)
-    strange = _strange(fit, grid, h2, vehicle_depth, measured, noise, below)
-    if strange:
+    outlier = _is_outlier(fit, grid, h2, vehicle_depth, measured, noise, below)
+    if outlier:
         grid = _widen(fit, steepness, grid, lay_out(vehicle_depth, measured, noise, below, h2))
     lowest, spacing = grid
     for _ in range(40):
-        if strange:
+        if outlier:
             break  # what is likely is not known yet
         best = -np.inf
         for c in range(CELLS):
@@ -211,13 +217,13 @@ def take_range(
         lowest, spacing = _narrow(fit, steepness, lowest, spacing, 0.5 * (first + last))
     best, most = -np.inf, -np.inf
     h = max(np.sqrt(h2), NEAREST_M)
-    if strange:
+    if outlier:
         for c in range(CELLS):
-            most = max(most, _kept(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing))
+            most = max(most, _stored(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing))
     for c in range(CELLS):
         rise = vehicle_depth - (lowest + c * spacing)
-        told = _kept(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing)
-        value = fit[c] + max(told, most - DISBELIEF)
+        told = _stored(lowest + c * spacing, h2, vehicle_depth, measured, noise, spacing)
+        value = fit[c] + max(told, most - OUTLIER_LOSS)
         if rise > 0.0:
             steepness[c] = max(steepness[c], rise / h)
             value = NEVER if below else value

@@ -172,11 +172,11 @@ class Landmark3DEstimator:
         row[spread] = np.arange(len(spread))
         blur, shared = _shared(landmarks, vehicle, position_sd_m**2)
         errors = np.minimum(blur[:, None], blur)
-        seer = vehicle if vehicle < len(blur) else -1
+        observer = vehicle if vehicle < len(blur) else -1
         shared[first] = 0.0
-        if seer >= 0:
-            shared[first, :, 0, 0] = shared[first, :, 1, 1] = errors[seer]
-        measured = _Measured(where, index, ranges, noise, seer, errors)
+        if observer >= 0:
+            shared[first, :, 0, 0] = shared[first, :, 1, 1] = errors[observer]
+        measured = _Measured(where, index, ranges, noise, observer, errors)
         single = _take(measured, looks, row, mean, covariance, shared, _Bundles(means, covariances, weights))
         looks[index] += 1
 
@@ -236,7 +236,7 @@ def _shared(landmarks: Landmarks3D, vehicle: int, blur_m2: float) -> tuple[Float
     if lacking > 0:
         if blur_m2 == 0.0:
             return blur, shared
-        likewise = _likewise(blur, shared, blur_m2)[:, None]
+        likewise = _shared_by_newcomer(blur, shared, blur_m2)[:, None]
         blur = np.concatenate([blur, np.zeros(lacking - 1), [blur_m2]])
         shared = np.concatenate([shared, np.zeros((len(shared), lacking - 1, 3, 2)), likewise], axis=1)
     if blur_m2 < blur[vehicle]:
@@ -245,7 +245,7 @@ def _shared(landmarks: Landmarks3D, vehicle: int, blur_m2: float) -> tuple[Float
     return blur, shared
 
 
-def _likewise(blur: FloatArray, shared: FloatArray, blur_m2: float) -> FloatArray:
+def _shared_by_newcomer(blur: FloatArray, shared: FloatArray, blur_m2: float) -> FloatArray:
     """Return the landmarks' covariances (n, 3, 2) with the error of one more vehicle, from those with the others'.
 
     What is most common to errors of different variances is what a walk has in common with itself: it is interpolated.
@@ -264,14 +264,14 @@ class _Measured(NamedTuple):
     """What one vehicle measured at ``position`` (3,): ``ranges`` (k,) of ``landmarks`` (k,), by number.
 
     ``noise`` is relative to a range, ``errors`` (n_vehicles, n_vehicles) the covariances of the vehicles' own places
-    along east and along north, m^2, and ``seer`` the vehicle's row there, -1 where it knows its place.
+    along east and along north, m^2, and ``observer`` the vehicle's row there, -1 where it knows its place.
     """
 
     position: FloatArray
     landmarks: IntArray
     ranges: FloatArray
     noise: float
-    seer: int
+    observer: int
     errors: FloatArray
 
 
@@ -300,21 +300,21 @@ def _take(
     """
     means, covariances, weights = bundles
     single = np.zeros(len(means), dtype=np.bool_)
-    gains, ways = np.zeros((BUNDLE, 3)), np.zeros((BUNDLE, 3))
+    gains, directions = np.zeros((BUNDLE, 3)), np.zeros((BUNDLE, 3))
     certain = np.ones(1)
     for k in range(len(measured.landmarks)):
         m, y = measured.landmarks[k], measured.ranges[k]
         b = row[m]
         if b < 0:
-            _filter(mean[m], covariance[m], shared[m], measured, y, gains[0], ways[0])
-            _share(shared[m], measured, certain, gains, ways)
-            _bound(shared[m], covariance[m], measured.errors)
+            _filter(mean[m], covariance[m], shared[m], measured, y, gains[0], directions[0])
+            _update_shared(shared[m], measured, certain, gains, directions)
+            _limit_shared(shared[m], covariance[m], measured.errors)
             continue
         if looks[m] > 0:
-            _weigh(means[b], covariances[b], weights[b], shared[m], measured, y, gains, ways)
-            _share(shared[m], measured, weights[b], gains, ways)
+            _weigh(means[b], covariances[b], weights[b], shared[m], measured, y, gains, directions)
+            _update_shared(shared[m], measured, weights[b], gains, directions)
         _match(means[b], covariances[b], weights[b], mean[m], covariance[m])
-        _bound(shared[m], covariance[m], measured.errors)
+        _limit_shared(shared[m], covariance[m], measured.errors)
         spread = covariance[m, 0, 0] + covariance[m, 1, 1] + covariance[m, 2, 2]
         single[b] = spread < (NARROW * y) ** 2
     return single
@@ -328,32 +328,32 @@ def _filter(
     measured: _Measured,
     y: float,
     gain: FloatArray,
-    way: FloatArray,
+    direction: FloatArray,
 ) -> float:
     """Kalman update in place; return the log-likelihood of the range (up to a constant).
 
-    Set ``gain`` (3,) and ``way`` (3,), the direction from the vehicle to the landmark.
+    Set ``gain`` (3,) and ``direction`` (3,), the direction from the vehicle to the landmark.
     """
-    noise, seer = measured.noise, measured.seer
+    noise, observer = measured.noise, measured.observer
     u = mean - measured.position
     r = max(np.sqrt((u * u).sum()), 1e-9)
     u /= r
     # Covariance of landmark minus vehicle, which is what the range sees, and of the landmark with that.
     D = covariance.copy()
     Pu = np.zeros(3)
-    part = _possible(covariance, shared[seer], measured.errors[seer, seer]) if seer >= 0 else 0.0
+    part = _possible_part(covariance, shared[observer], measured.errors[observer, observer]) if observer >= 0 else 0.0
     for i in range(3):
         for j in range(3):
             Pu[i] += covariance[i, j] * u[j]
-        if seer >= 0:
+        if observer >= 0:
             for j in range(2):
-                common = part * shared[seer, i, j]
+                common = part * shared[observer, i, j]
                 Pu[i] -= common * u[j]
                 D[i, j] -= common
                 D[j, i] -= common
-    if seer >= 0:
+    if observer >= 0:
         for j in range(2):
-            D[j, j] += measured.errors[seer, seer]
+            D[j, j] += measured.errors[observer, observer]
     Du = np.zeros(3)
     for i in range(3):
         for j in range(3):
@@ -367,7 +367,7 @@ def _filter(
     innovation = y - predicted
     for i in range(3):
         gain[i] = Pu[i] / variance
-        way[i] = u[i]
+        direction[i] = u[i]
         mean[i] += gain[i] * innovation
         for j in range(3):
             covariance[i, j] -= Pu[i] * Pu[j] / variance
@@ -375,10 +375,12 @@ def _filter(
 
 
 @njit(cache=True, nogil=True)
-def _share(shared: FloatArray, measured: _Measured, weights: FloatArray, gains: FloatArray, ways: FloatArray) -> None:
+def _update_shared(
+    shared: FloatArray, measured: _Measured, weights: FloatArray, gains: FloatArray, directions: FloatArray
+) -> None:
     """Update a landmark's covariances with the vehicles' errors (n_vehicles, 3, 2) in place.
 
-    ``gains`` and ``ways`` are those of its filters, whose ``weights`` (k,) sum to 1.
+    ``gains`` and ``directions`` are those of its filters, whose ``weights`` (k,) sum to 1.
     """
     for v in range(len(shared)):
         less = np.zeros((3, 2))
@@ -387,26 +389,26 @@ def _share(shared: FloatArray, measured: _Measured, weights: FloatArray, gains: 
                 for j in range(2):
                     told = 0.0
                     for i in range(3):
-                        told += ways[h, i] * shared[v, i, j]
-                    if measured.seer >= 0:
-                        told -= ways[h, j] * measured.errors[measured.seer, v]
+                        told += directions[h, i] * shared[v, i, j]
+                    if measured.observer >= 0:
+                        told -= directions[h, j] * measured.errors[measured.observer, v]
                     for i in range(3):
                         less[i, j] += weights[h] * gains[h, i] * told
         shared[v] -= less
 
 
 @njit(cache=True, nogil=True)
-def _bound(shared: FloatArray, covariance: FloatArray, errors: FloatArray) -> None:
+def _limit_shared(shared: FloatArray, covariance: FloatArray, errors: FloatArray) -> None:
     """Leave a landmark no more covariance with a vehicle's error (n_vehicles, 3, 2) than there can be, in place.
 
     What is taken to be common to vehicles may say more: they have fixes at different times.
     """
     for v in range(len(shared)):
-        shared[v] *= _possible(covariance, shared[v], errors[v, v])
+        shared[v] *= _possible_part(covariance, shared[v], errors[v, v])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _possible(covariance: FloatArray, shared: FloatArray, error: float) -> float:
+def _possible_part(covariance: FloatArray, shared: FloatArray, error: float) -> float:
     """Return which part of a covariance with a vehicle's error (3, 2) there can be: 1 where all of it.
 
     ``covariance`` (3, 3) less what the error, of variance ``error`` along either axis, explains of it is one, too.
@@ -447,13 +449,15 @@ def _weigh(
     measured: _Measured,
     y: float,
     gains: FloatArray,
-    ways: FloatArray,
+    directions: FloatArray,
 ) -> None:
     """Update a bundle in place; filters that have lost all weight are left as they are."""
     scores = np.full(len(weights), -np.inf)
     for h in range(len(weights)):
         if weights[h] > 0.0:
-            scores[h] = np.log(weights[h]) + _filter(means[h], covariances[h], shared, measured, y, gains[h], ways[h])
+            scores[h] = np.log(weights[h]) + _filter(
+                means[h], covariances[h], shared, measured, y, gains[h], directions[h]
+            )
     likely = np.exp(scores - scores.max())
     likely = np.where(likely < 1e-9, 0.0, likely)
     weights[:] = likely / likely.sum()

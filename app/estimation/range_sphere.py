@@ -15,11 +15,11 @@ AROUND, UPWARDS = 32, 9
 """Parts of a sphere by azimuth and by elevation, at least."""
 
 MOST_AROUND, MOST_UPWARDS = 64, 32
-"""The same at most: as many as it takes that no part is bent."""
+"""The same at most: as many as it takes for flat parts."""
 
-BENT = 0.3
-"""A part of a sphere is bent when it departs from a plane by more than this many deviations of its range. A filter
-would take that for another error at every range, and average it out."""
+FLAT_SD = 0.3
+"""A part of a sphere is flat when it departs from a plane by at most this many deviations of its range. A linearised
+filter takes what it departs by for noise, another one at every range, and averages it out."""
 
 THICK = 0.3
 """A sphere is this thick to begin with, in radii: the range itself, taken after that, makes it thin."""
@@ -37,7 +37,7 @@ class SphereParts(NamedTuple):
 
 
 def sphere_parts(
-    centre_m: FloatArray, radius_m: float, sd_m: float, low_m: float, high_m: float, *, straight: bool = False
+    centre_m: FloatArray, radius_m: float, sd_m: float, low_m: float, high_m: float, *, flat: bool = False
 ) -> SphereParts:
     """Return the parts of a sphere between two depths.
 
@@ -49,14 +49,14 @@ def sphere_parts(
         How exactly its radius is known.
     low_m, high_m
         Least and greatest depth. A sphere that does not reach them ends at its nearest place.
-    straight
-        As many parts as it takes that none is bent, up to ``MOST_AROUND`` by ``MOST_UPWARDS``.
+    flat
+        As many parts as it takes for all to be flat, up to ``MOST_AROUND`` by ``MOST_UPWARDS``.
     """
     below_m = np.clip(np.array([low_m, high_m]) - centre_m[2], -radius_m, radius_m)
     lowest, highest = np.arcsin(below_m / radius_m)
     upwards_count, around = UPWARDS, AROUND
-    if straight:
-        widest = 2.0 * np.sqrt(BENT * np.sqrt(2.0) * max(sd_m / radius_m, 1e-9))
+    if flat:
+        widest = 2.0 * np.sqrt(FLAT_SD * np.sqrt(2.0) * max(sd_m / radius_m, 1e-9))
         upwards_count = int(np.clip(np.ceil((highest - lowest) / widest), UPWARDS, MOST_UPWARDS))
         around = int(np.clip(np.ceil(2.0 * np.pi / widest), AROUND, MOST_AROUND))
     edges = np.linspace(lowest, highest, upwards_count + 1)

@@ -17,7 +17,7 @@ from numba import njit
 
 from app.arrays import FloatArray
 from app.estimation.range_filter import NEAREST_M, update_by_range
-from app.estimation.range_sphere import BENT, on_sphere, sphere_parts
+from app.estimation.range_sphere import FLAT_SD, on_sphere, sphere_parts
 from app.estimation.sensors import RangeSensor
 
 EVERYWHERE = np.inf
@@ -226,8 +226,8 @@ class TargetEstimator:
             kept = MEMORY ** (len(heard) / MEMORY_RANGES)
             return replace(mixture, surprise=mean, unease=kept * track.unease + (1.0 - kept) * mean)
         closest = float(np.abs(ranges[heard]).min())
-        straight_m = np.sqrt(3.0 * BENT * closest * sd_m)
-        if np.sqrt((mixture.sd_m**2).sum()) < min(NARROW * closest, straight_m):
+        flat_m = np.sqrt(3.0 * FLAT_SD * closest * sd_m)
+        if np.sqrt((mixture.sd_m**2).sum()) < min(NARROW * closest, flat_m):
             return TargetTrack(mixture.state[None], mixture.covariance[None], np.ones(1))
         return mixture
 
@@ -241,7 +241,7 @@ class TargetEstimator:
         bend_m = anywhere.parts_m**2 / (3.0 * max(range_m, NEAREST_M))
         if not (range_m > 0.0 and (anywhere.parts_m > WIDE * range_m or bend_m > sd_m > 0.0)):
             return anywhere
-        parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2], straight=True)
+        parts = sphere_parts(place_m, range_m, sd_m, self.low_m[2], self.high_m[2], flat=True)
         low, high = np.array(self.low_m[:2]), np.array(self.high_m[:2])
         inside = ((parts.place_m[:, :2] >= low) & (parts.place_m[:, :2] <= high)).all(axis=1)
         inside |= not inside.any()

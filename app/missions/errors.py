@@ -15,7 +15,7 @@ class MissionNotFoundError(MissionError):
     """There is no such mission."""
 
 
-class ProcessApartError(MissionError):
+class NotAMemberError(MissionError):
     """The process is none of those that share the database now: it can have no mission."""
 
 

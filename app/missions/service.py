@@ -260,7 +260,7 @@ class MissionService:
 
         Raises
         ------
-        InvalidRequestError, ConflictError, ProcessApartError
+        InvalidRequestError, ConflictError, NotAMemberError
             Nothing is stored then.
         """
         check_spec(spec, self.hub.kinds)

@@ -30,7 +30,7 @@ KEPT_CONNECTIONS = 5
 """So many stay open while they are not needed."""
 TURN_S = 30.0
 """How long a transaction waits for a connection that is free."""
-APART_CONNECTIONS = 2
+RESERVED_CONNECTIONS = 2
 """Of what nobody else may hold up: the watch beside other processes, and whether the database can be reached."""
 CONNECT_S = 4.0
 """How long opening one of these may take: a server that is cut off does not say so."""
@@ -132,9 +132,9 @@ class Database:
         self._engine = make_engine(url, self.application_name)
         # In memory each engine has a database of its own.
         in_memory = not isinstance(self._engine.pool, QueuePool)
-        few = (APART_CONNECTIONS, APART_CONNECTIONS, CONNECT_S)
-        self._engine_apart = self._engine if in_memory else make_engine(url, self.application_name, *few)
-        self._drivers_apart = _drivers(self._engine_apart)
+        few = (RESERVED_CONNECTIONS, RESERVED_CONNECTIONS, CONNECT_S)
+        self._reserved_engine = self._engine if in_memory else make_engine(url, self.application_name, *few)
+        self._reserved_drivers = _drivers(self._reserved_engine)
         self._asking: set[asyncio.Task[Any]] = set()
         self._pinging: asyncio.Task[None] | None = None
         # SQLite's writers wait for each other by asking again and again, and the unlucky one gives up ("database is
@@ -149,11 +149,11 @@ class Database:
         guarded._guard = guard
         return guarded
 
-    def apart(self) -> "Database":
+    def reserved(self) -> "Database":
         """Return the same database by connections that requests and missions cannot take, for what must not wait."""
-        apart = copy(self)
-        apart._engine = self._engine_apart
-        return apart
+        reserved = copy(self)
+        reserved._engine = self._reserved_engine
+        return reserved
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
@@ -195,18 +195,18 @@ class Database:
         pinging.result()
 
     async def answer(self, limit_s: float | None, ask: Callable[[AsyncSession], Awaitable[T]]) -> T:
-        """Return what ``ask`` reads, by a connection apart.
+        """Return what ``ask`` reads, by a reserved connection.
 
         Raises TimeoutError where that takes longer than ``limit_s``. A server that is cut off would be waited for
-        much longer: the connections apart are dropped then, and later questions are asked on others.
+        much longer: the reserved ones are dropped then, and later questions are asked on others.
         """
-        task = asyncio.create_task(self.apart()._read(ask), name="ask the database")
+        task = asyncio.create_task(self.reserved()._read(ask), name="ask the database")
         self._asking.add(task)
         task.add_done_callback(self._asking.discard)
         task.add_done_callback(_look_at)
         await asyncio.wait([task], timeout=limit_s)
         if not task.done():
-            self._drop_apart()
+            self._drop_reserved()
             raise TimeoutError(f"it does not answer within {limit_s:g} s")
         return task.result()
 
@@ -214,8 +214,8 @@ class Database:
         async with self.reading() as session:
             return await ask(session)
 
-    def _drop_apart(self) -> None:
-        for driver in list(self._drivers_apart):
+    def _drop_reserved(self) -> None:
+        for driver in list(self._reserved_drivers):
             driver.terminate()
 
     @asynccontextmanager
@@ -233,10 +233,10 @@ class Database:
         """Close every connection; what is still asked is not waited for longer than opening one takes."""
         asking = [*self._asking, *([self._pinging] if self._pinging is not None else [])]
         if any(not task.done() for task in asking):
-            self._drop_apart()
+            self._drop_reserved()
             await asyncio.wait(asking, timeout=CONNECT_S)
         await self._engine.dispose()
-        await self._engine_apart.dispose()
+        await self._reserved_engine.dispose()
 
 
 def _drivers(engine: AsyncEngine) -> WeakSet[Any]:

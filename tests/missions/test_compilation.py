@@ -10,6 +10,7 @@ from sqlalchemy import select
 
 from app.missions import compilation
 from app.missions.running import supervisor
+from app.missions.service import MissionService
 from app.storage.models import EventRow
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_step
 from tests.support.waiting import until
@@ -56,18 +57,23 @@ def test_the_default_planner_leaves_nothing_to_compile() -> None:
     assert found.stdout.strip() == "[]"
 
 
+async def started_anew(harbour: Harbour) -> tuple[MissionService, str]:
+    """A service that compiles as it is told to now, and the id of a mission that was started there."""
+    await harbour.close()
+    service = await harbour.open()
+    mission = await service.create(sim_spec(steps=3))
+    await act(service, mission.id, "start", actor="Ana")
+    return service, mission.id
+
+
 async def test_the_first_waypoint_does_not_wait_for_what_maps_need(
     harbour: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compiled = threading.Event()
     monkeypatch.setattr(compilation, "warm_up_maps", compiled.wait)
     try:
-        await harbour.close()
-        await harbour.open()
-        service = harbour.service
-        mission = await service.create(sim_spec(steps=3))
-        await act(service, mission.id, "start", actor="Ana")
-        await until_step(service, mission.id, 1)
+        service, mission_id = await started_anew(harbour)
+        await until_step(service, mission_id, 1)
         assert not compiled.is_set()
     finally:
         compiled.set()
@@ -80,11 +86,7 @@ async def test_an_operator_is_told_that_the_first_legs_wait_for_a_planner_that_i
     monkeypatch.setattr(compilation, "warm_up_planner", lambda *_: compiled.wait())
     monkeypatch.setattr(supervisor, "COMPILED_SOON_S", 0.0)
     try:
-        await harbour.close()
-        await harbour.open()
-        service = harbour.service
-        mission = await service.create(sim_spec(steps=3))
-        await act(service, mission.id, "start", actor="Ana")
+        service, mission_id = await started_anew(harbour)
 
         async def told() -> list[str]:
             async with harbour.database.reading() as session:
@@ -96,7 +98,7 @@ async def test_an_operator_is_told_that_the_first_legs_wait_for_a_planner_that_i
             "planner 'random' is being compiled, once on this machine: vehicles get their first legs when that is done"
         ]
         compiled.set()
-        await until_step(service, mission.id, 1)
+        await until_step(service, mission_id, 1)
         assert len(await told()) == 1
     finally:
         compiled.set()

@@ -24,9 +24,9 @@ from app.missions.errors import (
     MissionError,
     MissionNotFoundError,
     MissionUnreadableError,
+    NotAMemberError,
     PingsNotFoundError,
     PingsUnreadableError,
-    ProcessApartError,
     ProductUnavailableError,
     SiteNotFoundError,
     SoundingNotFoundError,
@@ -52,7 +52,7 @@ KINDS: dict[type[MissionError], str] = {
     MoveRefusedError: "move-refused",
     PingsNotFoundError: "pings-not-found",
     PingsUnreadableError: "pings-unreadable",
-    ProcessApartError: "not-ready",
+    NotAMemberError: "not-ready",
     ProductUnavailableError: "product-unavailable",
     SiteNotFoundError: "site-not-found",
     SoundingNotFoundError: "sounding-not-found",
@@ -116,7 +116,7 @@ def _mission_problem(request: Request, error: MissionError) -> Response:
             )
         )
     problem = make_problem(kind, detail, instance=instance_of(request.scope), remedy=remedy, errors=errors)
-    later = isinstance(error, ImportUnavailableError | ProcessApartError | ProductUnavailableError)
+    later = isinstance(error, ImportUnavailableError | NotAMemberError | ProductUnavailableError)
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)} if later else None)
 
 

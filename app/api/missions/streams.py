@@ -21,7 +21,7 @@ from app.api.http.problems import ProblemError, problems
 from app.api.mission import Mission
 from app.api.schemas import API, is_mission_id
 from app.api.state import EdgeState, State, edge_state
-from app.missions.errors import MissionElsewhereError, MissionError, MissionNotFoundError, ProcessApartError
+from app.missions.errors import MissionElsewhereError, MissionError, MissionNotFoundError, NotAMemberError
 from app.missions.live.watchers.broadcast import WatchEndedError
 from app.missions.operations.history import events_after
 from app.missions.running.mission_views import followed, watched
@@ -220,7 +220,7 @@ async def live(websocket: WebSocket, mission_id: str) -> None:
             "too-many-streams": CLOSE_TOO_MANY,
         }
         await _close(websocket, codes[error.kind], error.detail)
-    except (MissionElsewhereError, ProcessApartError) as error:
+    except (MissionElsewhereError, NotAMemberError) as error:
         await _close(websocket, CLOSE_TRY_AGAIN, str(error))
     except MissionError as error:
         await _close(websocket, CLOSE_NOT_FOUND, str(error))

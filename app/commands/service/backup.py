@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.command import CommandError, Database, check_database, command_settings, noted, unnoted_said
+from app.commands.command import CommandError, Database, audit_failure_told, check_database, command_settings, noted
 
 if TYPE_CHECKING:
     from app.storage.upkeep.backup import Contents
@@ -41,7 +41,7 @@ def backup(
         raise CommandError(str(error), error.remedy) from None
     _tell(path, contents, "is written and checked")
     # In the database, not in the copy: a copy of everything is worth an audit entry, though not an upgrade.
-    with unnoted_said():
+    with audit_failure_told():
         if asyncio.run(is_up_to_date(settings.database_url)):
             asyncio.run(noted(settings, "backup", str(path)))
         else:
@@ -69,7 +69,7 @@ def restore(
     if aside is not None:
         typer.echo(f"what was there before is now {aside}")
     _tell(file, contents, "is restored")
-    with unnoted_said():
+    with audit_failure_told():
         if settings.migrates_itself or asyncio.run(is_up_to_date(settings.database_url)):
             asyncio.run(noted(settings, "restore", str(file)))
         else:

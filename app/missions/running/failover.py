@@ -9,7 +9,7 @@ import structlog
 from sqlalchemy.exc import SQLAlchemyError
 
 from app.missions.alarm_kinds import AlarmKind
-from app.missions.errors import ConflictError, MissionElsewhereError, ProcessApartError
+from app.missions.errors import ConflictError, MissionElsewhereError, NotAMemberError
 from app.missions.fleet.hub import FleetHub
 from app.missions.live.mission import LiveMission
 from app.missions.running.claims import Claims
@@ -168,7 +168,7 @@ class Failover:
         """Take missions up; what is left over is found again when the watch looks next."""
         try:
             await self._take_up(missions)
-        except (ProcessApartError, SQLAlchemyError, OSError) as error:
+        except (NotAMemberError, SQLAlchemyError, OSError) as error:
             log.error("missions cannot be taken up", error=str(error))
         except Exception:
             log.exception("missions cannot be taken up")
@@ -181,7 +181,7 @@ class Failover:
                 await self._registry.get(mission_id)
             except MissionElsewhereError:
                 continue
-            except (ProcessApartError, SQLAlchemyError, OSError):
+            except (NotAMemberError, SQLAlchemyError, OSError):
                 raise  # that concerns all of them
             except Exception:
                 # One that cannot be read, as when a newer version wrote it, is not the others' trouble.

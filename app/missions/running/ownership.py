@@ -16,7 +16,7 @@ import structlog
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
-from app.missions.errors import MissionElsewhereError, ProcessApartError
+from app.missions.errors import MissionElsewhereError, NotAMemberError
 from app.missions.states import AT_SEA
 from app.storage.database import Database, Guard
 from app.storage.models import ProcessRow
@@ -66,7 +66,7 @@ class Ownership:
 
     def __init__(self, database: Database, url: str, certificate: str | None = None) -> None:
         self._database = database
-        self._apart = database.apart()
+        self._reserved = database.reserved()
         self._url = url
         self._certificate = certificate
         self.secret = secrets.token_hex(32)
@@ -109,7 +109,7 @@ class Ownership:
         self._mine.clear()
         for _ in range(TRIES):
             row = ProcessRow(url=self._url, secret=self.secret, certificate=self._certificate, began_at=now())
-            async with self._apart.writing() as session:
+            async with self._reserved.writing() as session:
                 session.add(row)
                 await session.flush()
                 self._number = row.id
@@ -136,7 +136,7 @@ class Ownership:
         """Give everything up and tell the others."""
         if self._number:
             try:
-                async with self._apart.writing() as session:
+                async with self._reserved.writing() as session:
                     await processes.bury(session, [self._number])
                 await self._membership.call()
             except Exception as error:
@@ -161,7 +161,7 @@ class Ownership:
         dead = {row.id for row in known} - alive
         if dead:
             await self._membership.end_sessions(dead)
-            async with self._apart.writing() as session:
+            async with self._reserved.writing() as session:
                 await processes.bury(session, dead)
             log.warning("another process ended, or hangs", processes=sorted(dead))
         self._peers = {
@@ -176,7 +176,7 @@ class Ownership:
 
         Raises
         ------
-        ProcessApartError
+        NotAMemberError
             While this process knows of no other one.
         """
         if mission_id in self._mine:
@@ -189,16 +189,16 @@ class Ownership:
             try:
                 await self.look()
             except MembershipLostError as error:
-                raise _apart() from error
+                raise _not_a_member() from error
         return self._peers.get(number)
 
-    def check_together(self, entries: int) -> None:
-        """Raise ProcessApartError where this process stands aside, or is a new one since it had entered so often."""
+    def check_member(self, entries: int) -> None:
+        """Raise NotAMemberError where this process stands aside, or is a new one since it had entered so often."""
         if self.aside or entries != self.entries:
-            raise _apart()
+            raise _not_a_member()
 
     async def take(self, mission_id: str) -> bool:
-        """Have a mission from now on; False when another process has it. Raises ProcessApartError."""
+        """Have a mission from now on; False when another process has it. Raises NotAMemberError."""
         async with self._database.writing() as session:
             await self.take_within(session, mission_id)
             mine = await processes.owner(session, mission_id) == self._number
@@ -211,11 +211,11 @@ class Ownership:
 
         Raises
         ------
-        ProcessApartError
+        NotAMemberError
             When this process is none of those that share the database: whatever the transaction wrote is taken back.
         """
         if not await processes.is_known(session, self._number):
-            raise _apart()
+            raise _not_a_member()
         await processes.take(session, mission_id, self._number, now())
 
     async def release(self, mission_ids: Iterable[str]) -> None:
@@ -237,8 +237,8 @@ class Ownership:
         return check
 
 
-def _apart() -> ProcessApartError:
-    return ProcessApartError(
+def _not_a_member() -> NotAMemberError:
+    return NotAMemberError(
         "this process is none of those that share the database now: it was out of reach, or others took it for dead",
         "Ask again in a moment: it enters again by itself as soon as it can",
     )

@@ -137,7 +137,7 @@ class MissionRegistry:
 
         Raises
         ------
-        MissionNotFoundError, MissionElsewhereError, MissionUnreadableError, ProcessApartError
+        MissionNotFoundError, MissionElsewhereError, MissionUnreadableError, NotAMemberError
         """
         live = self._live.get(mission_id)
         if live is not None and not await self._was_removed(live):
@@ -153,7 +153,7 @@ class MissionRegistry:
             entries = 0
             if self._ownership is not None:
                 entries = self._ownership.entries
-                self._ownership.check_together(entries)
+                self._ownership.check_member(entries)
                 if not (await self._may_take_up(row) and await self._ownership.take(mission_id)):
                     raise MissionElsewhereError(f"another process has mission {mission_id}", "ask again in a moment")
                 database = database.guarded(self._ownership.guard(mission_id))
@@ -166,7 +166,7 @@ class MissionRegistry:
                 await self._complete(live, row)
                 if self._ownership is not None:
                     # Others may have it meanwhile. From here until its vehicles fly nothing is waited for.
-                    self._ownership.check_together(entries)
+                    self._ownership.check_member(entries)
             except BaseException:
                 live.abandon("it could not be taken up")
                 raise
@@ -217,7 +217,7 @@ class MissionRegistry:
             await self._ownership.release([live.id])
 
     async def own(self, session: AsyncSession, mission_id: str) -> None:
-        """Have a new mission together with its rows, or none of both. Raises ProcessApartError."""
+        """Have a new mission together with its rows, or none of both. Raises NotAMemberError."""
         if self._ownership is not None:
             await self._ownership.take_within(session, mission_id)
 

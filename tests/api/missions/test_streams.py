@@ -18,7 +18,7 @@ from sqlalchemy.exc import TimeoutError as NoFreeConnectionError
 from app.api.accounts.roles import Role
 from app.api.accounts.tokens import TokenStore
 from app.main import Server
-from app.missions.errors import MissionElsewhereError, ProcessApartError
+from app.missions.errors import MissionElsewhereError, NotAMemberError
 from app.missions.views.messages import LiveMessage
 from app.missions.views.mission import Level
 from app.settings import Settings
@@ -138,7 +138,7 @@ async def test_an_unknown_mission_closes_the_socket_with_a_reason(server: Server
 @pytest.mark.parametrize(
     "error",
     [
-        ProcessApartError("apart"),
+        NotAMemberError("apart"),
         MissionElsewhereError("elsewhere"),
         NoFreeConnectionError("none is free"),
         OperationalError("select", None, ConnectionError("gone")),

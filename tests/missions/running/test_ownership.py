@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import pytest
 from sqlalchemy import text
 
-from app.missions.errors import ConflictError, MissionElsewhereError, ProcessApartError
+from app.missions.errors import ConflictError, MissionElsewhereError, NotAMemberError
 from app.missions.live.load import take_up
 from app.missions.operations.history import events_after
 from app.missions.running import failover, registry
@@ -203,6 +203,9 @@ async def test_a_server_that_is_cut_off_without_a_word_stops_the_vehicles_in_tim
         await until(lambda: mission.id not in service._runs, "its vehicles are stopped", 20.0)
         cable.mend()
         await until(lambda: mission.id in service._runs, "they go on", 60.0)
+        step = (await view_of(service, mission.id)).progress.step
+        await until_step(service, mission.id, step + 1)
+        assert (await view_of(service, mission.id)).state is MissionState.RUNNING
 
 
 async def test_a_server_that_changes_places_with_its_standby_leaves_no_mission_without_anybody_who_flies_it(
@@ -294,6 +297,7 @@ async def test_a_mission_that_cannot_be_read_for_a_while_does_not_hold_up_who_ta
             await until(begun, "one of them takes it up")
             for service in services:
                 await looks(url, service.process.number, 2)
+                assert (await service.ready())[1]["watch"] == "ok"
 
 
 @pytest.mark.parametrize("trouble", [asyncio.CancelledError, OSError, ValueError])
@@ -376,7 +380,7 @@ async def test_what_a_request_takes_up_does_not_fly_where_others_may_have_it_mea
         await asyncio.to_thread(query, harbour.database.url, "delete from processes")
         await watch._come_back()
     go_on.set()
-    with pytest.raises((ProcessApartError, MissionElsewhereError)):
+    with pytest.raises((NotAMemberError, MissionElsewhereError)):
         await asking
     assert mission not in service._runs
     assert list(service._registry) == []
@@ -403,11 +407,11 @@ async def test_who_is_no_process_of_the_database_stores_no_mission(open_service:
     await service._failover.end()  # it would enter again
     stored = (await service.create(make_spec())).id
     await asyncio.to_thread(query, harbour.database.url, "delete from processes")
-    with pytest.raises(ProcessApartError, match="none of those that share the database"):
+    with pytest.raises(NotAMemberError, match="none of those that share the database"):
         await service.create(make_spec())
     assert query(harbour.database.url, "select id from missions") == [(stored,)]
     service._registry.drop()
-    with pytest.raises(ProcessApartError):
+    with pytest.raises(NotAMemberError):
         await service.get(stored)
 
 

@@ -40,6 +40,8 @@ while True:
     connection.execute("COMMIT")
 """
 
+NEEDS_PG_DUMP = pytest.mark.skipif(shutil.which("pg_dump") is None, reason="pg_dump is not installed")
+
 
 def path_of(url: str) -> Path:
     return Path(url.removeprefix("sqlite+aiosqlite:///"))
@@ -243,13 +245,12 @@ async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Pa
         back_up(f"sqlite+aiosqlite:///{tmp_path / 'absent.db'}", tmp_path / "x.db")
 
 
+@NEEDS_PG_DUMP
 async def test_postgresql_is_copied_by_its_own_programs(
     databases: Databases,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    if shutil.which("pg_dump") is None:
-        pytest.skip("pg_dump is not installed")
     url = databases.fresh("postgresql")
     database = Database(url)
     files, others = PingFiles(str(tmp_path / "files")), PingFiles(str(tmp_path / "others"))
@@ -281,11 +282,10 @@ async def test_postgresql_is_copied_by_its_own_programs(
     assert "docker compose exec database pg_dump" in refused.value.remedy
 
 
+@NEEDS_PG_DUMP
 async def test_a_database_of_postgresql_is_not_replaced_while_a_process_has_it(
     databases: Databases, tmp_path: Path
 ) -> None:
-    if shutil.which("pg_dump") is None:
-        pytest.skip("pg_dump is not installed")
     url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "files"))
     copy, _ = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
     member = make_membership(url, lambda: None)
@@ -296,11 +296,10 @@ async def test_a_database_of_postgresql_is_not_replaced_while_a_process_has_it(
     await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
 
 
+@NEEDS_PG_DUMP
 async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
     databases: Databases, tmp_path: Path
 ) -> None:
-    if shutil.which("pg_dump") is None:
-        pytest.skip("pg_dump is not installed")
     url = databases.fresh("postgresql")
     database, files = Database(url), PingFiles(str(tmp_path / "files"))
     await fill(database, files)
@@ -320,6 +319,7 @@ async def test_what_was_told_of_alarms_comes_back_though_who_told_it_does_not(
     assert query(url, statement) == waiting, "over the row that named a process"
 
 
+@NEEDS_PG_DUMP
 @pytest.mark.parametrize("revision", ["0006", "0018"])  # before the audit log, and of a release
 async def test_the_backup_of_an_older_version_replaces_a_newer_database(
     databases: Databases,
@@ -329,8 +329,6 @@ async def test_the_backup_of_an_older_version_replaces_a_newer_database(
     revision: str,
 ) -> None:
     """The way back after an upgrade; what others keep beside it stays."""
-    if shutil.which("pg_dump") is None:
-        pytest.skip("pg_dump is not installed")
     older, newer, files = databases.empty("postgresql"), databases.fresh("postgresql"), PingFiles(str(tmp_path / "p"))
     await migrate.upgrade(older, revision)
     query(older, "insert into tokens (id, name, role, token_hash, created_at) values ('t', 'Ana', 'admin', 'd', now())")
@@ -355,8 +353,6 @@ async def test_the_backup_of_an_older_version_replaces_a_newer_database(
 
 
 async def test_an_archive_goes_into_postgresql_as_a_whole_or_not_at_all(databases: Databases, tmp_path: Path) -> None:
-    if shutil.which("pg_dump") is None:
-        pytest.skip("pg_dump is not installed")
     files = PingFiles(str(tmp_path / "files"))
     copy, _ = await asyncio.to_thread(back_up, databases.fresh("postgresql"), tmp_path / "fleet.dump", files)
     url = databases.empty("postgresql")
@@ -379,8 +375,6 @@ async def test_a_password_is_given_to_no_command_line(tmp_path: Path, monkeypatc
 
 
 async def test_a_server_is_found_and_spoken_to_as_its_url_says(databases: Databases, tmp_path: Path) -> None:
-    if shutil.which("pg_dump") is None:
-        pytest.skip("pg_dump is not installed")
     url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "files"))
     by_socket = databases.server.socket_url.format(url.rpartition("/")[2])
     assert await migrate.current(by_socket) == migrate.head()
