@@ -2,9 +2,11 @@
 
 phi = (expected progress of landmarks in sight towards accuracy, expected newly accurate ones, minus the sum over the
 vehicles of the distance to the closest open landmark, in steps). Unseen landmarks are taken to be as deep as the
-closest seen one. While nothing is gained the whole team heads for one common landmark: vehicles that pull towards
-different ones under a communication limit would hold each other back for ever. Each goes there round keep-out zones,
-and so high that it comes over what lies between: of small changes none leads out from behind a wall.
+closest seen one. While nothing is gained each vehicle heads for the open landmark that is closest to it; under a
+communication limit the whole team for one common landmark, because vehicles that pull towards different ones would
+hold each other back for ever. Each goes there round keep-out zones, and so high that it comes over what lies between:
+of small changes none leads out from behind a wall. Landmarks that are not seen where they are estimated are set aside
+while there are others.
 """
 
 from typing import Any
@@ -12,20 +14,27 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from app.arrays import FloatArray
+from app.arrays import FloatArray, IntArray
 from app.estimation import RangeSensor, Sensor
 from app.exploration.cao.regressors.landmark_predictions import Listed, predict, within_reach
+from app.exploration.cao.regressors.missed import MissedLandmarks
 from app.exploration.cao.regressors.moves import team_moves
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.constraints import Constraints
-from app.exploration.core.information_need import lacking
+from app.exploration.core.information_need import Lacking, lacking
 from app.exploration.core.problem import Situation
 from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.measured import MeasuredObjective
 from app.exploration.planner.options import PlannerOptions
 
 PATIENCE = 3
-"""Steps without a new accurate landmark after which the team heads for one common landmark."""
+"""Steps without a new accurate landmark after which vehicles head for landmarks as such."""
+
+AGAIN = 30
+"""Steps without a new accurate landmark after which those that were set aside are looked for again."""
+
+THERE_STEPS = 1.5
+"""A vehicle this close to where a landmark is estimated, in steps over ground, has come to it."""
 
 SAME_OF_STEP = 1e-3
 """A corner of a way this close, in steps, is passed."""
@@ -45,6 +54,7 @@ class LandmarkRegressors:
         self._measured = MeasuredObjective(sensor, options)
         self._accurate = 0
         self._idle = 0
+        self._missed = MissedLandmarks()
         self._space: tuple[Constraints, FreeSpace] | None = None
 
     def begin(self, team: Situation, bottom: Bottom, seed: int) -> FloatArray:
@@ -60,8 +70,10 @@ class LandmarkRegressors:
             depth[~known] = depth[known][nearest]
         elif not known.any():
             depth[:] = team.positions[:, 2].max() + self._sensor.visibility_m / 2
-        left = lacking(belief, self._options.accuracy_sd_m)
-        self._points = np.ascontiguousarray(np.column_stack([belief.xy_m, depth])[left.row])
+        points = np.column_stack([belief.xy_m, depth])
+        self._missed.update(belief, points, team.positions, self._sensor.visibility_m)
+        left = self._promising(lacking(belief, self._options.accuracy_sd_m))
+        self._points = np.ascontiguousarray(points[left.row])
         self._needed = left.need
         self._direction = None if belief.covariance_m2 is None else left.direction
         J = self._measured.update(team)
@@ -70,18 +82,41 @@ class LandmarkRegressors:
         self._idle = 0 if gained else self._idle + 1
         self._goals: FloatArray | None = None
         if self._idle >= PATIENCE and len(self._points):
-            squared = ((self._points[None, :, :2] - team.positions[:, None, :2]) ** 2).sum(axis=2)
-            self._goals = self._ways_to(self._points[int(squared.min(axis=0).argmin())], bottom)
+            self._goals = self._ways_to(self._goal_points(left.row), bottom)
         return J
 
-    def _ways_to(self, goal: FloatArray, bottom: Bottom) -> FloatArray:
-        """Return where each vehicle heads (n_vehicles, 3) to come to a landmark (3,)."""
+    def _promising(self, left: Lacking) -> Lacking:
+        """Return the tasks without those of landmarks that are set aside; all of them where nothing else is left."""
+        if self._idle and self._idle % AGAIN == 0:
+            self._missed.forget()
+        wanted = ~self._missed.set_aside[left.row]
+        if not wanted.any():
+            self._missed.forget()
+            return left
+        return Lacking(left.row[wanted], left.direction[wanted], left.need[wanted])
+
+    def _goal_points(self, rows: IntArray) -> FloatArray:
+        """Return where the landmark is estimated that each vehicle heads for, (n_vehicles, 3).
+
+        ``rows`` (k,) are the landmarks of ``self._points``.
+        """
         team = self._team
-        ends = np.repeat(goal[None], len(team.positions), axis=0)
+        squared = ((self._points[None, :, :2] - team.positions[:, None, :2]) ** 2).sum(axis=2)
+        goals = squared.argmin(axis=1)
+        if np.isfinite(team.constraints.com_range_m):
+            goals[:] = squared.min(axis=0).argmin()
+        away = np.sqrt(squared[np.arange(len(goals)), goals])
+        self._missed.count(np.unique(rows[goals[away < THERE_STEPS * team.constraints.max_step_m]]))
+        return np.asarray(self._points[goals])
+
+    def _ways_to(self, goals: FloatArray, bottom: Bottom) -> FloatArray:
+        """Return where each vehicle heads (n_vehicles, 3) to come to its landmark (n_vehicles, 3)."""
+        team = self._team
+        ends = goals.copy()
         if team.constraints.keep_out:
             space = self._free(team.constraints)
-            there, same = space.nearest(goal[:2]), SAME_OF_STEP * team.constraints.max_step_m
-            ends[:, :2] = [space.corner(here, there, same) for here in team.positions[:, :2]]
+            same, here = SAME_OF_STEP * team.constraints.max_step_m, team.positions[:, :2]
+            ends[:, :2] = [space.corner(a, space.nearest(b), same) for a, b in zip(here, goals[:, :2], strict=True)]
         away = np.hypot(*(ends - team.positions)[:, :2].T).max()
         along = np.linspace(0.0, 1.0, 2 + int(2.0 * away / bottom.cell_m))[:, None, None]
         ways = team.positions[:, :2] + along * (ends - team.positions)[:, :2]
@@ -131,9 +166,16 @@ class LandmarkRegressors:
 
     def remember(self) -> dict[str, Any]:
         """Return the memory."""
-        return {"measured": self._measured.remember(), "accurate": self._accurate, "idle": self._idle}
+        return {
+            "measured": self._measured.remember(),
+            "accurate": self._accurate,
+            "idle": self._idle,
+            "missed": self._missed.remember(),
+        }
 
     def recall(self, state: dict[str, Any]) -> None:
         """Take up what :meth:`remember` returned."""
         self._measured.recall(state["measured"])
         self._accurate, self._idle = int(state["accurate"]), int(state["idle"])
+        if "missed" in state:  # not in missions of older versions
+            self._missed.recall(state["missed"])
