@@ -237,7 +237,11 @@ def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathy
     assert bathyfleet("backup", "--verify", str(copy)).code == 0
     assert bathyfleet("restore", str(copy)).code == 1
     assert bathyfleet("restore", str(copy), "--replace").code == 0
-    assert bathyfleet("prune", "--days", "30", "--apply").stdout.startswith("0 missions removed")
+    (tmp_path / "pings" / "m1").mkdir(parents=True)
+    (tmp_path / "pings" / "m1" / "another's.parquet").touch()
+    pruned = bathyfleet("prune", "--days", "30", "--apply").stdout
+    assert pruned.startswith("0 missions removed")
+    assert f"1 files of pings in {tmp_path / 'pings'} are of no mission of this database and stay" in pruned
     lines = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
     assert [(line["action"], line["result"]) for line in lines] == [
         ("restore", "done"),

@@ -1,6 +1,7 @@
 """Copies of a database that is in use, checked, damaged and put back; and room for new missions."""
 
 import asyncio
+import hashlib
 import os
 import re
 import resource
@@ -18,11 +19,11 @@ from sqlalchemy.exc import DBAPIError
 
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
-from app.storage.ping_files import PingFiles
+from app.storage.ping_files import REMOVED, PingFiles, file_name
 from app.storage.processes.membership import make_membership
 from app.storage.upkeep import migrate
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
-from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
+from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove, unlisted_files
 from tests.support.storage.databases import Databases, query
 from tests.support.storage.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
 
@@ -195,7 +196,7 @@ async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlit
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
         restore_to(sqlite.url, copy, replace=True, pings=files)
     assert files.names() == [PING_FILE_NAME]
-    files.remove("m1")
+    files.remove("m1", [PING_FILE_NAME])
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
         back_up(sqlite.url, tmp_path / "again.db", files)
     assert not beside(tmp_path, "again")
@@ -222,11 +223,41 @@ async def test_a_mission_that_goes_takes_its_files_of_pings_along_whenever_the_p
     await finish_removing(database, files)
     assert (len(files.names()), files.condemned()) == (2, []), "the mission is still there"
     with monkeypatch.context() as kill:
-        kill.setattr(files, "remove", killed)
+        kill.setattr(files, "_remove", killed)
         with pytest.raises(KeyboardInterrupt):
             await remove(database, "m1", 30, files)
     await finish_removing(database, files)
     assert (files.names(), files.condemned()) == (["m2/other.parquet"], [])
+    assert await unlisted_files(database, files) == ["m2/other.parquet"]
+
+
+async def test_a_mission_that_goes_leaves_files_that_another_database_has_of_it(
+    databases: Databases, tmp_path: Path
+) -> None:
+    """One that was moved aside, for example: it knows pings that came after the backup."""
+    older, newer = Database(databases.fresh("sqlite")), Database(databases.fresh("sqlite"))
+    files, long_ago = PingFiles(str(tmp_path / "pings")), datetime.now(UTC) - timedelta(days=100)
+    content = b"came after the backup"
+    digest = hashlib.sha256(content).hexdigest()
+    later = file_name("m1", 2, digest)
+    files.write(PING_FILE_NAME, PING_FILE)
+    files.write(later, content)
+    for database in (older, newer):
+        async with database.writing() as session:
+            session.add(mission("m1", state="finished", updated_at=long_ago))
+            await session.flush()
+            session.add(ping_chunk())
+    assert await remove(older, "m1", 30, files)
+    await finish_removing(newer, files)
+    assert files.names() == [later]
+    assert await unlisted_files(newer, files) == [later]
+
+    # What another database condemned is not taken from one that has the mission.
+    files.write(f"m1{REMOVED}", later.encode())
+    await finish_removing(newer, files)
+    assert (files.names(), files.condemned()) == ([later], [])
+    await older.close()
+    await newer.close()
 
 
 async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Path) -> None:
