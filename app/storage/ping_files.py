@@ -200,16 +200,35 @@ class PingFiles:
         return [name.removesuffix(REMOVED) for name in names if name.endswith(REMOVED)]
 
     def copy_to(self, other: "PingFiles", names: Iterable[str]) -> int:
-        """Copy files, each checked by the digest in its name; returns how many. Raises PingFileError."""
-        copied = 0
-        for name in names:
-            other.write(name, self.read(name, digest_in(name)))
-            copied += 1
-        return copied
+        """Copy files, each checked by the digest in its name; returns how many the other place has of them now.
 
-    def move_aside(self, suffix: str) -> Path | None:
-        """Rename the folder, if it is one of this machine and there; returns what it is called now."""
-        folder = self.folder
-        if folder is None or not folder.is_dir():
-            return None
-        return folder.rename(folder.with_name(f"{folder.name}.{suffix}"))
+        Those that are there whole are not written again. What was written goes when the rest fails.
+
+        Raises
+        ------
+        PingFileError
+            When a file is missing or damaged here.
+        OSError
+            When one cannot be written there.
+        """
+        there, written, count = set(other.names()), list[str](), 0
+        try:
+            for name in names:
+                count += 1
+                if name not in there or not other.is_whole(name):
+                    other.write(name, self.read(name, digest_in(name)))
+                    written.append(name)
+        except BaseException:
+            file_system, root = other._place
+            for name in written:
+                file_system.rm_file(f"{root}/{name}")
+            raise
+        return count
+
+    def is_whole(self, name: str) -> bool:
+        """Tell whether a file is there and has the digest in its name."""
+        try:
+            self.read(name, digest_in(name))
+        except PingFileError:
+            return False
+        return True

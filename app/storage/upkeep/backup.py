@@ -4,8 +4,8 @@ import dataclasses
 import os
 import shutil
 import sqlite3
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -140,8 +140,8 @@ def _ping_files(file: Path) -> list[str]:
 def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None = None) -> tuple[Contents, Path | None]:
     """Put a checked backup in the database's place; returns what it holds, and where what was there before is now.
 
-    ``pings`` are the files of pings, those of the backup are put there; None: in the usual place. What is there
-    already goes aside with the database.
+    ``pings`` are the files of pings, those of the backup are added there; None: in the usual place. What is there
+    stays: the database that goes aside refers to it, and so may others.
 
     Raises
     ------
@@ -166,8 +166,8 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
         if postgres_archive.is_in_use(parsed):
             raise BackupError(f"the database {parsed.database} is in use", "Stop the service first")
-        with _put_back(files, beside, beside.names(), before if replace else ""):
-            postgres_archive.put_back(parsed, file, replace=replace)
+        _add_ping_files(files, beside, beside.names())
+        postgres_archive.put_back(parsed, file, replace=replace)
         return contents, None
     if not contents.revision:
         raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
@@ -190,11 +190,11 @@ def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Pat
         with file.open("rb") as source, private.open_new(part, "wb") as copy:
             shutil.copyfileobj(source, copy)
         _to_disk(part)
-        with _put_back(files, files_beside(file), _ping_files(file), before if there else ""):
-            if there:
-                _close_for_good(path)  # once more: copying may have taken long
-                path.rename(aside)
-            part.rename(path)
+        _add_ping_files(files, files_beside(file), _ping_files(file))
+        if there:
+            _close_for_good(path)  # once more: copying may have taken long
+            path.rename(aside)
+        part.rename(path)
     except OSError as error:
         raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
     finally:
@@ -205,21 +205,11 @@ def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Pat
     return aside if there else None
 
 
-@contextmanager
-def _put_back(files: PingFiles, beside: PingFiles, names: Sequence[str], aside: str) -> Iterator[None]:
-    """Put files of pings in their place before what refers to them is put in its own.
-
-    What is there already goes ``aside`` under a name with this; when the rest fails it comes back.
-    """
-    moved = files.move_aside(aside) if aside else None
-    try:
-        beside.copy_to(files, names)
-        yield
-    except BaseException:
-        if moved is not None and files.folder is not None:
-            shutil.rmtree(files.folder, ignore_errors=True)
-            moved.rename(files.folder)
-        raise
+def _add_ping_files(files: PingFiles, beside: PingFiles, names: Sequence[str]) -> None:
+    """Put a backup's files of pings in their place, before the database that refers to them is put in its own."""
+    beside.copy_to(files, names)
+    for mission_id in {name.partition("/")[0] for name in names}:
+        files.spare(mission_id)  # its removal had not come to an end
 
 
 def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:

@@ -182,12 +182,6 @@ async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlit
     copy, made = back_up(sqlite.url, tmp_path / "copy.db", files)
     assert made.ping_files == contents_of(copy).ping_files == 1
     assert all(file.stat().st_mode & 0o077 == 0 for file in (tmp_path / "copy.db-pings").rglob("*"))
-    files.write("m2/000000000001-later.parquet", b"of a mission that the backup does not know")
-    restore_to(sqlite.url, copy, replace=True, pings=files)
-    assert files.names() == [PING_FILE_NAME]
-    (aside,) = beside(tmp_path, "pings.before-")
-    assert len(PingFiles(str(aside)).names()) == 2, "with the database that was there"
-
     file = tmp_path / "copy.db-pings" / PING_FILE_NAME
     file.write_bytes(PING_FILE + b"?")
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
@@ -200,6 +194,65 @@ async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlit
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
         back_up(sqlite.url, tmp_path / "again.db", files)
     assert not beside(tmp_path, "again")
+
+
+@pytest.mark.parametrize("place", ["folder", "url"])
+async def test_what_is_replaced_keeps_its_files_of_pings(sqlite: Database, tmp_path: Path, place: str) -> None:
+    files = PingFiles(str(tmp_path / "pings") if place == "folder" else f"memory://{tmp_path.name}/pings")
+    await fill(sqlite, files)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db", files)
+    content = b"pings that came after the backup"
+    digest = hashlib.sha256(content).hexdigest()
+    later, another_s = file_name("m1", 2, digest), file_name("another-database-s", 1, digest)
+    for name in (later, another_s):
+        files.write(name, content)
+    async with sqlite.writing() as session:
+        row = ping_chunk()
+        row.name, row.digest, row.first_block, row.last_block = later, digest, 2, 2
+        session.add(row)
+    await sqlite.close()
+    files.write(f"m1{REMOVED}", PING_FILE_NAME.encode())  # by a removal that was killed
+
+    _, aside = restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert files.names() == sorted([another_s, later, PING_FILE_NAME])
+    assert files.condemned() == [], "the mission is there again"
+    assert not beside(tmp_path, "pings.")
+    found = query(f"sqlite+aiosqlite:///{aside}", "select name, digest from ping_chunks order by id")
+    assert [files.read(name, digest) for name, digest in found] == [PING_FILE, content]
+    database = Database(sqlite.url)
+    assert await unlisted_files(database, files) == [another_s, later]
+    await database.close()
+
+
+async def test_a_restore_without_room_for_files_of_pings_leaves_none_behind(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    content = bytes(100_000)
+    digest = hashlib.sha256(content).hexdigest()
+    large = file_name("m1", 2, digest)
+    PingFiles.beside(sqlite.url).write(large, content)
+    async with sqlite.writing() as session:
+        row = ping_chunk()
+        row.name, row.digest = large, digest
+        session.add(row)
+    await sqlite.close()
+    before = await counts(sqlite.url)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    most, room = resource.getrlimit(resource.RLIMIT_FSIZE), PingFiles(str(tmp_path / "room"))
+
+    class SmallDisk(PingFiles):
+        def write(self, name: str, content: bytes) -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, most[1]))
+            try:
+                super().write(name, content)
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, most)
+
+    with pytest.raises(BackupError, match="cannot be written: File too large"):
+        restore_to(sqlite.url, copy, replace=True, pings=SmallDisk(room.url))
+    assert room.names() == []
+    assert await counts(sqlite.url) == before
+    restore_to(sqlite.url, copy, replace=True, pings=room)
+    assert room.names() == [PING_FILE_NAME, large]
 
 
 async def test_a_mission_that_goes_takes_its_files_of_pings_along_whenever_the_process_is_killed(
