@@ -177,32 +177,47 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
 def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Path | None:
     """Put SQLite's file in its place; returns where what was there is now, under a name with ``before``.
 
-    The old one keeps its name until all of the new one is on the disk: whatever ends this, there is a database.
+    The old one keeps its name until the new one takes it, whole and with all its files of pings: whatever ends this,
+    there is a database and nothing of it is missing.
     """
     if path.exists() and not before:
         raise BackupError(f"{path} exists", "--replace moves it aside")
     private.make_folder(path.parent)
     part, aside = path.with_name(path.name + ".part"), path.with_name(f"{path.name}.{before}")
     there = path.exists()
+    if there and aside.exists():
+        raise BackupError(f"{aside} exists", "Try again in a second: that name has the time in it")
     try:
         if there:
             _close_for_good(path)
+        _add_ping_files(files, files_beside(file), _ping_files(file))
         with file.open("rb") as source, private.open_new(part, "wb") as copy:
             shutil.copyfileobj(source, copy)
         _to_disk(part)
-        _add_ping_files(files, files_beside(file), _ping_files(file))
         if there:
             _close_for_good(path)  # once more: copying may have taken long
-            path.rename(aside)
-        part.rename(path)
+            _keep(path, aside)
+        part.replace(path)
+        _to_disk(path)
     except OSError as error:
         raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
     finally:
-        part.unlink(missing_ok=True)
-        if there and not path.exists():
-            aside.rename(path)
+        if part.exists():  # it did not take its place
+            part.unlink()
+            if there:
+                aside.unlink(missing_ok=True)
     private.mend([aside])
     return aside if there else None
+
+
+def _keep(path: Path, aside: Path) -> None:
+    """Give a file a second name; a copy has it where the file system knows one name for a file only."""
+    try:
+        aside.hardlink_to(path)
+    except OSError:
+        with path.open("rb") as source:
+            private.write(aside, iter(lambda: source.read(1 << 20), b""))
+        _to_disk(aside)
 
 
 def _add_ping_files(files: PingFiles, beside: PingFiles, names: Sequence[str]) -> None:

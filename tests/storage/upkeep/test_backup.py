@@ -6,6 +6,7 @@ import os
 import re
 import resource
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -23,7 +24,9 @@ from app.storage.ping_files import REMOVED, PingFiles, file_name
 from app.storage.processes.membership import make_membership
 from app.storage.upkeep import migrate
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
+from app.storage.upkeep.prepare import DatabaseNotReadyError, prepare_database
 from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove, unlisted_files
+from tests.support.paths import PROJECT
 from tests.support.storage.databases import Databases, query
 from tests.support.storage.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
 
@@ -158,6 +161,93 @@ async def test_a_restore_that_is_broken_off_leaves_the_database_in_its_place(sql
         restore_to(sqlite.url, copy, replace=True, pings=InterruptedFiles(str(tmp_path / "pings")))
     assert await counts(sqlite.url) == before
     assert not beside(tmp_path, f"{path_of(sqlite.url).name}.")
+
+
+KILLED_RESTORE = """
+import os, shutil, signal, sys
+from pathlib import Path
+from app.storage.ping_files import PingFiles
+from app.storage.upkeep.backup import restore_to
+
+def killed(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+url, backup, moment = sys.argv[1:]
+place, name = {
+    "while a file of pings is written": (PingFiles, "write"),
+    "while the database is copied": (shutil, "copyfileobj"),
+    "before the new one takes its name": (Path, "replace"),
+}[moment]
+setattr(place, name, killed)
+restore_to(url, Path(backup), replace=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("moment", "left"),
+    [
+        ("while a file of pings is written", []),
+        ("while the database is copied", [".part"]),
+        ("before the new one takes its name", [".part", ".before-"]),
+    ],
+)
+async def test_a_killed_restore_leaves_the_database_with_all_its_files_of_pings_and_is_named(
+    databases: Databases,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+    moment: str,
+    left: list[str],
+) -> None:
+    other = Database(databases.fresh("sqlite"))
+    await fill(other, PingFiles(str(tmp_path / "elsewhere")))
+    copy, _ = back_up(other.url, tmp_path / "copy.db", PingFiles(str(tmp_path / "elsewhere")))
+    await other.close()
+    url, content = f"sqlite+aiosqlite:///{tmp_path / 'fleet.db'}", b"pings of the database that is replaced"
+    await migrate.upgrade(url)
+    digest = hashlib.sha256(content).hexdigest()
+    PingFiles.beside(url).write(file_name("m2", 1, digest), content)
+
+    command = [sys.executable, "-c", KILLED_RESTORE, url, str(copy), moment]
+    killed = await asyncio.to_thread(subprocess.run, command, cwd=PROJECT, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert (await counts(url))["missions"] == 0
+    assert PingFiles.beside(url).read(file_name("m2", 1, digest), digest) == content
+    await prepare_database(url, may_upgrade=False)
+    said = capsys.readouterr().out + caplog.text
+    assert ("a restore did not end" in said) == bool(left)
+    assert all(f"fleet.db{name}" in said for name in left)
+
+    if left:
+        path_of(url).rename(tmp_path / "lost.db")
+        with pytest.raises(DatabaseNotReadyError, match=r"a restore of it did not end \(.*fleet\.db\.part is left\)"):
+            await prepare_database(url, may_upgrade=True)
+        (tmp_path / "lost.db").rename(path_of(url))
+    for number in beside(tmp_path, "fleet.db.before-"):
+        number.unlink()  # its name may have this second in it
+    _, aside = await asyncio.to_thread(restore_to, url, copy, replace=True)
+    assert aside is not None
+    assert beside(tmp_path, "fleet.db.") == [aside]
+    assert (await counts(url))["missions"] == 1
+    assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 0
+
+
+async def test_a_database_goes_aside_where_files_have_one_name_only(
+    sqlite: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy, _ = back_up(sqlite.url, tmp_path / "empty.db")
+    await fill(sqlite)
+    await sqlite.close()
+
+    def none(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")  # as on FAT
+
+    monkeypatch.setattr(Path, "hardlink_to", none)
+    _, aside = restore_to(sqlite.url, copy, replace=True)
+    assert aside is not None
+    assert aside.stat().st_mode & 0o777 == 0o600
+    assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
+    assert (await counts(sqlite.url))["missions"] == 0
 
 
 @pytest.mark.parametrize("page", [0, 1, 2, 3])
