@@ -25,17 +25,24 @@ def backup(
 ) -> None:
     """Copy the database to a file while the service goes on writing, and check the copy."""
     from app.storage.ping_files import PingFiles
-    from app.storage.upkeep.backup import BackupError, back_up, contents_of
+    from app.storage.upkeep.backup import BackupError, back_up, contents_of, files_beside
     from app.storage.upkeep.prepare import is_up_to_date
 
     if verify is not None and file is not None:
         raise typer.BadParameter("check a backup or write one, not both", param_hint="--verify")
+    settings = command_settings(database_url=database)
+    files = PingFiles.beside(settings.database_url, settings.pings_url)
     try:
         if verify is not None:
-            _tell(verify, contents_of(verify), "is sound")
+            contents = contents_of(verify, files)
+            _tell(verify, contents, "is sound")
+            if contents.ping_files_elsewhere:
+                typer.echo(
+                    f"{contents.ping_files_elsewhere} of its files of pings are in {files.where('')} only: "
+                    f"copy them to {files_beside(verify).where('')}, or it cannot be restored once they are lost",
+                    err=True,
+                )
             return
-        settings = command_settings(database_url=database)
-        files = PingFiles.beside(settings.database_url, settings.pings_url)
         path, contents = back_up(settings.database_url, file or Path("backups"), files)
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None

@@ -4,7 +4,6 @@ import dataclasses
 import os
 import shutil
 import sqlite3
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -25,13 +24,15 @@ ARCHIVE_MAGIC = b"PGDMP"
 class Contents:
     """What a backup holds: its schema's revision and the rows of every table; both empty for pg_dump's archives.
 
-    ``ping_files`` is how many files of pings are beside it.
+    ``ping_files`` is how many files of pings belong to it, ``ping_files_elsewhere`` how many of these are not beside it
+    but only where the database has its own.
     """
 
     size_bytes: int
     revision: str
     rows: dict[str, int]
     ping_files: int = 0
+    ping_files_elsewhere: int = 0
 
 
 def files_beside(backup: Path) -> PingFiles:
@@ -74,7 +75,7 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
             contents = _database_of(part)
         # Whatever is in the copy has had its file before.
         source = pings or PingFiles.beside(url)
-        copied = source.copy_to(copies, source.names() if suffix == "dump" else _ping_files(part))
+        copied = source.copy_to(copies, _ping_files(part))
         contents = dataclasses.replace(contents, ping_files=copied)
         _to_disk(part)
         part.rename(target)
@@ -91,16 +92,34 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     return target, contents
 
 
-def contents_of(file: Path) -> Contents:
-    """Check a backup from end to end, with the files of pings beside it; returns what it holds. Raises BackupError."""
-    contents, beside = _database_of(file), files_beside(file)
-    names = _ping_files(file) if contents.revision else beside.names()
+def contents_of(file: Path, pings: PingFiles | None = None) -> Contents:
+    """Check a backup from end to end, with each file of pings that it refers to; returns what it holds.
+
+    Those that are not beside it are looked for among ``pings``, where the database has its own.
+
+    Raises
+    ------
+    BackupError
+        When it or a file is damaged, or a file is in neither place.
+    """
+    contents, beside, names = _database_of(file), files_beside(file), _ping_files(file)
+    there = set(beside.names())
+    elsewhere = [name for name in names if name not in there]
     try:
-        for name in names:
+        for name in there.intersection(names):
             beside.read(name, digest_in(name))
     except PingFileError as error:
         raise BackupError(str(error), "Use an older backup") from None
-    return dataclasses.replace(contents, ping_files=len(names))
+    for name in elsewhere:
+        try:
+            (pings or beside).read(name, digest_in(name))
+        except PingFileError as error:
+            raise BackupError(
+                f"{len(elsewhere)} of {len(names)} files of pings are not in {beside.folder}, where they belong: "
+                f"{error}",
+                f"Copy the folder of pings_url to {beside.folder} from where the database was, or use an older backup",
+            ) from None
+    return dataclasses.replace(contents, ping_files=len(names), ping_files_elsewhere=len(elsewhere))
 
 
 def _database_of(file: Path) -> Contents:
@@ -130,7 +149,10 @@ def _database_of(file: Path) -> Contents:
 
 
 def _ping_files(file: Path) -> list[str]:
-    """Return the names of the files of pings that belong to an SQLite database that nobody has open."""
+    """Return the names of the files of pings that a backup refers to, one that nobody has open. Raises BackupError."""
+    with file.open("rb") as opened:
+        if opened.read(len(ARCHIVE_MAGIC)) == ARCHIVE_MAGIC:
+            return postgres_archive.ping_files(file)
     with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'ping_chunks'").fetchone():
             return []  # of a version that had none
@@ -146,10 +168,12 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
     Raises
     ------
     BackupError
-        When the backup is damaged, of another kind or of a newer version, or there is a database already and
-        ``replace`` is False, or somebody has it open.
+        When the backup is damaged, of another kind or of a newer version, lacks files of pings that are not there
+        either, or there is a database already and ``replace`` is False, or somebody has it open.
     """
-    contents = contents_of(file)
+    parsed = make_url(url)
+    files = pings or PingFiles.beside(url)
+    contents = contents_of(file, files)
     revision = contents.revision if contents.rows else postgres_archive.revision(file)
     if not revision:
         raise BackupError(f"{file} holds no database of bathyfleet")
@@ -158,15 +182,13 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
             f"{file} is at revision {revision}, which this version does not know (its newest is {migrate.head()})",
             "Restore it with the version that wrote it; nothing was changed",
         )
-    parsed = make_url(url)
-    files, beside = pings or PingFiles.beside(url), files_beside(file)
-    before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}"
     if parsed.get_backend_name() != "sqlite":
         if contents.revision:
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
         if postgres_archive.is_in_use(parsed):
             raise BackupError(f"the database {parsed.database} is in use", "Stop the service first")
-        _add_ping_files(files, beside, beside.names())
+        _add_ping_files(files, file)
         postgres_archive.put_back(parsed, file, replace=replace)
         return contents, None
     if not contents.revision:
@@ -186,11 +208,11 @@ def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Pat
     part, aside = path.with_name(path.name + ".part"), path.with_name(f"{path.name}.{before}")
     there = path.exists()
     if there and aside.exists():
-        raise BackupError(f"{aside} exists", "Try again in a second: that name has the time in it")
+        raise BackupError(f"{aside} exists", "Try again: that name has the time in it")
     try:
         if there:
             _close_for_good(path)
-        _add_ping_files(files, files_beside(file), _ping_files(file))
+        _add_ping_files(files, file)
         with file.open("rb") as source, private.open_new(part, "wb") as copy:
             shutil.copyfileobj(source, copy)
         _to_disk(part)
@@ -220,9 +242,10 @@ def _keep(path: Path, aside: Path) -> None:
         _to_disk(aside)
 
 
-def _add_ping_files(files: PingFiles, beside: PingFiles, names: Sequence[str]) -> None:
+def _add_ping_files(files: PingFiles, backup: Path) -> None:
     """Put a backup's files of pings in their place, before the database that refers to them is put in its own."""
-    beside.copy_to(files, names)
+    names, beside = _ping_files(backup), files_beside(backup)
+    beside.copy_to(files, set(beside.names()).intersection(names))
     for mission_id in {name.partition("/")[0] for name in names}:
         files.spare(mission_id)  # its removal had not come to an end
 

@@ -23,7 +23,7 @@ from app.storage.models import Base, MissionRow, SoundingRow
 from app.storage.ping_files import REMOVED, PingFiles, file_name
 from app.storage.processes.membership import make_membership
 from app.storage.upkeep import migrate
-from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
+from app.storage.upkeep.backup import BackupError, back_up, contents_of, files_beside, restore_to
 from app.storage.upkeep.prepare import DatabaseNotReadyError, prepare_database
 from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove, unlisted_files
 from tests.support.paths import PROJECT
@@ -223,8 +223,8 @@ async def test_a_killed_restore_leaves_the_database_with_all_its_files_of_pings_
         with pytest.raises(DatabaseNotReadyError, match=r"a restore of it did not end \(.*fleet\.db\.part is left\)"):
             await prepare_database(url, may_upgrade=True)
         (tmp_path / "lost.db").rename(path_of(url))
-    for number in beside(tmp_path, "fleet.db.before-"):
-        number.unlink()  # its name may have this second in it
+    for second_name in beside(tmp_path, "fleet.db.before-"):
+        second_name.unlink()
     _, aside = await asyncio.to_thread(restore_to, url, copy, replace=True)
     assert aside is not None
     assert beside(tmp_path, "fleet.db.") == [aside]
@@ -278,12 +278,52 @@ async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlit
         contents_of(copy)
     file.unlink()
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
-        restore_to(sqlite.url, copy, replace=True, pings=files)
+        contents_of(copy)
+    assert contents_of(copy, files).ping_files_elsewhere == 1
+    restore_to(sqlite.url, copy, replace=True, pings=files)
     assert files.names() == [PING_FILE_NAME]
     files.remove("m1", [PING_FILE_NAME])
+    before = path_of(sqlite.url).read_bytes()
+    with pytest.raises(BackupError, match=f"1 of 1 files .* not in .*copy.db-pings.*pings/{PING_FILE_NAME} is missing"):
+        restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert path_of(sqlite.url).read_bytes() == before
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
         back_up(sqlite.url, tmp_path / "again.db", files)
     assert not beside(tmp_path, "again")
+
+
+@NEEDS_PG_DUMP
+async def test_an_archive_without_its_files_of_pings_is_refused(databases: Databases, tmp_path: Path) -> None:
+    url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "pings"))
+    database = Database(url)
+    await fill(database, files)
+    await database.close()
+    files.write("m1/left-by-a-kill.parquet", b"no archive refers to it")
+    copy, made = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    assert (made.ping_files, files_beside(copy).names()) == (1, [PING_FILE_NAME])
+
+    shutil.rmtree(tmp_path / "fleet.dump-pings")  # as pg_dump leaves it
+    missing = rf"1 of 1 files of pings are not in .*/fleet\.dump-pings, .*{PING_FILE_NAME} is missing"
+    other, others = databases.fresh("postgresql"), PingFiles(str(tmp_path / "others"))
+    for nowhere in (None, others):
+        with pytest.raises(BackupError, match=missing) as refused:
+            await asyncio.to_thread(contents_of, copy, nowhere)
+        assert f"Copy the folder of pings_url to {tmp_path / 'fleet.dump-pings'}" in refused.value.remedy
+    with pytest.raises(BackupError, match=missing):
+        await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
+    assert (await counts(other))["missions"] == 0
+
+    assert (await asyncio.to_thread(contents_of, copy, files)).ping_files_elsewhere == 1
+    names = files.names()
+    await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
+    assert files.names() == names, "where they are"
+    assert not beside(tmp_path, "pings.")
+    shutil.copytree(tmp_path / "pings", tmp_path / "fleet.dump-pings")  # by hand
+    await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
+    assert others.names() == [PING_FILE_NAME]
+    (tmp_path / "fleet.dump-pings" / PING_FILE_NAME).write_bytes(b"?")
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
+        await asyncio.to_thread(contents_of, copy, files)
 
 
 @pytest.mark.parametrize("place", ["folder", "url"])
