@@ -44,7 +44,8 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     """Copy the database to a file, or into a folder under a name with the time; returns the file and what it holds.
 
     SQLite's is one consistent state, however much is written meanwhile. The file appears under its name only when it
-    was checked and is on the disk; only its owner may read it. Files of pings go into a folder beside it.
+    was checked and is on the disk; only its owner may read it. Files of pings go into a folder beside it, which has its
+    name before, when all of them are there. Nothing that was there is overwritten or removed.
 
     Parameters
     ----------
@@ -59,11 +60,15 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     suffix = "db" if parsed.get_backend_name() == "sqlite" else "dump"
     if target.is_dir() or not target.suffix:
         target /= f"bathyfleet-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.{suffix}"
-    if target.exists():
-        raise BackupError(f"{target} exists", "Name another file: backups are not overwritten")
-    part, copies = target.with_name(target.name + ".part"), files_beside(target)
+    copies = Path(files_beside(target).url)
+    for place in (target, copies):
+        if place.exists():
+            raise BackupError(f"{place} exists", "Name another file: backups are not overwritten")
+    part, parts = target.with_name(f"{target.name}.part"), copies.with_name(f"{copies.name}.part")
+    made = parts
     try:
         private.make_folder(target.parent)
+        shutil.rmtree(parts, ignore_errors=True)  # of a backup to this file that was killed
         os.close(os.open(part, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o600))
         if suffix == "db":
             expected = _copy_sqlite(parsed, part)
@@ -74,21 +79,23 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
             postgres_archive.dump(parsed, part)
             contents = _database_of(part)
         # Whatever is in the copy has had its file before.
-        source = pings or PingFiles.beside(url)
-        copied = source.copy_to(copies, _ping_files(part))
+        copied = (pings or PingFiles.beside(url)).copy_to(PingFiles(str(parts)), _ping_files(part))
         contents = dataclasses.replace(contents, ping_files=copied)
         _to_disk(part)
+        if copied:
+            made = parts.rename(copies)
         part.rename(target)
+        _to_disk(target)
     except PingFileError as error:
         raise BackupError(str(error), "Bring it back from an older backup, or set pings_url to where it is") from None
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
     finally:
+        if not target.exists():
+            shutil.rmtree(made, ignore_errors=True)
         for left in (part.with_name(part.name + suffix) for suffix in ("", "-journal", "-wal", "-shm")):
             if left.exists():
                 left.unlink()
-        if not target.exists() and copies.folder is not None:
-            shutil.rmtree(copies.folder, ignore_errors=True)
     return target, contents
 
 

@@ -20,7 +20,7 @@ from sqlalchemy.exc import DBAPIError
 
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
-from app.storage.ping_files import REMOVED, PingFiles, file_name
+from app.storage.ping_files import REMOVED, PingFiles, digest_in, file_name
 from app.storage.processes.membership import make_membership
 from app.storage.upkeep import migrate
 from app.storage.upkeep.backup import BackupError, back_up, contents_of, files_beside, restore_to
@@ -324,6 +324,48 @@ async def test_an_archive_without_its_files_of_pings_is_refused(databases: Datab
     (tmp_path / "fleet.dump-pings" / PING_FILE_NAME).write_bytes(b"?")
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
         await asyncio.to_thread(contents_of, copy, files)
+
+
+async def test_a_backup_that_fails_leaves_what_belongs_to_another_one(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    copy, _ = back_up(sqlite.url, tmp_path / "harbour.db")
+    kept, files = copy.rename(tmp_path / "kept.db"), files_beside(copy)
+    for _ in range(2):
+        with pytest.raises(BackupError, match=r"harbour\.db-pings exists"):
+            back_up(sqlite.url, copy)
+        assert files.read(PING_FILE_NAME, digest_in(PING_FILE_NAME)) == PING_FILE
+    assert beside(tmp_path, "harbour.") == [tmp_path / "harbour.db-pings"]
+
+    kept.rename(copy)
+    PingFiles.beside(sqlite.url).remove("m1", [PING_FILE_NAME])
+    with pytest.raises(BackupError, match="is missing"):
+        back_up(sqlite.url, tmp_path / "next.db")
+    assert contents_of(copy).ping_files == 1
+    assert not beside(tmp_path, "next.")
+
+
+@pytest.mark.parametrize("failing", [".db.part", "pings.part"])
+async def test_a_backup_whose_last_steps_fail_leaves_nothing(
+    sqlite: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    await fill(sqlite)
+    rename = Path.rename
+
+    def full(path: Path, target: Path) -> Path:
+        if path.name.endswith(failing):
+            raise OSError(28, "No space left on device")
+        return rename(path, target)
+
+    (tmp_path / "copy.db-pings.part" / "m2").mkdir(parents=True)
+    (tmp_path / "copy.db-pings.part" / "m2" / "left-by-a-kill.parquet").touch()
+    with monkeypatch.context() as disk:
+        disk.setattr(Path, "rename", full)
+        with pytest.raises(BackupError, match="No space left"):
+            back_up(sqlite.url, tmp_path / "copy.db")
+    assert not beside(tmp_path, "copy.")
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    assert files_beside(copy).names() == [PING_FILE_NAME]
+    assert sorted(beside(tmp_path, "copy.")) == [copy, tmp_path / "copy.db-pings"]
 
 
 @pytest.mark.parametrize("place", ["folder", "url"])
