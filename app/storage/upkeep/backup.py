@@ -189,7 +189,6 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
             f"{file} is at revision {revision}, which this version does not know (its newest is {migrate.head()})",
             "Restore it with the version that wrote it; nothing was changed",
         )
-    before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}"
     if parsed.get_backend_name() != "sqlite":
         if contents.revision:
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
@@ -200,21 +199,22 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
         return contents, None
     if not contents.revision:
         raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
-    return contents, _put_file_back(_path(parsed), file, before if replace else "", files)
+    return contents, _put_file_back(_path(parsed), file, files, replace=replace)
 
 
-def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Path | None:
-    """Put SQLite's file in its place; returns where what was there is now, under a name with ``before``.
+def _put_file_back(path: Path, file: Path, files: PingFiles, *, replace: bool) -> Path | None:
+    """Put SQLite's file in its place; returns where what was there is now.
 
     The old one keeps its name until the new one takes it, whole and with all its files of pings: whatever ends this,
     there is a database and nothing of it is missing.
     """
-    if path.exists() and not before:
+    if path.exists() and not replace:
         raise BackupError(f"{path} exists", "--replace moves it aside")
     private.make_folder(path.parent)
-    part, aside = path.with_name(path.name + ".part"), path.with_name(f"{path.name}.{before}")
+    part = path.with_name(f"{path.name}.part")
+    aside = path.with_name(f"{path.name}.before-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}")
     there = path.exists()
-    if there and aside.exists():
+    if aside.exists():
         raise BackupError(f"{aside} exists", "Try again: that name has the time in it")
     try:
         if there:
@@ -226,6 +226,7 @@ def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Pat
         if there:
             _close_for_good(path)  # once more: copying may have taken long
             _keep(path, aside)
+        _move_journals(path, aside)
         part.replace(path)
         _to_disk(path)
     except OSError as error:
@@ -233,9 +234,10 @@ def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Pat
     finally:
         if part.exists():  # it did not take its place
             part.unlink()
+            _move_journals(aside, path)
             if there:
                 aside.unlink(missing_ok=True)
-    private.mend([aside])
+    private.mend(private.family(aside))
     return aside if there else None
 
 
@@ -247,6 +249,14 @@ def _keep(path: Path, aside: Path) -> None:
         with path.open("rb") as source:
             private.write(aside, iter(lambda: source.read(1 << 20), b""))
         _to_disk(aside)
+
+
+def _move_journals(path: Path, new: Path) -> None:
+    """Let the journals of a damaged or lost database go with it: SQLite would write them into another one."""
+    for suffix in ("-wal", "-shm", "-journal"):
+        journal = path.with_name(path.name + suffix)
+        if journal.exists():
+            journal.rename(new.with_name(new.name + suffix))
 
 
 def _add_ping_files(files: PingFiles, backup: Path) -> None:
@@ -302,10 +312,6 @@ def _close_for_good(path: Path) -> None:
         raise BackupError(f"{path} is in use", "Stop the service first") from None
     except sqlite3.DatabaseError:
         pass  # damaged, which is why it is replaced; its journals go aside with it
-    for suffix in ("-wal", "-shm"):
-        journal = path.with_name(path.name + suffix)
-        if journal.exists():
-            journal.rename(path.with_name(f"{path.name}.before{suffix}"))
 
 
 def _path(url: URL) -> Path:

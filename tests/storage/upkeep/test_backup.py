@@ -232,6 +232,23 @@ async def test_a_killed_restore_leaves_the_database_with_all_its_files_of_pings_
     assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 0
 
 
+async def test_the_journal_of_a_lost_database_goes_aside_and_into_no_other(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    before = await counts(sqlite.url)
+    async with sqlite.writing() as session:
+        session.add(mission("m2"))
+    path = path_of(sqlite.url)
+    journal = shutil.copy(f"{path}-wal", tmp_path / "wal").read_bytes()
+    await sqlite.close()
+    path.with_name(f"{path.name}-wal").write_bytes(journal)
+    path.unlink()
+    assert restore_to(sqlite.url, copy, replace=False)[1] is None
+    assert await counts(sqlite.url) == before
+    (aside,) = beside(path.parent, f"{path.name}.before-")
+    assert (aside.name[-4:], aside.read_bytes()) == ("-wal", journal)
+
+
 async def test_a_database_goes_aside_where_files_have_one_name_only(
     sqlite: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
