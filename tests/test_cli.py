@@ -1,5 +1,6 @@
 """The command line: what a user sees and which code a script gets."""
 
+import asyncio
 import json
 import os
 import re
@@ -20,12 +21,15 @@ import rasterio
 
 from app.cli import main
 from app.mapping.coordinates.georeference import LocalFrame
+from app.storage.database import Database
+from app.storage.ping_files import PingFiles
 from tests.support import commands
 from tests.support.api.rest import mission_spec, soundings
 from tests.support.commands import serving
 from tests.support.imc import log_writer as writer
 from tests.support.mapping.multibeam import line, write_gsf, write_kmall
 from tests.support.paths import PROJECT
+from tests.support.storage.rows import PING_FILE, PING_FILE_NAME, mission, ping_chunk
 
 COMMANDS = (
     "serve",
@@ -237,7 +241,11 @@ def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathy
     assert bathyfleet("backup", "--verify", str(copy)).code == 0
     assert bathyfleet("restore", str(copy)).code == 1
     assert bathyfleet("restore", str(copy), "--replace").code == 0
-    assert bathyfleet("prune", "--days", "30", "--apply").stdout.startswith("0 missions removed")
+    (tmp_path / "pings" / "m1").mkdir(parents=True)
+    (tmp_path / "pings" / "m1" / "another's.parquet").touch()
+    pruned = bathyfleet("prune", "--days", "30", "--apply").stdout
+    assert pruned.startswith("0 missions removed")
+    assert f"1 files of pings in {tmp_path / 'pings'} are of no mission of this database and stay" in pruned
     lines = [json.loads(line) for line in bathyfleet("audit", "--format", "json").stdout.splitlines()]
     assert [(line["action"], line["result"]) for line in lines] == [
         ("restore", "done"),
@@ -247,6 +255,33 @@ def test_commands_are_written_down_and_the_whole_is_backed_up_and_restored(bathy
     assert {line["origin"] for line in lines} == {"command line"}
     assert "Maria" in bathyfleet("audit").stdout
     assert bathyfleet("audit", "--format", "csv").stdout.startswith("id,time,actor,role,origin,action")
+
+
+async def store_pings(file: Path) -> None:
+    """Put a mission with a file of pings into a database."""
+    database = Database(f"sqlite+aiosqlite:///{file}")
+    async with database.writing() as session:
+        session.add(mission("m1"))
+        await session.flush()
+        session.add(ping_chunk())
+    await database.close()
+    PingFiles.beside(database.url).write(PING_FILE_NAME, PING_FILE)
+
+
+def test_files_of_pings_that_are_not_beside_a_backup_are_said_to_be_missing(bathyfleet: Run, tmp_path: Path) -> None:
+    bathyfleet("migrate")
+    asyncio.run(store_pings(tmp_path / "bathyfleet.db"))
+    assert "and 1 files of pings" in bathyfleet("backup", "copy.db").stdout
+    (tmp_path / "copy.db-pings").rename(tmp_path / "away")
+    sound = bathyfleet("backup", "--verify", "copy.db")
+    assert (sound.code, "copy.db is sound" in sound.stdout) == (0, True)
+    assert f"1 of its files of pings are in {tmp_path / 'pings'} only: copy them to " in sound.stderr
+    (tmp_path / "pings").rename(tmp_path / "lost")
+    for words in (["backup", "--verify", "copy.db"], ["restore", "copy.db", "--replace"]):
+        refused = bathyfleet(*words)
+        assert (refused.code, refused.stdout) == (1, "")
+        assert f"1 of 1 files of pings are not in {tmp_path / 'copy.db-pings'}, where they belong" in refused.stderr
+        assert f"Copy the folder of pings_url to {tmp_path / 'copy.db-pings'}" in refused.stderr
 
 
 def at_revision(file: Path, revision: str) -> None:

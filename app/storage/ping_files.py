@@ -4,6 +4,7 @@ import hashlib
 import os
 import re
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from app.storage import private
 FOLDER = "pings"
 PART = ".part"
 REMOVED = ".removed"
-"""Beside the folder of a mission that is being removed."""
+"""Beside the folder of a mission that was removed: a list of the files that go with it."""
 
 
 class PingFileError(Exception):
@@ -84,7 +85,7 @@ class PingFiles:
     def where(self, name: str) -> str:
         """Return where a file is, for people: without a user's name and password in a URL."""
         shown = re.sub(r"://[^/]*@", "://", self.url).rstrip("/")
-        return f"{self.folder / name}" if self.folder else f"{shown}/{name}"
+        return f"{self.folder / name}" if self.folder else f"{shown}/{name}".rstrip("/")
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file; it has its name only when all of it is on the disk."""
@@ -140,34 +141,56 @@ class PingFiles:
         below = root if mission_id is None else f"{root}/{mission_id}"
         return sorted(str(path).removeprefix(f"{root}/") for path in file_system.find(below))
 
-    def tidy(self, mission_id: str, known: Collection[str]) -> list[str]:
-        """Remove a mission's files that are not ``known``, left behind by a process that was killed; returns which."""
+    def tidy(self, mission_id: str) -> list[str]:
+        """Remove what is left of a mission's files that were not written to their end; returns which.
+
+        A whole file is never removed because a database does not list it: another one may, whose only copy it is.
+        """
         file_system, root = self._place
-        left = [name for name in self._found(mission_id) if name not in known]
+        left = [name for name in self._found(mission_id) if name.endswith(PART)]
         for name in left:
             file_system.rm_file(f"{root}/{name}")
         return left
 
-    def condemn(self, mission_id: str) -> None:
-        """Note that a mission is about to be removed: its files go with it, though this process may be killed first."""
-        if self._found(mission_id):
-            self.write(f"{mission_id}{REMOVED}", b"")
+    def remove(self, mission_id: str, names: Iterable[str]) -> None:
+        """Remove files of a mission that was removed from its database, and no others.
 
-    def remove(self, mission_id: str) -> None:
-        """Remove a mission's files."""
+        They are noted before: :meth:`finish_removing` removes the rest where this process is killed.
+        """
+        listed = sorted(names)
+        if listed:
+            with suppress(OSError):  # a full disk is why missions are removed
+                self.write(f"{mission_id}{REMOVED}", "\n".join(listed).encode())
+        self._remove(mission_id, listed)
+
+    def finish_removing(self, mission_id: str) -> None:
+        """Remove what is left of files that were noted to go with a mission."""
         file_system, root = self._place
-        if self._found(mission_id):
-            file_system.rm(f"{root}/{mission_id}", recursive=True)
+        try:
+            listed = file_system.cat_file(f"{root}/{mission_id}{REMOVED}").decode().splitlines()
+        except FileNotFoundError:
+            return  # another process was faster
+        self._remove(mission_id, listed)
+
+    def _remove(self, mission_id: str, listed: Collection[str]) -> None:
+        file_system, root = self._place
+        for name in self._found(mission_id):
+            if name in listed or name.endswith(PART):
+                with suppress(FileNotFoundError):  # by another process that finishes the same
+                    file_system.rm_file(f"{root}/{name}")
+        if self.folder is not None:
+            with suppress(OSError):  # it is not empty, or was never made
+                (self.folder / mission_id).rmdir()
         self.spare(mission_id)
 
     def spare(self, mission_id: str) -> None:
-        """Note that a mission is not removed, after all."""
+        """Forget that files of a mission were to be removed: it is there, or they are gone."""
         file_system, root = self._place
-        if file_system.exists(f"{root}/{mission_id}{REMOVED}"):
+        with suppress(FileNotFoundError):
             file_system.rm_file(f"{root}/{mission_id}{REMOVED}")
 
     def condemned(self) -> list[str]:
-        """Return the missions that were about to be removed when a process ended."""
+        """Return the missions that were removed, but not all of their files, when a process ended."""
         if "://" not in self.url and not Path(self.url).is_dir():
             return []
         file_system, root = self._place
@@ -177,16 +200,35 @@ class PingFiles:
         return [name.removesuffix(REMOVED) for name in names if name.endswith(REMOVED)]
 
     def copy_to(self, other: "PingFiles", names: Iterable[str]) -> int:
-        """Copy files, each checked by the digest in its name; returns how many. Raises PingFileError."""
-        copied = 0
-        for name in names:
-            other.write(name, self.read(name, digest_in(name)))
-            copied += 1
-        return copied
+        """Copy files, each checked by the digest in its name; returns how many the other place has of them now.
 
-    def move_aside(self, suffix: str) -> Path | None:
-        """Rename the folder, if it is one of this machine and there; returns what it is called now."""
-        folder = self.folder
-        if folder is None or not folder.is_dir():
-            return None
-        return folder.rename(folder.with_name(f"{folder.name}.{suffix}"))
+        Those that are there whole are not written again. What was written goes when the rest fails.
+
+        Raises
+        ------
+        PingFileError
+            When a file is missing or damaged here.
+        OSError
+            When one cannot be written there.
+        """
+        there, written, count = set(other.names()), list[str](), 0
+        try:
+            for name in names:
+                count += 1
+                if name not in there or not other.is_whole(name):
+                    other.write(name, self.read(name, digest_in(name)))
+                    written.append(name)
+        except BaseException:
+            file_system, root = other._place
+            for name in written:
+                file_system.rm_file(f"{root}/{name}")
+            raise
+        return count
+
+    def is_whole(self, name: str) -> bool:
+        """Tell whether a file is there and has the digest in its name."""
+        try:
+            self.read(name, digest_in(name))
+        except PingFileError:
+            return False
+        return True

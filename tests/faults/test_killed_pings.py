@@ -63,7 +63,7 @@ async def test_pings_survive_being_killed_at_random_moments(databases: Databases
         kills += 1
         store, counts = await open_store(database, files)
         chunks, _ = await store.contents()
-        assert files.names("m1") == sorted(row.name for row in chunks)
+        assert {row.name for row in chunks} <= set(files.names("m1"))
         found = await times_of(store)
         assert found["a"] == sorted(set(found["a"]))
         assert found["a"] == found["b"]

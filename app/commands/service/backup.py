@@ -25,17 +25,24 @@ def backup(
 ) -> None:
     """Copy the database to a file while the service goes on writing, and check the copy."""
     from app.storage.ping_files import PingFiles
-    from app.storage.upkeep.backup import BackupError, back_up, contents_of
+    from app.storage.upkeep.backup import BackupError, back_up, contents_of, files_beside
     from app.storage.upkeep.prepare import is_up_to_date
 
     if verify is not None and file is not None:
         raise typer.BadParameter("check a backup or write one, not both", param_hint="--verify")
+    settings = command_settings(database_url=database)
+    files = PingFiles.beside(settings.database_url, settings.pings_url)
     try:
         if verify is not None:
-            _tell(verify, contents_of(verify), "is sound")
+            contents = contents_of(verify, files)
+            _tell(verify, contents, "is sound")
+            if contents.ping_files_elsewhere:
+                typer.echo(
+                    f"{contents.ping_files_elsewhere} of its files of pings are in {files.where('')} only: "
+                    f"copy them to {files_beside(verify).where('')}, or it cannot be restored once they are lost",
+                    err=True,
+                )
             return
-        settings = command_settings(database_url=database)
-        files = PingFiles.beside(settings.database_url, settings.pings_url)
         path, contents = back_up(settings.database_url, file or Path("backups"), files)
     except BackupError as error:
         raise CommandError(str(error), error.remedy) from None
@@ -86,28 +93,30 @@ def prune(
     check_database(settings)
     from app.storage.database import Database as Store
     from app.storage.ping_files import PingFiles
+    from app.storage.upkeep import retention
     from app.storage.upkeep.prepare import prepare_database
-    from app.storage.upkeep.retention import Ended, ended_before, finish_removing, give_space_back, remove
 
-    async def run() -> tuple[list[Ended], str]:
+    files = PingFiles.beside(settings.database_url, settings.pings_url)
+
+    async def run() -> tuple[list[retention.Ended], int, str]:
         await prepare_database(settings.database_url, may_upgrade=settings.migrates_itself and apply)
         store = Store(settings.database_url)
-        files = PingFiles.beside(settings.database_url, settings.pings_url)
         try:
-            await finish_removing(store, files)
-            found = await ended_before(store, days)
+            await retention.finish_removing(store, files)
+            found = await retention.ended_before(store, days)
             if not apply:
-                return found, ""
-            removed = [mission for mission in found if await remove(store, mission.id, days, files)]
+                return found, len(await retention.unlisted_files(store, files)), ""
+            removed = [mission for mission in found if await retention.remove(store, mission.id, days, files)]
             for mission in removed:
                 await noted(settings, "prune", f"{mission.name}, ended {mission.ended:%Y-%m-%d}", mission.id)
-            return removed, await give_space_back(settings.database_url)
+            unlisted = len(await retention.unlisted_files(store, files))
+            return removed, unlisted, await retention.give_space_back(settings.database_url)
         finally:
             await store.close()
 
     from imc_bridge.printable import printable
 
-    missions, note = asyncio.run(run())
+    missions, unlisted, note = asyncio.run(run())
     for mission in missions:
         typer.echo(
             f"{mission.id}  ended {mission.ended:%Y-%m-%d}  {mission.soundings} soundings  {printable(mission.name)}"
@@ -116,8 +125,13 @@ def prune(
     if not apply:
         hint = "; --apply removes them: bathyfleet export and bathyfleet backup keep them" if missions else ""
         typer.echo(f"{number} ended more than {days} days ago{hint}")
-        return
-    typer.echo(f"{number} removed{f'; {note}' if note else ''}")
+    else:
+        typer.echo(f"{number} removed{f'; {note}' if note else ''}")
+    if unlisted:
+        typer.echo(
+            f"{unlisted} files of pings in {files.where('')} are of no mission of this database and stay: "
+            "another database's, or left by a kill"
+        )
 
 
 def _tell(file: Path, contents: "Contents", what: str) -> None:

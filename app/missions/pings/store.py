@@ -115,12 +115,10 @@ class PingStore:
         return stored
 
     async def tidy(self) -> None:
-        """Remove files that a process left behind which was killed; only for the process that has the mission."""
+        """Remove halves of files that a killed process left behind; only for the process that has the mission."""
         if not self._any:
             return  # a file is made of what is stored
-        async with self._database.reading() as session:
-            known = {row.name for row in await ping_queries.chunks(session, self._mission_id)}
-        left = await asyncio.to_thread(self._files.tidy, self._mission_id, known)
+        left = await asyncio.to_thread(self._files.tidy, self._mission_id)
         if left:
             log.warning("files of pings that were not written to the end are removed", files=left)
 

@@ -142,6 +142,14 @@ async def chunks(session: AsyncSession, mission_id: str) -> Sequence[PingChunkRo
     return (await session.scalars(query.options(defer(PingChunkRow.times, raiseload=True)))).all()
 
 
+async def file_names(session: AsyncSession, mission_id: str | None = None) -> Sequence[str]:
+    """Return the names of a mission's files, or of all."""
+    query = select(PingChunkRow.name).order_by(PingChunkRow.id)
+    return (
+        await session.scalars(query if mission_id is None else query.where(PingChunkRow.mission_id == mission_id))
+    ).all()
+
+
 async def chunk(session: AsyncSession, mission_id: str, number: int) -> PingChunkRow | None:
     """Return what is known of one of a mission's files."""
     found = await session.get(PingChunkRow, number, options=[defer(PingChunkRow.times, raiseload=True)])

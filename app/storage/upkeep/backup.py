@@ -4,8 +4,7 @@ import dataclasses
 import os
 import shutil
 import sqlite3
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,13 +24,15 @@ ARCHIVE_MAGIC = b"PGDMP"
 class Contents:
     """What a backup holds: its schema's revision and the rows of every table; both empty for pg_dump's archives.
 
-    ``ping_files`` is how many files of pings are beside it.
+    ``ping_files`` is how many files of pings belong to it, ``ping_files_elsewhere`` how many of these are not beside it
+    but only where the database has its own.
     """
 
     size_bytes: int
     revision: str
     rows: dict[str, int]
     ping_files: int = 0
+    ping_files_elsewhere: int = 0
 
 
 def files_beside(backup: Path) -> PingFiles:
@@ -43,7 +44,8 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     """Copy the database to a file, or into a folder under a name with the time; returns the file and what it holds.
 
     SQLite's is one consistent state, however much is written meanwhile. The file appears under its name only when it
-    was checked and is on the disk; only its owner may read it. Files of pings go into a folder beside it.
+    was checked and is on the disk; only its owner may read it. Files of pings go into a folder beside it, which has its
+    name before, when all of them are there. Nothing that was there is overwritten or removed.
 
     Parameters
     ----------
@@ -58,11 +60,15 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
     suffix = "db" if parsed.get_backend_name() == "sqlite" else "dump"
     if target.is_dir() or not target.suffix:
         target /= f"bathyfleet-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.{suffix}"
-    if target.exists():
-        raise BackupError(f"{target} exists", "Name another file: backups are not overwritten")
-    part, copies = target.with_name(target.name + ".part"), files_beside(target)
+    copies = Path(files_beside(target).url)
+    for place in (target, copies):
+        if place.exists():
+            raise BackupError(f"{place} exists", "Name another file: backups are not overwritten")
+    part, parts = target.with_name(f"{target.name}.part"), copies.with_name(f"{copies.name}.part")
+    made = parts
     try:
         private.make_folder(target.parent)
+        shutil.rmtree(parts, ignore_errors=True)  # of a backup to this file that was killed
         os.close(os.open(part, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o600))
         if suffix == "db":
             expected = _copy_sqlite(parsed, part)
@@ -73,34 +79,54 @@ def back_up(url: str, target: Path, pings: PingFiles | None = None) -> tuple[Pat
             postgres_archive.dump(parsed, part)
             contents = _database_of(part)
         # Whatever is in the copy has had its file before.
-        source = pings or PingFiles.beside(url)
-        copied = source.copy_to(copies, source.names() if suffix == "dump" else _ping_files(part))
+        copied = (pings or PingFiles.beside(url)).copy_to(PingFiles(str(parts)), _ping_files(part))
         contents = dataclasses.replace(contents, ping_files=copied)
         _to_disk(part)
+        if copied:
+            made = parts.rename(copies)
         part.rename(target)
+        _to_disk(target)
     except PingFileError as error:
         raise BackupError(str(error), "Bring it back from an older backup, or set pings_url to where it is") from None
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{target} cannot be written: {error}", "Is there room on that disk?") from None
     finally:
+        if not target.exists():
+            shutil.rmtree(made, ignore_errors=True)
         for left in (part.with_name(part.name + suffix) for suffix in ("", "-journal", "-wal", "-shm")):
             if left.exists():
                 left.unlink()
-        if not target.exists() and copies.folder is not None:
-            shutil.rmtree(copies.folder, ignore_errors=True)
     return target, contents
 
 
-def contents_of(file: Path) -> Contents:
-    """Check a backup from end to end, with the files of pings beside it; returns what it holds. Raises BackupError."""
-    contents, beside = _database_of(file), files_beside(file)
-    names = _ping_files(file) if contents.revision else beside.names()
+def contents_of(file: Path, pings: PingFiles | None = None) -> Contents:
+    """Check a backup from end to end, with each file of pings that it refers to; returns what it holds.
+
+    Those that are not beside it are looked for among ``pings``, where the database has its own.
+
+    Raises
+    ------
+    BackupError
+        When it or a file is damaged, or a file is in neither place.
+    """
+    contents, beside, names = _database_of(file), files_beside(file), _ping_files(file)
+    there = set(beside.names())
+    elsewhere = [name for name in names if name not in there]
     try:
-        for name in names:
+        for name in there.intersection(names):
             beside.read(name, digest_in(name))
     except PingFileError as error:
         raise BackupError(str(error), "Use an older backup") from None
-    return dataclasses.replace(contents, ping_files=len(names))
+    for name in elsewhere:
+        try:
+            (pings or beside).read(name, digest_in(name))
+        except PingFileError as error:
+            raise BackupError(
+                f"{len(elsewhere)} of {len(names)} files of pings are not in {beside.folder}, where they belong: "
+                f"{error}",
+                f"Copy the folder of pings_url to {beside.folder} from where the database was, or use an older backup",
+            ) from None
+    return dataclasses.replace(contents, ping_files=len(names), ping_files_elsewhere=len(elsewhere))
 
 
 def _database_of(file: Path) -> Contents:
@@ -130,7 +156,10 @@ def _database_of(file: Path) -> Contents:
 
 
 def _ping_files(file: Path) -> list[str]:
-    """Return the names of the files of pings that belong to an SQLite database that nobody has open."""
+    """Return the names of the files of pings that a backup refers to, one that nobody has open. Raises BackupError."""
+    with file.open("rb") as opened:
+        if opened.read(len(ARCHIVE_MAGIC)) == ARCHIVE_MAGIC:
+            return postgres_archive.ping_files(file)
     with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         if not connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'ping_chunks'").fetchone():
             return []  # of a version that had none
@@ -140,16 +169,18 @@ def _ping_files(file: Path) -> list[str]:
 def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None = None) -> tuple[Contents, Path | None]:
     """Put a checked backup in the database's place; returns what it holds, and where what was there before is now.
 
-    ``pings`` are the files of pings, those of the backup are put there; None: in the usual place. What is there
-    already goes aside with the database.
+    ``pings`` are the files of pings, those of the backup are added there; None: in the usual place. What is there
+    stays: the database that goes aside refers to it, and so may others.
 
     Raises
     ------
     BackupError
-        When the backup is damaged, of another kind or of a newer version, or there is a database already and
-        ``replace`` is False, or somebody has it open.
+        When the backup is damaged, of another kind or of a newer version, lacks files of pings that are not there
+        either, or there is a database already and ``replace`` is False, or somebody has it open.
     """
-    contents = contents_of(file)
+    parsed = make_url(url)
+    files = pings or PingFiles.beside(url)
+    contents = contents_of(file, files)
     revision = contents.revision if contents.rows else postgres_archive.revision(file)
     if not revision:
         raise BackupError(f"{file} holds no database of bathyfleet")
@@ -158,68 +189,82 @@ def restore_to(url: str, file: Path, *, replace: bool, pings: PingFiles | None =
             f"{file} is at revision {revision}, which this version does not know (its newest is {migrate.head()})",
             "Restore it with the version that wrote it; nothing was changed",
         )
-    parsed = make_url(url)
-    files, beside = pings or PingFiles.beside(url), files_beside(file)
-    before = f"before-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     if parsed.get_backend_name() != "sqlite":
         if contents.revision:
             raise BackupError(f"{file} is an SQLite database and cannot be restored to PostgreSQL")
         if postgres_archive.is_in_use(parsed):
             raise BackupError(f"the database {parsed.database} is in use", "Stop the service first")
-        with _put_back(files, beside, beside.names(), before if replace else ""):
-            postgres_archive.put_back(parsed, file, replace=replace)
+        _add_ping_files(files, file)
+        postgres_archive.put_back(parsed, file, replace=replace)
         return contents, None
     if not contents.revision:
         raise BackupError(f"{file} is an archive of pg_dump: name a PostgreSQL database with --database")
-    return contents, _put_file_back(_path(parsed), file, before if replace else "", files)
+    return contents, _put_file_back(_path(parsed), file, files, replace=replace)
 
 
-def _put_file_back(path: Path, file: Path, before: str, files: PingFiles) -> Path | None:
-    """Put SQLite's file in its place; returns where what was there is now, under a name with ``before``.
+def _put_file_back(path: Path, file: Path, files: PingFiles, *, replace: bool) -> Path | None:
+    """Put SQLite's file in its place; returns where what was there is now.
 
-    The old one keeps its name until all of the new one is on the disk: whatever ends this, there is a database.
+    The old one keeps its name until the new one takes it, whole and with all its files of pings: whatever ends this,
+    there is a database and nothing of it is missing.
     """
-    if path.exists() and not before:
+    if path.exists() and not replace:
         raise BackupError(f"{path} exists", "--replace moves it aside")
     private.make_folder(path.parent)
-    part, aside = path.with_name(path.name + ".part"), path.with_name(f"{path.name}.{before}")
+    part = path.with_name(f"{path.name}.part")
+    aside = path.with_name(f"{path.name}.before-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}")
     there = path.exists()
+    if aside.exists():
+        raise BackupError(f"{aside} exists", "Try again: that name has the time in it")
     try:
         if there:
             _close_for_good(path)
+        _add_ping_files(files, file)
         with file.open("rb") as source, private.open_new(part, "wb") as copy:
             shutil.copyfileobj(source, copy)
         _to_disk(part)
-        with _put_back(files, files_beside(file), _ping_files(file), before if there else ""):
-            if there:
-                _close_for_good(path)  # once more: copying may have taken long
-                path.rename(aside)
-            part.rename(path)
+        if there:
+            _close_for_good(path)  # once more: copying may have taken long
+            _keep(path, aside)
+        _move_journals(path, aside)
+        part.replace(path)
+        _to_disk(path)
     except OSError as error:
         raise BackupError(f"{path} cannot be written: {error.strerror}", "Is there room on that disk?") from None
     finally:
-        part.unlink(missing_ok=True)
-        if there and not path.exists():
-            aside.rename(path)
-    private.mend([aside])
+        if part.exists():  # it did not take its place
+            part.unlink()
+            _move_journals(aside, path)
+            if there:
+                aside.unlink(missing_ok=True)
+    private.mend(private.family(aside))
     return aside if there else None
 
 
-@contextmanager
-def _put_back(files: PingFiles, beside: PingFiles, names: Sequence[str], aside: str) -> Iterator[None]:
-    """Put files of pings in their place before what refers to them is put in its own.
-
-    What is there already goes ``aside`` under a name with this; when the rest fails it comes back.
-    """
-    moved = files.move_aside(aside) if aside else None
+def _keep(path: Path, aside: Path) -> None:
+    """Give a file a second name; a copy has it where the file system knows one name for a file only."""
     try:
-        beside.copy_to(files, names)
-        yield
-    except BaseException:
-        if moved is not None and files.folder is not None:
-            shutil.rmtree(files.folder, ignore_errors=True)
-            moved.rename(files.folder)
-        raise
+        aside.hardlink_to(path)
+    except OSError:
+        with path.open("rb") as source:
+            private.write(aside, iter(lambda: source.read(1 << 20), b""))
+        _to_disk(aside)
+
+
+def _move_journals(path: Path, new: Path) -> None:
+    """Let the journals of a damaged or lost database go with it: SQLite would write them into another one."""
+    for suffix in ("-wal", "-shm", "-journal"):
+        journal = path.with_name(path.name + suffix)
+        if journal.exists():
+            journal.rename(new.with_name(new.name + suffix))
+
+
+def _add_ping_files(files: PingFiles, backup: Path) -> None:
+    """Put a backup's files of pings in their place, before the database that refers to them is put in its own."""
+    names, beside = _ping_files(backup), files_beside(backup)
+    beside.copy_to(files, set(beside.names()).intersection(names))
+    for mission_id in {name.partition("/")[0] for name in names}:
+        files.spare(mission_id)  # its removal had not come to an end
 
 
 def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:
@@ -267,10 +312,6 @@ def _close_for_good(path: Path) -> None:
         raise BackupError(f"{path} is in use", "Stop the service first") from None
     except sqlite3.DatabaseError:
         pass  # damaged, which is why it is replaced; its journals go aside with it
-    for suffix in ("-wal", "-shm"):
-        journal = path.with_name(path.name + suffix)
-        if journal.exists():
-            journal.rename(path.with_name(f"{path.name}.before{suffix}"))
 
 
 def _path(url: URL) -> Path:

@@ -13,7 +13,7 @@ from typing import IO, Any, NamedTuple
 import structlog
 from sqlalchemy import URL
 
-from app.storage.models import Base, MissionOwnerRow, ProcessRow
+from app.storage.models import Base, MissionOwnerRow, PingChunkRow, ProcessRow
 from app.storage.processes.membership import HELD
 
 log = structlog.get_logger(__name__)
@@ -58,6 +58,35 @@ def revision(archive: Path) -> str:
     read = [_program("pg_restore"), "--data-only", f"--table={VERSION_TABLE}", "--file=-"]
     found = re.search(rf"^COPY \S*{VERSION_TABLE} .*\n(\S+)\n", _run([*read, str(archive)]), re.MULTILINE)
     return found[1] if found else ""
+
+
+def ping_files(archive: Path) -> list[str]:
+    """Return the names of the files of pings that an archive refers to. Raises BackupError when it is damaged."""
+    table = PingChunkRow.__tablename__
+    command = [_program("pg_restore"), "--data-only", f"--table={table}", "--file=-", str(archive)]
+    with (
+        tempfile.TemporaryFile() as said,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said) as reading,  # noqa: S603 - no shell
+    ):
+        assert reading.stdout is not None  # noqa: S101 - it is a pipe
+        # Line by line: the rows hold the times of all pings.
+        names = list(_names_in(reading.stdout, table))
+        if reading.wait() != 0:
+            said.seek(0)
+            raise BackupError(f"pg_restore failed: {said.read().decode(errors='replace').strip()}")
+    return names
+
+
+def _names_in(lines: Iterable[bytes], table: str) -> Iterator[str]:
+    """Yield the column ``name`` of a table's rows, as pg_restore writes them."""
+    column: int | None = None
+    for line in lines:
+        if column is not None:
+            if line == b"\\.\n":
+                return
+            yield line.split(b"\t", column + 1)[column].decode()
+        elif begin := re.match(rf"COPY \S*{table} \((.*)\) FROM stdin;".encode(), line):
+            column = begin[1].split(b", ").index(b"name")
 
 
 def is_in_use(url: URL) -> bool:
@@ -179,7 +208,8 @@ def _program(name: str) -> str:
         raise BackupError(
             f"PostgreSQL's {name} is not installed here",
             f"Install PostgreSQL's client programs (postgresql-client), or run {name} where the database is: "
-            "docker compose exec database pg_dump --username bathyfleet --format custom bathyfleet > FILE",
+            "docker compose exec database pg_dump --username bathyfleet --format custom bathyfleet > FILE, "
+            "and copy the folder of pings_url to FILE-pings after that",
         )
     return found
 

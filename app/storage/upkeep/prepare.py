@@ -73,11 +73,32 @@ def _try_to_open(url: str) -> None:
     if not file.parent.is_dir():
         reason = f"there is no folder {file.parent}"
         raise DatabaseNotReadyError(f"the database cannot be used: {reason}; check database_url")
+    _look_for_restores(file)
     private.create(file)
     keep_for_owner([*private.family(file), file.parent / FIRST_TOKEN_FILE])
     with closing(sqlite3.connect(file, timeout=BUSY_TIMEOUT_MS / 1000)) as connection:
         # Not before something is read is it looked at whether it is a database.
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+
+
+def _look_for_restores(file: Path) -> None:
+    """Say that a restore was killed before its backup took the database's place.
+
+    Raises DatabaseNotReadyError where there is no database, instead of an empty one that would take its place.
+    """
+    part = file.with_name(f"{file.name}.part")
+    if not part.exists():
+        return
+    if not file.exists():
+        raise DatabaseNotReadyError(
+            f"there is no database {file}, and a restore of it did not end ({part} is left): run 'bathyfleet restore' "
+            f"again, or remove {part.name} to begin with an empty one"
+        )
+    second = [path for path in private.family(file) if path.name.startswith(f"{file.name}.before-")]
+    log.warning(
+        "a restore did not end: the database is the one from before; restore again, or remove what is left",
+        left=[str(path) for path in (part, *second) if path == part or path.samefile(file)],
+    )
 
 
 def file_of(url: str) -> Path | None:

@@ -10,7 +10,7 @@ from sqlalchemy.exc import OperationalError
 from app.storage.database import Database, make_engine
 from app.storage.models import MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
-from app.storage.queries.pings import Totals, totals
+from app.storage.queries.pings import file_names
 
 ENDED = ("finished", "aborted", "failed")
 
@@ -46,23 +46,28 @@ async def remove(database: Database, mission_id: str, days: float, files: PingFi
     """
     files = files or PingFiles.beside(database.url)
     condition = (MissionRow.id == mission_id, MissionRow.state.in_(ENDED), MissionRow.updated_at < _moment(days))
-    async with database.reading() as session:
-        pings = await totals(session, mission_id) != Totals()
-    if pings:
-        await asyncio.to_thread(files.condemn, mission_id)
     async with database.writing() as session:
+        names = await file_names(session, mission_id)
         removed = (await session.scalars(delete(MissionRow).where(*condition).returning(MissionRow.id))).first()
-    if pings:
-        await asyncio.to_thread(files.remove if removed else files.spare, mission_id)
+    if removed is not None and names:
+        await asyncio.to_thread(files.remove, mission_id, names)
     return removed is not None
 
 
 async def finish_removing(database: Database, files: PingFiles) -> None:
-    """Remove the files of missions that were removed when a process was killed."""
+    """Remove the files of missions that were removed when a process was killed; never those of one that is there."""
     for mission_id in await asyncio.to_thread(files.condemned):
         async with database.reading() as session:
             there = await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id))
-        await asyncio.to_thread(files.remove if there is None else files.spare, mission_id)
+        await asyncio.to_thread(files.finish_removing if there is None else files.spare, mission_id)
+
+
+async def unlisted_files(database: Database, files: PingFiles) -> list[str]:
+    """Return the files of pings that no mission of this database has: another database's, or left by a kill."""
+    found = await asyncio.to_thread(files.names)
+    async with database.reading() as session:
+        listed = set(await file_names(session))
+    return [name for name in found if name not in listed]
 
 
 async def give_space_back(url: str) -> str:

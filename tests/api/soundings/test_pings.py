@@ -15,8 +15,10 @@ from app.missions.operations import measurements
 from app.missions.pings import store
 from app.settings import Settings
 from app.storage.ping_files import PingFiles
+from app.storage.upkeep.backup import back_up, restore_to
 from tests.support.api.rest import make_client, mission_spec, running, soundings
 from tests.support.missions.pings import posted_ping
+from tests.support.storage.databases import Databases
 
 VEHICLES = [{"name": "rover", "kind": "rest", "sensor": "multibeam"}, {"name": "plain", "kind": "rest"}]
 
@@ -185,3 +187,32 @@ async def test_pings_are_there_after_a_restart(settings: Settings) -> None:
         assert (batch["duplicate"], batch["accepted"]) == (10, 2)
         parts = (await client.get(f"{path}/pings")).json()["parts"]
         assert [(part["pings"], part["number"] is None) for part in parts] == [(10, False), (2, True)]
+
+
+async def test_what_came_after_a_backup_is_still_in_the_database_that_a_restore_moved_aside(
+    make_settings: Callable[..., Settings], databases: Databases, tmp_path: Path
+) -> None:
+    settings = make_settings(database_url=databases.fresh("sqlite"), pings_url=f"memory://{tmp_path.name}/pings")
+    files, mission_path = PingFiles(settings.pings_url), ""
+
+    async def pings(settings: Settings, *numbers: int) -> int:
+        async with running(settings) as server, make_client(server) as client:
+            await post(client, mission_path, [posted_ping(number) for number in numbers])
+            listed = (await client.get(f"{mission_path}/pings")).json()
+            for part in listed["parts"]:
+                if part["number"] is not None:
+                    assert (await client.get(f"{mission_path}/pings/{part['number']}")).status_code == 200
+            return int(listed["pings"])
+
+    async with running(settings) as server, make_client(server) as client:
+        mission_path = (
+            f"/missions/{(await client.post('/missions', json=mission_spec(vehicles=VEHICLES))).json()['id']}"
+        )
+        await post(client, mission_path, [posted_ping(0), posted_ping(1)])
+    copy, _ = await asyncio.to_thread(back_up, settings.database_url, tmp_path / "copy.db", files)
+    assert await pings(settings, 2, 3, 4) == 5
+    _, aside = await asyncio.to_thread(restore_to, settings.database_url, copy, replace=True, pings=files)
+    assert await pings(settings, 1) == 2
+    before = settings.model_copy(update={"database_url": f"sqlite+aiosqlite:///{aside}"})
+    assert await pings(before, 4) == 5
+    assert await pings(settings, 1) == 2

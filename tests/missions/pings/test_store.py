@@ -19,6 +19,7 @@ from app.storage.ping_files import PingFiles
 from app.storage.queries import pings as ping_queries
 from tests.support.missions.pings import CLOCK_S, open_store, ping, same, take, times_of
 from tests.support.missions.specs import LAT, LON
+from tests.support.storage.databases import Databases
 from tests.support.storage.rows import mission
 from tests.support.waiting import until
 
@@ -200,13 +201,33 @@ async def test_a_kill_while_pings_are_moved_loses_and_doubles_nothing(
     opened, counts = await open_store(database, files)
     assert (counts.pings, counts.rejected_pings) == (20, 0)
     assert await times_of(opened) == {"a": times(*range(20))}
-    chunks, _ = await opened.contents()
-    assert files.names("m1") == [row.name for row in chunks], "no orphan is left"
+    assert files.tidy("m1") == [], "no half is left"
     taken = await take(opened, database, [ping(number) for number in range(25)])
     assert taken.totals.pings == 5
     await opened.close()
     assert await times_of(opened) == {"a": times(*range(25))}
-    assert (await opened.contents())[1] == {}
+    chunks, waiting = await opened.contents()
+    assert waiting == {}
+    assert files.names("m1") == [row.name for row in chunks], "a file that was left is written again"
+
+
+async def test_another_database_in_the_same_place_keeps_its_files(
+    store: PingStore, database: Database, files: PingFiles, databases: Databases
+) -> None:
+    """An older copy of a database, opened by a second service or moved aside, has no whole file removed."""
+    async with (copy := Database(databases.fresh("sqlite"))).writing() as session:
+        session.add(mission())
+    older, _ = await open_store(copy, files)
+    await take(older, copy, [ping(0)])
+    await take(store, database, [ping(number) for number in range(30)])
+    await store.close()
+    written = files.names("m1")
+    assert written
+    opened, _ = await open_store(copy, files)
+    assert files.names("m1") == written
+    await opened.close()
+    await copy.close()
+    assert await times_of(store) == {"a": times(*range(30))}
 
 
 async def test_two_processes_that_move_the_same_pings_keep_them_once(

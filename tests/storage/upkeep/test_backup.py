@@ -1,10 +1,12 @@
 """Copies of a database that is in use, checked, damaged and put back; and room for new missions."""
 
 import asyncio
+import hashlib
 import os
 import re
 import resource
 import shutil
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -18,11 +20,13 @@ from sqlalchemy.exc import DBAPIError
 
 from app.storage.database import Database
 from app.storage.models import Base, MissionRow, SoundingRow
-from app.storage.ping_files import PingFiles
+from app.storage.ping_files import REMOVED, PingFiles, digest_in, file_name
 from app.storage.processes.membership import make_membership
 from app.storage.upkeep import migrate
-from app.storage.upkeep.backup import BackupError, back_up, contents_of, restore_to
-from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove
+from app.storage.upkeep.backup import BackupError, back_up, contents_of, files_beside, restore_to
+from app.storage.upkeep.prepare import DatabaseNotReadyError, prepare_database
+from app.storage.upkeep.retention import ended_before, finish_removing, give_space_back, remove, unlisted_files
+from tests.support.paths import PROJECT
 from tests.support.storage.databases import Databases, query
 from tests.support.storage.rows import PING_FILE, PING_FILE_NAME, mission, one_of_each, ping_chunk, sounding
 
@@ -159,6 +163,110 @@ async def test_a_restore_that_is_broken_off_leaves_the_database_in_its_place(sql
     assert not beside(tmp_path, f"{path_of(sqlite.url).name}.")
 
 
+KILLED_RESTORE = """
+import os, shutil, signal, sys
+from pathlib import Path
+from app.storage.ping_files import PingFiles
+from app.storage.upkeep.backup import restore_to
+
+def killed(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+url, backup, moment = sys.argv[1:]
+place, name = {
+    "while a file of pings is written": (PingFiles, "write"),
+    "while the database is copied": (shutil, "copyfileobj"),
+    "before the new one takes its name": (Path, "replace"),
+}[moment]
+setattr(place, name, killed)
+restore_to(url, Path(backup), replace=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("moment", "left"),
+    [
+        ("while a file of pings is written", []),
+        ("while the database is copied", [".part"]),
+        ("before the new one takes its name", [".part", ".before-"]),
+    ],
+)
+async def test_a_killed_restore_leaves_the_database_with_all_its_files_of_pings_and_is_named(
+    databases: Databases,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+    moment: str,
+    left: list[str],
+) -> None:
+    other = Database(databases.fresh("sqlite"))
+    await fill(other, PingFiles(str(tmp_path / "elsewhere")))
+    copy, _ = back_up(other.url, tmp_path / "copy.db", PingFiles(str(tmp_path / "elsewhere")))
+    await other.close()
+    url, content = f"sqlite+aiosqlite:///{tmp_path / 'fleet.db'}", b"pings of the database that is replaced"
+    await migrate.upgrade(url)
+    digest = hashlib.sha256(content).hexdigest()
+    PingFiles.beside(url).write(file_name("m2", 1, digest), content)
+
+    command = [sys.executable, "-c", KILLED_RESTORE, url, str(copy), moment]
+    killed = await asyncio.to_thread(subprocess.run, command, cwd=PROJECT, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert (await counts(url))["missions"] == 0
+    assert PingFiles.beside(url).read(file_name("m2", 1, digest), digest) == content
+    await prepare_database(url, may_upgrade=False)
+    said = capsys.readouterr().out + caplog.text
+    assert ("a restore did not end" in said) == bool(left)
+    assert all(f"fleet.db{name}" in said for name in left)
+
+    if left:
+        path_of(url).rename(tmp_path / "lost.db")
+        with pytest.raises(DatabaseNotReadyError, match=r"a restore of it did not end \(.*fleet\.db\.part is left\)"):
+            await prepare_database(url, may_upgrade=True)
+        (tmp_path / "lost.db").rename(path_of(url))
+    for second_name in beside(tmp_path, "fleet.db.before-"):
+        second_name.unlink()
+    _, aside = await asyncio.to_thread(restore_to, url, copy, replace=True)
+    assert aside is not None
+    assert beside(tmp_path, "fleet.db.") == [aside]
+    assert (await counts(url))["missions"] == 1
+    assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 0
+
+
+async def test_the_journal_of_a_lost_database_goes_aside_and_into_no_other(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    before = await counts(sqlite.url)
+    async with sqlite.writing() as session:
+        session.add(mission("m2"))
+    path = path_of(sqlite.url)
+    journal = shutil.copy(f"{path}-wal", tmp_path / "wal").read_bytes()
+    await sqlite.close()
+    path.with_name(f"{path.name}-wal").write_bytes(journal)
+    path.unlink()
+    assert restore_to(sqlite.url, copy, replace=False)[1] is None
+    assert await counts(sqlite.url) == before
+    (aside,) = beside(path.parent, f"{path.name}.before-")
+    assert (aside.name[-4:], aside.read_bytes()) == ("-wal", journal)
+
+
+async def test_a_database_goes_aside_where_files_have_one_name_only(
+    sqlite: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy, _ = back_up(sqlite.url, tmp_path / "empty.db")
+    await fill(sqlite)
+    await sqlite.close()
+
+    def none(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")  # as on FAT
+
+    monkeypatch.setattr(Path, "hardlink_to", none)
+    _, aside = restore_to(sqlite.url, copy, replace=True)
+    assert aside is not None
+    assert aside.stat().st_mode & 0o777 == 0o600
+    assert (await counts(f"sqlite+aiosqlite:///{aside}"))["missions"] == 1
+    assert (await counts(sqlite.url))["missions"] == 0
+
+
 @pytest.mark.parametrize("page", [0, 1, 2, 3])
 async def test_damage_is_noticed_and_nothing_is_restored_from_it(sqlite: Database, tmp_path: Path, page: int) -> None:
     await fill(sqlite)
@@ -181,24 +289,159 @@ async def test_files_of_pings_are_backed_up_and_put_back_with_the_database(sqlit
     copy, made = back_up(sqlite.url, tmp_path / "copy.db", files)
     assert made.ping_files == contents_of(copy).ping_files == 1
     assert all(file.stat().st_mode & 0o077 == 0 for file in (tmp_path / "copy.db-pings").rglob("*"))
-    files.write("m2/000000000001-later.parquet", b"of a mission that the backup does not know")
-    restore_to(sqlite.url, copy, replace=True, pings=files)
-    assert files.names() == [PING_FILE_NAME]
-    (aside,) = beside(tmp_path, "pings.before-")
-    assert len(PingFiles(str(aside)).names()) == 2, "with the database that was there"
-
     file = tmp_path / "copy.db-pings" / PING_FILE_NAME
     file.write_bytes(PING_FILE + b"?")
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
         contents_of(copy)
     file.unlink()
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
-        restore_to(sqlite.url, copy, replace=True, pings=files)
+        contents_of(copy)
+    assert contents_of(copy, files).ping_files_elsewhere == 1
+    restore_to(sqlite.url, copy, replace=True, pings=files)
     assert files.names() == [PING_FILE_NAME]
-    files.remove("m1")
+    files.remove("m1", [PING_FILE_NAME])
+    before = path_of(sqlite.url).read_bytes()
+    with pytest.raises(BackupError, match=f"1 of 1 files .* not in .*copy.db-pings.*pings/{PING_FILE_NAME} is missing"):
+        restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert path_of(sqlite.url).read_bytes() == before
     with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is missing"):
         back_up(sqlite.url, tmp_path / "again.db", files)
     assert not beside(tmp_path, "again")
+
+
+@NEEDS_PG_DUMP
+async def test_an_archive_without_its_files_of_pings_is_refused(databases: Databases, tmp_path: Path) -> None:
+    url, files = databases.fresh("postgresql"), PingFiles(str(tmp_path / "pings"))
+    database = Database(url)
+    await fill(database, files)
+    await database.close()
+    files.write("m1/left-by-a-kill.parquet", b"no archive refers to it")
+    copy, made = await asyncio.to_thread(back_up, url, tmp_path / "fleet.dump", files)
+    assert (made.ping_files, files_beside(copy).names()) == (1, [PING_FILE_NAME])
+
+    shutil.rmtree(tmp_path / "fleet.dump-pings")  # as pg_dump leaves it
+    missing = rf"1 of 1 files of pings are not in .*/fleet\.dump-pings, .*{PING_FILE_NAME} is missing"
+    other, others = databases.fresh("postgresql"), PingFiles(str(tmp_path / "others"))
+    for nowhere in (None, others):
+        with pytest.raises(BackupError, match=missing) as refused:
+            await asyncio.to_thread(contents_of, copy, nowhere)
+        assert f"Copy the folder of pings_url to {tmp_path / 'fleet.dump-pings'}" in refused.value.remedy
+    with pytest.raises(BackupError, match=missing):
+        await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
+    assert (await counts(other))["missions"] == 0
+
+    assert (await asyncio.to_thread(contents_of, copy, files)).ping_files_elsewhere == 1
+    names = files.names()
+    await asyncio.to_thread(restore_to, url, copy, replace=True, pings=files)
+    assert files.names() == names, "where they are"
+    assert not beside(tmp_path, "pings.")
+    shutil.copytree(tmp_path / "pings", tmp_path / "fleet.dump-pings")  # by hand
+    await asyncio.to_thread(restore_to, other, copy, replace=True, pings=others)
+    assert others.names() == [PING_FILE_NAME]
+    (tmp_path / "fleet.dump-pings" / PING_FILE_NAME).write_bytes(b"?")
+    with pytest.raises(BackupError, match=f"{PING_FILE_NAME} is damaged"):
+        await asyncio.to_thread(contents_of, copy, files)
+
+
+async def test_a_backup_that_fails_leaves_what_belongs_to_another_one(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    copy, _ = back_up(sqlite.url, tmp_path / "harbour.db")
+    kept, files = copy.rename(tmp_path / "kept.db"), files_beside(copy)
+    for _ in range(2):
+        with pytest.raises(BackupError, match=r"harbour\.db-pings exists"):
+            back_up(sqlite.url, copy)
+        assert files.read(PING_FILE_NAME, digest_in(PING_FILE_NAME)) == PING_FILE
+    assert beside(tmp_path, "harbour.") == [tmp_path / "harbour.db-pings"]
+
+    kept.rename(copy)
+    PingFiles.beside(sqlite.url).remove("m1", [PING_FILE_NAME])
+    with pytest.raises(BackupError, match="is missing"):
+        back_up(sqlite.url, tmp_path / "next.db")
+    assert contents_of(copy).ping_files == 1
+    assert not beside(tmp_path, "next.")
+
+
+@pytest.mark.parametrize("failing", [".db.part", "pings.part"])
+async def test_a_backup_whose_last_steps_fail_leaves_nothing(
+    sqlite: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    await fill(sqlite)
+    rename = Path.rename
+
+    def full(path: Path, target: Path) -> Path:
+        if path.name.endswith(failing):
+            raise OSError(28, "No space left on device")
+        return rename(path, target)
+
+    (tmp_path / "copy.db-pings.part" / "m2").mkdir(parents=True)
+    (tmp_path / "copy.db-pings.part" / "m2" / "left-by-a-kill.parquet").touch()
+    with monkeypatch.context() as disk:
+        disk.setattr(Path, "rename", full)
+        with pytest.raises(BackupError, match="No space left"):
+            back_up(sqlite.url, tmp_path / "copy.db")
+    assert not beside(tmp_path, "copy.")
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    assert files_beside(copy).names() == [PING_FILE_NAME]
+    assert sorted(beside(tmp_path, "copy.")) == [copy, tmp_path / "copy.db-pings"]
+
+
+@pytest.mark.parametrize("place", ["folder", "url"])
+async def test_what_is_replaced_keeps_its_files_of_pings(sqlite: Database, tmp_path: Path, place: str) -> None:
+    files = PingFiles(str(tmp_path / "pings") if place == "folder" else f"memory://{tmp_path.name}/pings")
+    await fill(sqlite, files)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db", files)
+    content = b"pings that came after the backup"
+    digest = hashlib.sha256(content).hexdigest()
+    later, another_s = file_name("m1", 2, digest), file_name("another-database-s", 1, digest)
+    for name in (later, another_s):
+        files.write(name, content)
+    async with sqlite.writing() as session:
+        row = ping_chunk()
+        row.name, row.digest, row.first_block, row.last_block = later, digest, 2, 2
+        session.add(row)
+    await sqlite.close()
+    files.write(f"m1{REMOVED}", PING_FILE_NAME.encode())  # by a removal that was killed
+
+    _, aside = restore_to(sqlite.url, copy, replace=True, pings=files)
+    assert files.names() == sorted([another_s, later, PING_FILE_NAME])
+    assert files.condemned() == [], "the mission is there again"
+    assert not beside(tmp_path, "pings.")
+    found = query(f"sqlite+aiosqlite:///{aside}", "select name, digest from ping_chunks order by id")
+    assert [files.read(name, digest) for name, digest in found] == [PING_FILE, content]
+    database = Database(sqlite.url)
+    assert await unlisted_files(database, files) == [another_s, later]
+    await database.close()
+
+
+async def test_a_restore_without_room_for_files_of_pings_leaves_none_behind(sqlite: Database, tmp_path: Path) -> None:
+    await fill(sqlite)
+    content = bytes(100_000)
+    digest = hashlib.sha256(content).hexdigest()
+    large = file_name("m1", 2, digest)
+    PingFiles.beside(sqlite.url).write(large, content)
+    async with sqlite.writing() as session:
+        row = ping_chunk()
+        row.name, row.digest = large, digest
+        session.add(row)
+    await sqlite.close()
+    before = await counts(sqlite.url)
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    most, room = resource.getrlimit(resource.RLIMIT_FSIZE), PingFiles(str(tmp_path / "room"))
+
+    class SmallDisk(PingFiles):
+        def write(self, name: str, content: bytes) -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, most[1]))
+            try:
+                super().write(name, content)
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, most)
+
+    with pytest.raises(BackupError, match="cannot be written: File too large"):
+        restore_to(sqlite.url, copy, replace=True, pings=SmallDisk(room.url))
+    assert room.names() == []
+    assert await counts(sqlite.url) == before
+    restore_to(sqlite.url, copy, replace=True, pings=room)
+    assert room.names() == [PING_FILE_NAME, large]
 
 
 async def test_a_mission_that_goes_takes_its_files_of_pings_along_whenever_the_process_is_killed(
@@ -222,11 +465,41 @@ async def test_a_mission_that_goes_takes_its_files_of_pings_along_whenever_the_p
     await finish_removing(database, files)
     assert (len(files.names()), files.condemned()) == (2, []), "the mission is still there"
     with monkeypatch.context() as kill:
-        kill.setattr(files, "remove", killed)
+        kill.setattr(files, "_remove", killed)
         with pytest.raises(KeyboardInterrupt):
             await remove(database, "m1", 30, files)
     await finish_removing(database, files)
     assert (files.names(), files.condemned()) == (["m2/other.parquet"], [])
+    assert await unlisted_files(database, files) == ["m2/other.parquet"]
+
+
+async def test_a_mission_that_goes_leaves_files_that_another_database_has_of_it(
+    databases: Databases, tmp_path: Path
+) -> None:
+    """One that was moved aside, for example: it knows pings that came after the backup."""
+    older, newer = Database(databases.fresh("sqlite")), Database(databases.fresh("sqlite"))
+    files, long_ago = PingFiles(str(tmp_path / "pings")), datetime.now(UTC) - timedelta(days=100)
+    content = b"came after the backup"
+    digest = hashlib.sha256(content).hexdigest()
+    later = file_name("m1", 2, digest)
+    files.write(PING_FILE_NAME, PING_FILE)
+    files.write(later, content)
+    for database in (older, newer):
+        async with database.writing() as session:
+            session.add(mission("m1", state="finished", updated_at=long_ago))
+            await session.flush()
+            session.add(ping_chunk())
+    assert await remove(older, "m1", 30, files)
+    await finish_removing(newer, files)
+    assert files.names() == [later]
+    assert await unlisted_files(newer, files) == [later]
+
+    # What another database condemned is not taken from one that has the mission.
+    files.write(f"m1{REMOVED}", later.encode())
+    await finish_removing(newer, files)
+    assert (files.names(), files.condemned()) == ([later], [])
+    await older.close()
+    await newer.close()
 
 
 async def test_what_is_no_backup_of_ours_is_named(sqlite: Database, tmp_path: Path) -> None:
