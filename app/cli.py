@@ -13,6 +13,7 @@ from app.commands.demo import demo
 from app.commands.failsafes import failsafes
 from app.commands.home import home
 from app.commands.logs import import_logs
+from app.commands.missions import missions_app
 from app.commands.service.audit import audit
 from app.commands.service.backup import backup, prune, restore
 from app.commands.service.doctor import doctor
@@ -31,6 +32,7 @@ app = typer.Typer(
 )
 app.add_typer(token_app, name="token")
 app.add_typer(sites_app, name="sites")
+app.add_typer(missions_app, name="missions")
 app.command()(export)
 app.command()(report)
 app.command("import")(import_file)

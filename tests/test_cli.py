@@ -47,6 +47,7 @@ COMMANDS = (
     "backup",
     "restore",
     "prune",
+    "missions",
 )
 
 
@@ -488,3 +489,44 @@ def test_the_doctor_says_when_the_service_holds_the_port(bathyfleet: Run) -> Non
     assert "is held by" in " ".join(ended.stdout.split())
     assert "/api/v1/doctor" in " ".join(ended.stdout.split())
     assert "Traceback" not in ended.stderr
+
+
+def test_missions_are_listed_paused_and_aborted_where_there_is_no_browser(
+    bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    with serving(tmp_path, environment) as (_, url), httpx.Client(base_url=f"{url}/api/v1") as client:
+        here = {"BATHYFLEET_PORT": str(httpx.URL(url).port)}
+        assert "there are no missions" in bathyfleet("missions", "list", **here).stdout
+        simulated = {"vehicles": [{"name": "auv-1", "kind": "sim"}, {"name": "auv-2", "kind": "sim"}], "steps": 50}
+        one, two = (
+            client.post("/missions", json=mission_spec(name=name, **simulated)).json()["id"] for name in ("A", "B")
+        )
+        none = bathyfleet("missions", "abort", **here)
+        assert (none.code, "0 missions can be meant by abort" in none.stderr) == (1, True)
+        client.post(f"/missions/{one}/start").raise_for_status()
+        listed = bathyfleet("missions", "list", **here).stdout.splitlines()
+        assert listed[0] == f"{two}  B: ready"
+        assert listed[1].startswith(f"{one}  A: running")
+        for action, state in (("pause", "paused"), ("resume", "running"), ("abort", "aborted")):
+            done = bathyfleet("missions", action, "--note", "a ferry", **here)
+            assert (done.code, done.stdout.splitlines()[0]) == (0, f"{one}  A: {state}")
+            if action != "resume":
+                assert done.stdout.count("acknowledged the stop") == 2
+            assert client.get(f"/missions/{one}").json()["state"] == state
+        late = bathyfleet("missions", "resume", one, "--url", url)
+        assert (late.code, "aborted" in late.stderr) == (1, True)
+    gone = bathyfleet("missions", "list", "--url", url)
+    assert (gone.code, "does not answer" in gone.stderr) == (1, True)
+
+
+def test_missions_of_a_service_that_asks_for_a_token_are_reached_by_that_of_its_first_start(
+    bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    with serving(tmp_path, environment) as (_, url):
+        here = {"BATHYFLEET_PORT": str(httpx.URL(url).port)}
+        token = (tmp_path / "operator.token").read_text().strip()
+        assert bathyfleet("missions", "list", **here).code == 0
+        assert bathyfleet("missions", "list", "--url", url, "--token", token).code == 0
+        (tmp_path / "operator.token").unlink()
+        assert bathyfleet("missions", "list", **here, BATHYFLEET_TOKEN=token).code == 0
+        assert bathyfleet("missions", "list", "--url", url, "--token", "wrong").code == 1

@@ -1,27 +1,105 @@
 """Commands to a service that is running, over REST."""
 
-from typing import Any
+import ipaddress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 from app.commands.command import CommandError
+
+if TYPE_CHECKING:
+    import httpx
+
+    from app.settings import Settings
+
+
+class RunningService:
+    """A service that answers at a URL; closes its connections at the end of a ``with`` block.
+
+    Parameters
+    ----------
+    url : str
+        Such as ``http://127.0.0.1:8080``.
+    token : str or None
+        Access token, where it asks for one.
+    """
+
+    def __init__(self, url: str, token: str | None) -> None:
+        import httpx
+
+        self.url = url.rstrip("/")
+        headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        try:
+            self._client = httpx.Client(base_url=f"{self.url}/api/v1", headers=headers, timeout=300.0)
+        except httpx.InvalidURL as error:
+            raise CommandError(f"{url!r} is no URL: {error}", "Such as http://127.0.0.1:8080") from None
+
+    def __enter__(self) -> "RunningService":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._client.close()
+
+    def missions(self) -> list[Any]:
+        """Return its missions as it lists them. Raises CommandError."""
+        return list(self._answer("GET", "/missions"))
+
+    def ask(self, begin: str, method: str, path: str, **content: Any) -> Any:
+        """Send something for the one mission whose id begins so; returns the answer. Raises CommandError."""
+        meant = [mission["id"] for mission in self.missions() if mission["id"].startswith(begin)]
+        if len(meant) != 1:
+            raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}")
+        return self._answer(method, f"/missions/{meant[0]}/{path}", **content)
+
+    def _answer(self, method: str, path: str, **content: Any) -> Any:
+        import httpx
+
+        try:
+            return _content(self._client.request(method, path, **content))
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise CommandError(f"{self.url} does not answer: {error}", "Is the service running there?") from None
 
 
 def ask_service(url: str, token: str | None, begin: str, method: str, path: str, **content: Any) -> Any:
     """Send something for the one mission whose id begins so to a running service; returns its answer."""
-    import httpx
+    with RunningService(url, token) as service:
+        return service.ask(begin, method, path, **content)
 
-    headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+
+def own_url(settings: "Settings") -> str:
+    """Return where the service of these settings is reached from its own machine.
+
+    Raises CommandError where it takes any free port, which nobody knows beforehand.
+    """
+    if settings.port == 0:
+        raise CommandError("port is 0: any free one, which is not known here", "Name the service with --url")
+    host = settings.host
     try:
-        with httpx.Client(base_url=url.rstrip("/") + "/api/v1", headers=headers, timeout=300.0) as client:
-            listed = client.get("/missions")
-            meant = [m["id"] for m in _answer(listed) if m["id"].startswith(begin)]
-            if len(meant) != 1:
-                raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}")
-            return _answer(client.request(method, f"/missions/{meant[0]}/{path}", **content))
-    except (httpx.HTTPError, httpx.InvalidURL) as error:
-        raise CommandError(f"{url} does not answer: {error}", "Is the service running there?") from None
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        pass  # a name
+    else:
+        if address.is_unspecified:
+            address = ipaddress.ip_address("::1" if address.version == 6 else "127.0.0.1")
+        host = f"[{address}]" if address.version == 6 else str(address)
+    return f"{'http' if settings.tls_certificate is None else 'https'}://{host}:{settings.port}"
 
 
-def _answer(response: Any) -> Any:
+def own_token(settings: "Settings") -> str | None:
+    """Return the token that the service's first start left in a file, where there is one that this user may read."""
+    from app.storage.upkeep.prepare import FIRST_TOKEN_FILE, file_of
+
+    database = file_of(settings.database_url)
+    if database is None:
+        return None
+    try:
+        return (database.parent / FIRST_TOKEN_FILE).read_text().strip()
+    except OSError:
+        return None
+
+
+def _content(response: "httpx.Response") -> Any:
     """Return a service's answer. Raises CommandError with what it refused."""
     try:
         said = response.json()

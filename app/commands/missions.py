@@ -1,0 +1,129 @@
+"""``bathyfleet missions``: what an operator needs of a running service where there is no browser."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.commands.command import FAILURE, CommandError, command_settings
+from app.commands.running_service import RunningService, own_token, own_url
+
+if TYPE_CHECKING:
+    from app.missions.views.mission import MissionSummary
+
+missions_app = typer.Typer(
+    help="List the missions of a running service, pause them and end them.", no_args_is_help=True
+)
+
+Url = Annotated[str | None, typer.Option(help="A running service [default: the one of this machine's settings]")]
+Token = Annotated[
+    str | None,
+    typer.Option(
+        envvar="BATHYFLEET_TOKEN",
+        help="Access token [default: that of its first start, where this user may read it]",
+        show_default=False,
+    ),
+]
+Mission = Annotated[
+    str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it [default: the only one under way]")
+]
+Note = Annotated[str, typer.Option(help="Kept in the mission's log beside the action.")]
+Home = Annotated[
+    bool | None,
+    typer.Option(
+        "--return/--stop",
+        help="Send the vehicles home first, or stop them where they are "
+        "[default: abort stops them, finish does as the mission says]",
+        show_default=False,
+    ),
+]
+
+
+@missions_app.command("list")
+def list_missions(url: Url = None, token: Token = None) -> None:
+    """List the missions, newest first, with their state and what is left of them."""
+    from app.missions.views.mission import MissionSummary
+    from imc_bridge.printable import printable
+
+    with _service(url, token) as service:
+        found = [MissionSummary.model_validate(one) for one in service.missions()]
+    if not found:
+        typer.echo("there are no missions; POST /api/v1/missions describes one")
+    for one in found:
+        state = f"{one.state}, {one.reason}" if one.reason else str(one.state)
+        typer.echo(f"{one.id}  {printable(one.name)}: {printable(state)}{_left(one)}")
+
+
+@missions_app.command()
+def pause(mission: Mission = "", note: Note = "", url: Url = None, token: Token = None) -> None:
+    """Stop a mission's vehicles until it is resumed."""
+    _act("pause", mission, {"note": note}, url, token, lambda one: one.state == "running")
+
+
+@missions_app.command()
+def resume(mission: Mission = "", note: Note = "", url: Url = None, token: Token = None) -> None:
+    """Go on with a paused mission."""
+    _act("resume", mission, {"note": note}, url, token, lambda one: one.state == "paused")
+
+
+@missions_app.command()
+def finish(mission: Mission = "", home: Home = None, note: Note = "", url: Url = None, token: Token = None) -> None:
+    """End a mission early; its vehicles go home where it says so."""
+    _act("finish", mission, {"note": note, "return": home}, url, token, _is_under_way)
+
+
+@missions_app.command()
+def abort(mission: Mission = "", home: Home = None, note: Note = "", url: Url = None, token: Token = None) -> None:
+    """Stop every vehicle of a mission now and end it.
+
+    Exit code 1 when a vehicle has not acknowledged the stop.
+    """
+    _act("abort", mission, {"note": note, "return": home}, url, token, _is_under_way)
+
+
+def _service(url: str | None, token: str | None) -> RunningService:
+    settings = command_settings()
+    if url is None:
+        url, token = own_url(settings), token or own_token(settings)
+    return RunningService(url, token)
+
+
+def _left(mission: "MissionSummary") -> str:
+    if not _is_under_way(mission) or mission.progress.minutes_left is None:
+        return ""
+    return f", {mission.progress.minutes_left:.0f} min left"
+
+
+def _is_under_way(mission: "MissionSummary") -> bool:
+    return mission.state in ("running", "paused")
+
+
+def _act(
+    action: str,
+    begin: str,
+    asked: dict[str, Any],
+    url: str | None,
+    token: str | None,
+    meant: "Callable[[MissionSummary], bool]",
+) -> None:
+    """Ask for an action and tell which vehicles acknowledged what it stopped; ``meant`` are missions it can be for."""
+    from app.missions.views.mission import ActionView, MissionSummary
+    from imc_bridge.printable import printable
+
+    with _service(url, token) as service:
+        if not begin:
+            every = map(MissionSummary.model_validate, service.missions())
+            fitting = [one for one in every if meant(one)]
+            if len(fitting) != 1:
+                there = "; ".join(f"{one.id} {one.name} ({one.state})" for one in fitting)
+                raise CommandError(
+                    f"{len(fitting)} missions can be meant by {action}", f"Name one of {there}" if there else ""
+                )
+            begin = fitting[0].id
+        done: ActionView = ActionView.model_validate(service.ask(begin, "POST", action, json=asked))
+    typer.echo(f"{done.mission.id}  {printable(done.mission.name)}: {done.mission.state}")
+    for stop in done.stops:
+        words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
+        typer.echo(printable(f"{stop.vehicle} {words}{f': {stop.detail}' if stop.detail else ''}"))
+    if not all(stop.acknowledged for stop in done.stops):
+        raise typer.Exit(FAILURE)
