@@ -169,8 +169,8 @@ def import_file(
         str | None, typer.Option(help="Which way values grow: down or up [default: what the file says]")
     ] = None,
     datum_offset: Annotated[
-        float, typer.Option(help="Metres added to every depth to bring it to the mission's datum.")
-    ] = 0.0,
+        float | None, typer.Option(help="Metres added to every depth to bring it to the mission's datum [default: 0]")
+    ] = None,
     url: Url = None,
     token: Token = None,
     database: Database = None,

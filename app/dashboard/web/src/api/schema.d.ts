@@ -12203,7 +12203,7 @@ export interface operations {
                 sd_m?: number;
                 /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
                 order?: components["schemas"]["Order"];
-                /** @description Added to every depth to bring it to the mission's datum */
+                /** @description Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said where the file states another one */
                 datum_offset_m?: number;
             };
             header?: never;
@@ -12481,7 +12481,7 @@ export interface operations {
                 sd_m?: number;
                 /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
                 order?: components["schemas"]["Order"];
-                /** @description Added to every depth to bring it to the mission's datum */
+                /** @description Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said where the file states another one */
                 datum_offset_m?: number;
             };
             header?: never;
