@@ -169,8 +169,8 @@ def import_file(
         str | None, typer.Option(help="Which way values grow: down or up [default: what the file says]")
     ] = None,
     datum_offset: Annotated[
-        float, typer.Option(help="Metres added to every depth to bring it to the mission's datum.")
-    ] = 0.0,
+        float | None, typer.Option(help="Metres added to every depth to bring it to the mission's datum [default: 0]")
+    ] = None,
     url: Url = None,
     token: Token = None,
     database: Database = None,
@@ -238,7 +238,7 @@ def tide(
             exists=True,
             dir_okay=False,
             readable=True,
-            help="Table of high and low waters, or of observed levels (.tid); default: --level.",
+            help="Table of high and low waters, or of observed levels (.tid, gauge's export); default: --level.",
         ),
     ] = None,
     level: Annotated[
@@ -263,7 +263,7 @@ def tide(
     try:
         text = None if table is None else table.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise CommandError(f"{table} is not text", "send a .tid table") from None
+        raise CommandError(f"{table} is not text", "send a table of times and levels") from None
     given: dict[str, Any] = {
         "level_m": level or 0.0,
         "sd_m": sd,
@@ -282,6 +282,8 @@ def tide(
 
         view = with_missions(command_settings(database_url=database), run, changing="tide", mission=mission)
     typer.echo(f"depths are below {view.vertical_datum}; {view.accepted} soundings accepted, {view.rejected} rejected")
+    if view.tide_table is not None and view.tide_table.utc_assumed:
+        typer.echo("the table states no zone for its times: they are taken for UTC")
 
 
 def adjust(

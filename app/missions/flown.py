@@ -52,6 +52,11 @@ class Flown:
     """What it may fly yet, metres; None where that is not known."""
     phase: Phase = Phase.STOPPED
 
+    @property
+    def surveyed(self) -> bool:
+        """Whether it ever surveyed: who only was on its way did not."""
+        return self.survey_s > 0.0 or self.legs_reached > 0
+
     def add_way(self, start: Place, end: Place, leg: tuple[Place, Place] | None) -> None:
         """Add a piece of track while a leg was flown; None: it had none."""
         length_m = math.hypot(end[0] - start[0], end[1] - start[1])

@@ -7,10 +7,14 @@ import numpy as np
 import shapely
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.mapping.quality.sessions import FASTEST_MPS, UNCERTAIN_M, sessions
 
 GAP_S, GAP_M, GAP_OF_USUAL = 30.0, 25.0, 5.0
 """Nothing is known between two soundings that lie farther apart than one of the first two and than so many times what
 is usual in their track."""
+
+LONGEST_GAP_M = 100.0
+"""Nor between two that are farther apart than this, whatever is usual."""
 
 LEAST_STEP_M = 0.01
 """A sounding that is nearer to the one before it says nothing of the way."""
@@ -34,7 +38,7 @@ CROSSLINE_OF_LONGEST = 0.1
 
 @dataclass(frozen=True)
 class Tracks:
-    """Soundings of several vehicles, each array of shape (n,), sorted by vehicle and time.
+    """Soundings of several vehicles, each array of shape (n,), sorted by vehicle, session of its clock, and time.
 
     Attributes
     ----------
@@ -60,7 +64,8 @@ class Tracks:
     def of(cls, tables: dict[str, FloatArray]) -> "Tracks":
         """Return tracks of tables (k, 5), one per vehicle: time, east, north, depth, standard deviation.
 
-        Soundings of the same time, as of a DVL's four beams, become one in their middle.
+        Rows are in the order of arrival; where a vehicle's clock was set back a session begins. Soundings of the same
+        time, as of a DVL's four beams, become one in their middle.
         """
         names = tuple(sorted(tables))
         parts = [_along(tables[name]) for name in names]
@@ -108,19 +113,24 @@ class Lines:
 
 
 def _along(table: FloatArray) -> FloatArray:
-    """Return a vehicle's soundings (k, 5) by time, one for each time and place."""
-    table = table[np.argsort(table[:, 0], kind="stable")]
-    if not len(table):
-        return table
-    first = np.flatnonzero(np.diff(table[:, 0], prepend=-np.inf) > 0.0)
+    """Return a vehicle's soundings (k, 5) by session and time, one for each time and place."""
+    table = _one_per_time(table)
+    parts = [_one_per_time(table[rows]) for rows in sessions(*table[:, :3].T)]
+    table = np.concatenate([np.zeros((0, 5)), *parts])
+    step = np.hypot(*np.diff(table[:, 1:3], axis=0).T)
+    moved = np.concatenate([[True], (step >= LEAST_STEP_M) | (np.diff(table[:, 0]) < 0.0)])
+    return np.asarray(table[moved[: len(table)]])
+
+
+def _one_per_time(table: FloatArray) -> FloatArray:
+    """Return soundings (k, 5) of which those of the same time, one after the other, are one in their middle."""
+    first = np.flatnonzero(np.diff(table[:, 0], prepend=np.nan) != 0.0)
     if len(first) < len(table):
         size = np.diff(first, append=len(table))
         variance = np.add.reduceat(table[:, 4] ** 2, first) / size**2
         table = np.add.reduceat(table, first) / size[:, None]
         table[:, 4] = np.sqrt(variance)
-    step = np.hypot(*np.diff(table[:, 1:3], axis=0).T)
-    moved = np.concatenate([[True], step >= LEAST_STEP_M])
-    return np.asarray(table[moved])
+    return table
 
 
 def cut(tracks: Tracks) -> Lines:
@@ -161,8 +171,11 @@ def _joined(tracks: Tracks) -> BoolArray:
             between_s = np.diff(tracks.time_s[rows])
             between_m = np.hypot(np.diff(tracks.east_m[rows]), np.diff(tracks.north_m[rows]))
             longest_s = max(GAP_S, GAP_OF_USUAL * float(np.median(between_s)))
-            longest_m = max(GAP_M, GAP_OF_USUAL * float(np.median(between_m)))
-            joined[rows[:-1]] = (between_s <= longest_s) & (between_m <= longest_m)
+            longest_m = np.minimum(
+                min(max(GAP_M, GAP_OF_USUAL * float(np.median(between_m))), LONGEST_GAP_M),
+                FASTEST_MPS * between_s + UNCERTAIN_M,
+            )
+            joined[rows[:-1]] = (between_s >= 0.0) & (between_s <= longest_s) & (between_m <= longest_m)
     return joined
 
 

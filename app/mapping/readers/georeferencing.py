@@ -15,6 +15,7 @@ from rasterio.warp import Resampling, reproject
 from app.arrays import BoolArray, FloatArray
 from app.mapping.kriging.cell_index import cell_numbers
 from app.mapping.readers.types import (
+    DATUM_NOTE,
     LOCAL,
     MAX_DEPTH_M,
     MAX_SD_M,
@@ -30,6 +31,7 @@ from app.mapping.readers.types import (
 )
 from app.mapping.s44 import NORMAL_95, Order, max_tvu_m
 from app.mapping.types import Grid, Soundings
+from app.mapping.water.vertical import datum_words, same_datum, vertical_part
 
 SAME_UNIT = 1e-4
 """Files seldom tell which of the feet theirs are, whose lengths differ by less than this: their systems do."""
@@ -63,12 +65,14 @@ def place_soundings(content: Points | Raster, options: ReadOptions, place: MapEx
     Raises
     ------
     ReadError
-        When something that has to be known is not, when a value cannot be, or when nothing lies near the grid.
+        When something that has to be known is not, when a value cannot be, when depths are below another datum than
+        the mission's and no offset is stated, or when nothing lies near the grid.
     """
-    notes = list(content.notes) if isinstance(content, Points) else []
+    notes = list(content.notes)
     positive = _positive(content, options, notes)
-    depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
+    depth = (content.z if positive == "down" else -content.z) + options.offset_m
     crs = _crs(content.crs, options, notes)
+    _check_datum(crs, options, place, notes)
     if isinstance(content, Points):
         east, north = _to_local(content.x, content.y, crs, place)
         near = _is_near(east, north, place)
@@ -99,10 +103,11 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
 
     A grid is interpolated linearly, or averaged where it is finer than the map; soundings are averaged in each cell.
     """
-    notes = list(content.notes) if isinstance(content, Points) else []
+    notes = list(content.notes)
     positive = _positive(content, options, notes)
-    depth = (content.z if positive == "down" else -content.z) + options.datum_offset_m
+    depth = (content.z if positive == "down" else -content.z) + options.offset_m
     crs = _crs(content.crs, options, notes)
+    _check_datum(crs, options, place, notes)
     if isinstance(content, Raster):
         raster = _in_unit_of(content, crs)
         _check_depths(depth, _cells_near(raster, crs, place), content, notes)
@@ -121,6 +126,28 @@ def place_reference(content: Points | Raster, options: ReadOptions, place: MapEx
         raise ReadError("file", "none of its depths lies in the mission's grid", "check the file and its crs")
     _check_side(sampled, options)
     return sampled, notes
+
+
+def _check_datum(crs: pyproj.CRS | None, options: ReadOptions, place: MapExtent, notes: list[str]) -> None:
+    """Refuse depths below another datum than the mission's; note where only one of the two states its datum."""
+    if options.datum_offset_m is not None:
+        return
+    of_file = vertical_part(crs)
+    of_mission = None if place.datum_epsg is None else vertical_part(pyproj.CRS.from_epsg(place.datum_epsg))
+    if of_file is not None and of_mission is not None:
+        if not same_datum(of_file, of_mission):
+            raise ReadError(
+                "datum_offset_m",
+                f"its values count from {datum_words(of_file)}, the mission's depths from {datum_words(of_mission)}",
+                "say datum_offset_m, the metres to add to its depths, or 0 where both are the same there",
+            )
+        return
+    for known, who, other in ((of_file, "the file", "the mission"), (of_mission, "the mission", "the file")):
+        if known is not None:
+            notes.append(
+                f"{DATUM_NOTE}{who} states {datum_words(known)}, {other} none; they are taken for the same, and depths "
+                "are off by as much as they differ. State datum_offset_m where they do"
+            )
 
 
 def _none_near(content: Points | Raster, options: ReadOptions, place: MapExtent) -> ReadError:
@@ -224,7 +251,7 @@ def _check_depths(depth: FloatArray, near: BoolArray, content: Points | Raster, 
 
 def _check_side(depth: FloatArray, options: ReadOptions) -> None:
     """Refuse depths of which nearly all lie above zero, where nobody but the file said which way they grow."""
-    if options.positive is None and np.mean(depth[np.isfinite(depth)] < options.datum_offset_m) >= _BOTH:
+    if options.positive is None and np.mean(depth[np.isfinite(depth)] < options.offset_m) >= _BOTH:
         raise ReadError(
             "positive",
             "by what the file says of its values nearly all there lie above the water",

@@ -27,7 +27,7 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
     ReadError
         When the file cannot be used.
     """
-    place = MapExtent(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"])
+    place = MapExtent(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"], task.get("datum_epsg"))
     if task["what"] == "zones":
         return _zones(file, place, float(task["around_m"]), out)
     options = ReadOptions(**task["options"])

@@ -11,11 +11,14 @@ from pyproj.exceptions import CRSError
 
 from app.arrays import FloatArray
 from app.mapping.readers.hdf5 import check_contained
-from app.mapping.readers.types import MAX_RASTER_CELLS, Raster, ReadError
+from app.mapping.readers.types import DATUM_NOTE, MAX_RASTER_CELLS, Raster, ReadError
+from app.mapping.water.vertical import EPSG_OF_S100, VerticalDatum
 
 INSTANCE = "BathymetryCoverage/BathymetryCoverage.01"
 VALUES = f"{INSTANCE}/Group_001/values"
 FILLED = 1_000_000.0
+EPSG_REFERENCE = 2
+"""A file whose verticalDatumReference is this numbers its datum as EPSG does."""
 _CRS = ("horizontalCRS", "horizontalDatumValue")
 """Attributes that number the coordinate reference system, in newer and older editions."""
 
@@ -58,7 +61,23 @@ def _read(file: Any) -> Raster:
     # The origin is the middle of the south-western cell, the first row the southernmost.
     north = south + (rows - 0.5) * step_y
     transform = Affine(step_x, 0.0, west - 0.5 * step_x, 0.0, -step_y, north)
-    return Raster(depth[::-1].copy(), sd[::-1].copy(), transform, pyproj.CRS.from_epsg(number), "down")
+    crs, notes = _with_datum(file, pyproj.CRS.from_epsg(number))
+    return Raster(depth[::-1].copy(), sd[::-1].copy(), transform, crs, "down", notes=notes)
+
+
+def _with_datum(file: Any, horizontal: pyproj.CRS) -> tuple[pyproj.CRS, tuple[str, ...]]:
+    """Return the system of the positions with the datum that a file states, and what is to be known of that."""
+    if "verticalDatum" not in file.attrs:
+        return horizontal, ()
+    stated = int(file.attrs["verticalDatum"])
+    by_epsg = int(file.attrs.get("verticalDatumReference", 1)) == EPSG_REFERENCE
+    epsg = stated if by_epsg else EPSG_OF_S100.get(stated)
+    if epsg is None:
+        words = f"{DATUM_NOTE}the file states number {stated} of the IHO's register, which is not known here"
+        return horizontal, (f"{words}; state datum_offset_m where the mission's is another one",)
+    if not pyproj.CRS.from_epsg(epsg).is_vertical:
+        raise ReadError("file", "its vertical datum is none", "check verticalDatum")
+    return VerticalDatum(epsg, "").compound_with(horizontal), ()
 
 
 def _known(values: Any) -> FloatArray:

@@ -23,6 +23,9 @@ LOCAL: Literal["local"] = "local"
 MIN_DEPTH_M, MAX_DEPTH_M = -100.0, 11_100.0
 MIN_SD_M, MAX_SD_M = 0.001, 1000.0
 
+DATUM_NOTE = "vertical datum: "
+"""How a note begins that depths may be off by the difference of two datums."""
+
 UNUSABLE = 3
 """Exit code of the reading process when the file, not the program, is wrong."""
 
@@ -54,23 +57,32 @@ class ReadOptions:
     sd_m, order
         Uncertainty where the file states none: a standard deviation, or the S-44 order that was surveyed to.
     datum_offset_m
-        Added to every depth to bring it to the mission's datum.
+        Added to every depth to bring it to the mission's datum; None: nobody said that it is another one.
     """
 
     crs: str | None = None
     positive: Positive | None = None
     sd_m: float | None = None
     order: str | None = None
-    datum_offset_m: float = 0.0
+    datum_offset_m: float | None = None
+
+    @property
+    def offset_m(self) -> float:
+        """What is added to every depth."""
+        return self.datum_offset_m or 0.0
 
 
 @dataclass(frozen=True)
 class MapExtent:
-    """Where the mission maps: its frame, its grid, and how far outside that still helps."""
+    """Where the mission maps: its frame, its grid, how far outside that still helps, and what its depths are below.
+
+    ``datum_epsg`` is None where the mission's depths are below the water level of the moment.
+    """
 
     frame: LocalFrame
     grid: Grid
     margin_m: float
+    datum_epsg: int | None = None
 
 
 @dataclass(frozen=True)
@@ -101,7 +113,7 @@ class Raster:
     """A grid. Arrays have shape (rows, cols), row 0 first in the file; NaN is unknown.
 
     ``transform`` takes columns and rows to x and y of ``crs``, in metres ``unit_m`` long where the file states their
-    unit beside it.
+    unit beside it. ``crs`` has the vertical system, too, where the file states it. ``notes`` say what is to be known.
     """
 
     z: FloatArray
@@ -110,3 +122,4 @@ class Raster:
     crs: pyproj.CRS | None
     positive: Positive | None
     unit_m: float | None = None
+    notes: tuple[str, ...] = ()

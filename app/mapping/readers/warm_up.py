@@ -21,6 +21,7 @@ from app.mapping.readers.georeferencing import place_reference, place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES
 from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid
+from app.mapping.water.vertical import LOWEST_ASTRONOMICAL_TIDE, VerticalDatum, datum_words, same_datum
 
 SMALL_CELL = Path(__file__).with_name("small.000")
 """A cell with one object of each class that is read."""
@@ -68,6 +69,9 @@ def warm_up(task: dict[str, Any]) -> None:
     found = read_file(io.BytesIO(content), kind, place)
     place_reference(found, _OPTIONS, place)
     place_soundings(found, _OPTIONS, place)
+    in_space = pyproj.CRS.from_epsg(4979)
+    datum_words(in_space)
+    same_datum(VerticalDatum(LOWEST_ASTRONOMICAL_TIDE, "").heights, in_space)
     for content in (b"", b"x,y,z\na,b,c\n", b"\x89HDF\r\n\x1a\n", b"000263LE1 0900201   " + 40 * b"0"):
         with contextlib.suppress(ReadError):
             read_file(io.BytesIO(content), kind, place)

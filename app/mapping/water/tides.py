@@ -1,9 +1,12 @@
-"""Water levels from a table of high and low waters or of observed levels (``.tid`` files as of Neptus and DUNE)."""
+"""Water levels from a table of high and low waters or of observed levels.
+
+Tables are ``.tid`` files as of Neptus and DUNE, or what gauges export: a time of ISO 8601 and a level in each line.
+"""
 
 import hashlib
 import re
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from functools import cached_property
 
 import numpy as np
@@ -36,9 +39,22 @@ FLAWS, FLAWED = 4, 0.15
 lies between entries that are close together is told."""
 
 MAX_LINES = 200_000
+_SEPARATOR = r"[ \t]*[,;\t ][ \t]*"
 _LINE = re.compile(
-    r"(\d{4})/(\d{2})/(\d{2})\s+(\d{2}):(\d{2})(?::(\d{2})(?:\.(\d{1,6}))?)?\s+([-+]?\d+(?:\.\d*)?)\s*\Z"
+    r"(?P<year>\d{4})(?P<mark>[-/])(?P<month>\d{2})(?P=mark)(?P<day>\d{2})"
+    rf"(?:T|{_SEPARATOR})"
+    r"(?P<hour>\d{2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:\.(?P<fraction>\d{1,6}))?)?"
+    r"(?P<zone>[ \t]*(?:Z|UTC|GMT)|[-+]\d{2}(?::?\d{2})?)?"
+    rf"(?P<separator>{_SEPARATOR})(?P<level>[-+]?\d+(?:[.,]\d*)?)\s*\Z",
+    re.ASCII | re.IGNORECASE,
 )
+_DAY_OR_MONTH = re.compile(r"\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}\b")
+_FORMS = "'2021-01-31T05:20:00Z 1.1' or '2021/01/31 05:20:00.000 1.1'"
+
+UTC_NAMES = frozenset({"UTC", "GMT", "Z", "UTC+0"})
+OTHER_ZONES = frozenset({"local", "lt", "lst", "ldt", "lst_ldt", "wet", "west", "cet", "cest", "mez", "mesz", "bst"})
+OTHER_UNITS = frozenset({"mm", "cm", "dm", "ft", "feet", "foot"})
+"""Words of a header, in lower case, that say that times or levels are not what they are taken for."""
 
 
 class TideTableError(ValueError):
@@ -55,12 +71,15 @@ class TideTable:
         Unix seconds, strictly ascending, shape (n,).
     levels_m
         Above the table's zero (chart datum), shape (n,).
+    utc_assumed
+        Whether the table states no zone for some of its times, which are taken for UTC.
     """
 
     name: str
     times_s: FloatArray
     levels_m: FloatArray
     digest: str
+    utc_assumed: bool = False
 
     @property
     def first(self) -> datetime:
@@ -144,7 +163,11 @@ class TideTable:
 
 
 def parse_tid(text: str, *, name: str = "") -> TideTable:
-    """Read a ``.tid`` table: ``YYYY/MM/DD hh:mm:ss.sss level`` per line, UTC, ``#`` before comments.
+    """Read a table: a time and a level in metres per line, ``#`` before comments, a header line where there is one.
+
+    Times are ``YYYY/MM/DD hh:mm[:ss.sss]`` as in ``.tid`` files or ISO 8601, with ``Z`` or an offset such as ``+01:00``
+    or without: then they are UTC. Blanks, a tab, a comma or a semicolon lie between time and level; after a semicolon
+    a level may have a decimal comma.
 
     Parameters
     ----------
@@ -154,12 +177,13 @@ def parse_tid(text: str, *, name: str = "") -> TideTable:
     Raises
     ------
     TideTableError
-        For a line that cannot be read, is out of order or has an impossible level, for another time zone than UTC,
-        and for fewer than two entries.
+        For a line that cannot be read, is out of order or has an impossible level, for a comment or header that states
+        another time zone than UTC or another unit than metres, and for fewer than two entries.
     """
     times: list[float] = []
     levels: list[float] = []
     harbour = ""
+    zone_named, zone_missing, header_seen = False, False, False
     for number, line in enumerate(text.splitlines(), start=1):
         if number > MAX_LINES:
             raise TideTableError(f"the table has more than {MAX_LINES} lines; send the years that are needed")
@@ -170,33 +194,75 @@ def parse_tid(text: str, *, name: str = "") -> TideTable:
             key, _, value = entry.lstrip("# ").partition(":")
             if key.strip().lower() == "harbor":
                 harbour = value.strip()[:100]
-            if key.strip().lower() == "time zone" and value.strip().upper() not in ("UTC", "GMT", "Z", "UTC+0"):
-                raise TideTableError(f"line {number}: the time zone is {value.strip()[:40]!r}; times must be UTC")
+            if key.strip().lower() == "time zone":
+                if value.strip().upper() not in UTC_NAMES:
+                    raise TideTableError(f"line {number}: the time zone is {value.strip()[:40]!r}; times must be UTC")
+                zone_named = True
             continue
-        time_s, level = _entry(entry, number)
+        if not times and not header_seen and entry.lstrip("\"'(")[:1].isalpha():
+            header_seen = True
+            zone_named |= _zone_of_header(entry, number)
+            continue
+        time_s, level, has_zone = _entry(entry, number)
         if times and time_s <= times[-1]:
             raise TideTableError(f"line {number}: {entry[:40]!r} is not later than the entry before it")
         times.append(time_s)
         levels.append(level)
+        zone_missing |= not has_zone
     if len(times) < 2:
         raise TideTableError(f"the table has {len(times)} entries; a level lies between two, so at least 2 are needed")
     digest = hashlib.sha256(text.encode()).hexdigest()
-    return TideTable(name or harbour or "unnamed", np.array(times), np.array(levels), digest)
+    utc_assumed = zone_missing and not zone_named
+    return TideTable(name or harbour or "unnamed", np.array(times), np.array(levels), digest, utc_assumed)
 
 
-def _entry(entry: str, number: int) -> tuple[float, float]:
+def _zone_of_header(header: str, number: int) -> bool:
+    """Return whether a header says that times are UTC. Raises TideTableError where it states another zone or unit."""
+    words = {word.lower() for word in re.findall(r"\w+", header)}
+    shift = re.search(r"\b(?:UTC|GMT)\s*[-+]\s*0*[1-9]", header, re.IGNORECASE)
+    if shift is not None or words & OTHER_ZONES:
+        zone = sorted(words & OTHER_ZONES)[0] if shift is None else shift.group()
+        raise TideTableError(
+            f"line {number}: the header states the time zone {zone!r}; times must be UTC, or state their offset "
+            "as in 2021-01-31T05:20+01:00"
+        )
+    if words & OTHER_UNITS:
+        unit = sorted(words & OTHER_UNITS)[0]
+        raise TideTableError(f"line {number}: the header states levels in {unit!r}; they must be in metres")
+    return bool(words & {"utc", "gmt"})
+
+
+def _entry(entry: str, number: int) -> tuple[float, float, bool]:
+    """Return time (Unix seconds), level (metres) and whether the time states its zone. Raises TideTableError."""
     match = _LINE.match(entry)
-    if match is None:
-        raise TideTableError(f"line {number}: {entry[:60]!r} is not of the form '2021/01/31 05:20:00.000 1.1'")
-    year, month, day, hour, minute, second, fraction, level = match.groups()
+    if match is None or ("," in match["level"] and ";" not in match["separator"]):
+        why = f"line {number}: {entry[:60]!r} is not of the form {_FORMS}"
+        if _DAY_OR_MONTH.match(entry):
+            why += "; which number is the day and which the month is open, write the year first"
+        raise TideTableError(why)
+    zone = (match["zone"] or "").strip()
     try:
-        time = datetime(int(year), int(month), int(day), int(hour), int(minute), int(second or 0), tzinfo=UTC)
+        year, month, day = (int(match[part]) for part in ("year", "month", "day"))
+        hour, minute, second = (int(match[part] or 0) for part in ("hour", "minute", "second"))
+        time = datetime(year, month, day, hour, minute, second, tzinfo=_zone(zone))
     except ValueError as error:
         raise TideTableError(f"line {number}: {entry[:60]!r} is no date and time ({error})") from None
-    time += timedelta(microseconds=int((fraction or "0").ljust(6, "0")))
-    if abs(float(level)) > MAX_LEVEL_M:
-        raise TideTableError(f"line {number}: the level {level} is not between -{MAX_LEVEL_M:g} and {MAX_LEVEL_M:g} m")
-    return time.timestamp(), float(level)
+    time_s = time.timestamp() + 1e-6 * int((match["fraction"] or "0").ljust(6, "0"))
+    level = float(match["level"].replace(",", "."))
+    if abs(level) > MAX_LEVEL_M:
+        raise TideTableError(
+            f"line {number}: the level {match['level']} is not between -{MAX_LEVEL_M:g} and {MAX_LEVEL_M:g} m"
+        )
+    return time_s, level, bool(zone)
+
+
+def _zone(zone: str) -> timezone:
+    """Return the zone of ``+hh``, ``+hhmm`` or ``+hh:mm``, UTC for others. Raises ValueError for a day or more."""
+    if zone[:1] not in ("+", "-"):
+        return UTC
+    digits = zone[1:].replace(":", "").ljust(4, "0")
+    size = timedelta(hours=int(digits[:2]), minutes=int(digits[2:]))
+    return timezone(-size if zone[0] == "-" else size)
 
 
 def _minute(time_s: float) -> str:

@@ -1,6 +1,7 @@
 """What depths are counted from, as a coordinate reference system and in words."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import pyproj
 from pyproj.crs import CompoundCRS
@@ -15,6 +16,13 @@ S100_DATUMS = (
     | dict.fromkeys((LOWEST_ASTRONOMICAL_TIDE, 9287, 10548, 10550, 10552, 10650), 23)
 )
 """Numbers of vertical datums in the IHO's register for S-100, by the EPSG code of depths below them."""
+
+
+EPSG_OF_S100 = {number: epsg for epsg, number in S100_DATUMS.items() if number not in (3, 23)} | {
+    3: 5715,
+    23: LOWEST_ASTRONOMICAL_TIDE,
+}
+"""The other way round; where several realizations have one number, the code of what they all realize."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,59 @@ class VerticalDatum:
     def compound_with(self, horizontal: pyproj.CRS) -> pyproj.CRS:
         """Return the horizontal system with this datum as its third axis."""
         return CompoundCRS(f"{horizontal.name} + {self.crs.name}", [horizontal, self.crs])
+
+
+def vertical_part(crs: pyproj.CRS | None) -> pyproj.CRS | None:
+    """Return the vertical system in a coordinate reference system, of one in space that one itself.
+
+    None where it states none, an unknown one, or the water level of the moment, which is no datum.
+    """
+    if crs is None:
+        return None
+    found = next((part for part in (crs, *crs.sub_crs_list) if part.is_vertical and not part.sub_crs_list), None)
+    if found is None:
+        return crs if len(crs.axis_info) == 3 and not crs.is_compound else None
+    name = _datum_name(found)
+    return None if name.startswith(_NO_DATUM) or name == _datum_name(_INSTANTANEOUS) else found
+
+
+def same_datum(one: pyproj.CRS, other: pyproj.CRS) -> bool:
+    """Return whether two vertical systems count from the same, be it upwards or downwards.
+
+    Realizations of what S-100 has one number for, as mean sea level, are the same.
+    """
+    one_name, other_name = _datum_name(one), _datum_name(other)
+    number = _s100_by_name().get(one_name)
+    return one_name == other_name or (number is not None and number == _s100_by_name().get(other_name))
+
+
+def datum_words(crs: pyproj.CRS) -> str:
+    """Return what a vertical system is called in EPSG's register, for an operator; nothing of a file is quoted."""
+    epsg = crs.to_epsg()
+    if epsg is not None:
+        name = str(pyproj.CRS.from_epsg(epsg).name)
+        return f"EPSG:{epsg} {name}" + (", above the ellipsoid" if len(crs.axis_info) == 3 else "")
+    for known in S100_DATUMS:
+        depths = pyproj.CRS.from_epsg(known)
+        if _datum_name(depths) == _datum_name(crs):
+            return str(VerticalDatum(known, "").heights.name)
+    return "the ellipsoid" if len(crs.axis_info) == 3 else "a vertical datum that EPSG does not list"
+
+
+@cache
+def _s100_by_name() -> dict[str, int]:
+    """Return S-100's numbers by the names of datums."""
+    return {_datum_name(pyproj.CRS.from_epsg(epsg)): number for epsg, number in S100_DATUMS.items()}
+
+
+def _datum_name(crs: pyproj.CRS) -> str:
+    described = crs.to_json_dict()
+    name = (described.get("datum") or described.get("datum_ensemble") or {}).get("name", "unknown")
+    return "".join(c for c in name.lower() if c.isalnum())
+
+
+_INSTANTANEOUS = pyproj.CRS.from_epsg(INSTANTANEOUS_WATER_LEVEL)
+_NO_DATUM = ("unknown", "unnamed", "undefined", "notspecified")
 
 
 def check_depth_datum(epsg: int) -> str:

@@ -29,7 +29,7 @@ from app.missions.flight.legs.exchange import LegExchange
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
-from app.missions.live.remaining import remaining
+from app.missions.live.remaining import left_words
 from app.missions.safety import free_space
 from app.missions.spec.failsafes import Response
 from app.missions.task.constraints import INSET_M
@@ -135,7 +135,7 @@ class OwnLegs:
                 if await self._take_lines_back():
                     continue  # meanwhile somebody may have flown its way
                 if self._awaits_batteries:
-                    await self._waiting.for_batteries(self._left_words())
+                    await self._waiting.for_batteries(left_words(self._spec, self._live.team))
                     continue
                 if patient_s is not None or self._nobody_to_lead:
                     await self._waiting.for_team(patient_s=patient_s)
@@ -158,19 +158,10 @@ class OwnLegs:
         team = self._live.team
         gave_up = (m for m in team if m.withdrawal is not None and not m.withdrawal.done)
         if any(m.name not in self._sent_home and self._has_way(m) for m in gave_up):
-            return f"nobody surveys any more{self._left_words()}"
+            return f"nobody surveys any more{left_words(self._spec, self._live.team)}"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
         words += f" but {', '.join(m.name for m in left)}" if left else ""
         return words + team.missed_words({m.name for m in left})
-
-    def _left_words(self) -> str:
-        """Return how much of the mission's length is left, as words after a reason; '' where it is counted in steps."""
-        left, budget = remaining(self._spec, self._live.team), self._spec.budget
-        if budget.minutes is not None and left.minutes:
-            return f", {left.minutes:.0f} min before the mission's time is up"
-        if budget.km_per_vehicle is not None and left.km_per_vehicle:
-            return f", {left.km_per_vehicle:.1f} km before a vehicle has flown its way"
-        return ""
 
     async def _take_lines_back(self) -> bool:
         """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet.

@@ -8,7 +8,7 @@ from app.mapping.water.tides import parse_tid
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport
-from app.missions.flown import Flown
+from app.missions.flown import Flown, Phase
 from app.missions.live.header import StoredMission
 from app.missions.live.journals.journal import RISES, Counts
 from app.missions.live.mission import LiveMission, builder_of
@@ -54,7 +54,7 @@ async def take_up(
         tide = await session.get(TideTableRow, row.id)
         drift = await session.get(AdjustmentRow, row.id)
         heard = await telemetry_queries.last_heard(session, row.id)
-        batteries = await telemetry_queries.last_batteries(session, row.id) if row.state in AT_SEA else {}
+        batteries = await telemetry_queries.last_batteries(session, row.id)
         standing = await alarm_queries.standing(session, row.id) if row.state in AT_SEA else []
         risings = await event_queries.count_by_vehicle(session, row.id, "surface", RISES)
     # Building the spec checks geometry, which takes milliseconds: not on the event loop.
@@ -93,13 +93,18 @@ async def take_up(
         live.set_step(step.number, step.objective, step.terms)
     for vehicle in vehicles:
         member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
-        member.report = _last_report(positions.get(member.name))
+        ended = live.header.state in ENDED
+        level_pct = batteries.get(member.name)
+        member.report = _last_report(positions.get(member.name), level_pct if ended else None)
         member.heard_s = heard.get(member.name)
-        member.stored_battery_pct = batteries.get(member.name)
+        member.stored_battery_pct = level_pct
         member.risings = risings.get(member.name, 0)
         member.flown = Flown.recall(vehicle.flown)
         member.energy.used_s = member.flown.used_s
         member.withdrawal = Withdrawal.recall(vehicle.withdrawal)
+        if ended:
+            member.energy.take_level(level_pct)
+            member.flown.phase = Phase.HOME if member.is_home else Phase.STOPPED
         if vehicle.left_at is not None:
             live.team.leave(member.name, vehicle.left_at)
     live.waypoints.show_rows(waypoints)
@@ -123,8 +128,12 @@ async def _take_up_search(live: LiveMission, search: Search) -> None:
     await live.in_thread(search.see, [report_of(row) for row in scans])
 
 
-def _last_report(row: PositionRow | None) -> VehicleReport | None:
-    """Return where a vehicle was last: one that holds there and only polls has nothing new to tell."""
+def _last_report(row: PositionRow | None, level_pct: float | None) -> VehicleReport | None:
+    """Return where a vehicle was last, and its battery's level where that is to be shown still.
+
+    One that holds there and only polls has nothing new to tell.
+    """
     if row is None:
         return None
-    return VehicleReport(row.vehicle, row.time_s, Position(row.lat_deg, row.lon_deg, row.depth_m))
+    position = Position(row.lat_deg, row.lon_deg, row.depth_m)
+    return VehicleReport(row.vehicle, row.time_s, position, battery_pct=level_pct)

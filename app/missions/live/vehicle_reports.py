@@ -94,15 +94,16 @@ class VehicleReports:
                 if place is None:
                     log.warning("position is not near the mission, ignored", vehicle=event.vehicle)
                     return
+                heard_before = member.clock_ahead_s is not None
                 passed_s = self._passed_s(member, event)
                 if running:
                     self._count_time(member, passed_s, spec, standing=standing)
-                    self._count_way(member, passed_s, place, spec)
+                    self._count_way(member, passed_s, place, spec, heard_before=heard_before)
                 self._count_energy(member, event, passed_s, spec.surface_policy)
                 member.report, member.heard_s = event, now().timestamp()
                 if running and member.flown.phase is Phase.SURVEY:
                     member.count_late(spec, self._frame)
-                self._journal.position(event)
+                self._journal.position(event, member.flown if running else None)
                 self._hold_against_boundaries(event, place)
                 if spec.targets:
                     self._ranges.times.heard(event.vehicle, event.time_s)
@@ -153,8 +154,13 @@ class VehicleReports:
         if member.flown.phase is Phase.SURVEY and 0.0 < passed_s <= LONGEST_SILENCE_S and not standing:
             member.flown.survey_s += passed_s
 
-    def _count_way(self, member: Member, passed_s: float, place: tuple[float, float], spec: MissionSpec) -> None:
-        """Add what a vehicle has flown since its last report, if that can have been."""
+    def _count_way(
+        self, member: Member, passed_s: float, place: tuple[float, float], spec: MissionSpec, *, heard_before: bool
+    ) -> None:
+        """Add what a vehicle has flown since its last report, if that can have been.
+
+        ``heard_before``: in this run of the service. While it was down nobody knows whether a vehicle was idle.
+        """
         flown = member.flown
         way_left_m = member.way_left_m(spec)
         flown.left_m = way_left_m + (member.way_ahead_m(self._frame) if member.flies_survey else 0.0)
@@ -167,7 +173,8 @@ class VehicleReports:
         if member.ordered and member.leg_start_m is not None and member.target_m is not None:
             leg = place_of(member.leg_start_m), place_of(member.target_m)
         flown.add_way(before, place, leg)
-        if not member.ordered and member.legs and way_left_m > 0.0 and member.withdrawal is None:
+        waits = not member.ordered and member.legs and way_left_m > 0.0 and member.withdrawal is None
+        if waits and heard_before:
             flown.idle_s += passed_s
 
     def _count_energy(

@@ -4,10 +4,14 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from shapely.geometry import Point, Polygon
+from shapely.ops import nearest_points
 
 from app.arrays import FloatArray
 from app.missions.live.mission import LiveMission
+from app.missions.live.watchers.vehicles import local_place
 from app.missions.recovery.berths import berth_spacing_m, farthest_m, home_of
+from app.missions.recovery.energy import EnergyLeft
 from app.missions.recovery.failsafes import with_reserve_s
 from app.missions.recovery.way_home import WaysHome, way_time_s
 from app.missions.search.state import Search
@@ -88,6 +92,16 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
             remedy="Give its endurance_min: without it the vehicle does not turn back in time",
         )
         return
+    short = _never_surveys(live, member, ways_home, left, speed_mps)
+    if short:
+        yield CheckView(
+            id=name,
+            title=title,
+            status=PROBLEM,
+            message=f"{words}; {short}",
+            remedy="Charge it, or launch it and have it come home nearer to the area",
+        )
+        return
     way_m = live.spec.allowance(member.spec).most_m(live.spec.limits.max_step_m)
     needs_s = way_m / speed_mps + with_reserve_s(farthest_s)
     status = OK if left.time_s >= needs_s else WARNING
@@ -99,6 +113,27 @@ def _way(live: LiveMission, member: Member) -> Iterator[CheckView]:
         status=status,
         message=f"{words}; its energy lasts {left.time_s / 60:.0f} min, and {needs_s / 60:.0f} min are asked for",
         remedy="" if status is OK else "Charge it or make the mission shorter: it turns back before its part is done",
+    )
+
+
+def _never_surveys(live: LiveMission, member: Member, ways: WaysHome, left: EnergyLeft, speed_mps: float) -> str:
+    """Return why a vehicle would turn home before its first line; '' where it would not, or its place is not known."""
+    report = member.report or live.hub.info(member.key).report
+    here = None if report is None else local_place(live.frame, report.position)
+    if here is None:
+        return ""
+    entry, _ = nearest_points(Polygon(live.area), Point(here))
+    first_m = np.array([entry.x, entry.y])
+    way_home = ways.way(first_m)
+    if way_home is None:
+        return ""
+    in_s = math.dist(here, first_m) / speed_mps
+    needs_s = in_s + with_reserve_s(way_time_s(first_m, way_home, speed_mps, STILL))
+    if left.safe_s > needs_s:
+        return ""
+    return (
+        f"it turns home before its first line: its energy lasts {left.safe_s / 60:.1f} min for sure, and the way to "
+        f"the area ({in_s / 60:.1f} min) and home from there, with the reserve, takes {needs_s / 60:.1f} min"
     )
 
 

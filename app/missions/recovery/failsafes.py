@@ -83,7 +83,7 @@ TABLE: Mapping[Failsafe, Rule] = {
         f"what it has left for sure is less than {LOW_RATIO:g} of its way home, {LOW_RESERVE_S:g} s, and what makes up "
         f"for a drift of {UNHEARD_S:g} s; without a recovery point a battery below {LOW_PCT:g} %",
         Response.RETURN,
-        "alarm: it turns back",
+        "alarm: it turns back; over when it was charged",
         after_s=2.0,
         over_s=60.0,
     ),

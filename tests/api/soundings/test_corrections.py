@@ -63,6 +63,20 @@ async def test_a_tide_set_afterwards_corrects_what_was_measured_before(client: h
     assert "none applied</" not in report.partition("Sound speed")[0]
 
 
+async def test_that_a_gauges_times_are_taken_for_utc_is_answered_and_logged(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    begin = datetime.fromtimestamp(START_S, UTC)
+    lines = [f"{begin + timedelta(minutes=6 * k):%Y-%m-%d %H:%M};1.{k}" for k in range(3)]
+    answer = await client.put(f"{path}/tide", json={"table": "\n".join(lines), "source": "gauge"})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["tide_table"]["utc_assumed"]
+    logged = [event["message"] for event in (await client.get(f"{path}/events")).json()["items"]]
+    assert any("whose times state no zone and are taken for UTC" in text for text in logged), logged
+    stated = "\n".join(line.replace(";", "Z;") for line in lines)
+    assert not (await client.put(f"{path}/tide", json={"table": stated})).json()["tide_table"]["utc_assumed"]
+
+
 async def test_soundings_are_corrected_and_written_piece_by_piece(
     client: httpx.AsyncClient, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

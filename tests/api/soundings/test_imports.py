@@ -60,6 +60,77 @@ async def test_of_another_datum_that_imported_depths_do_not_follow_the_log_warns
     assert (await client.get(f"{path}/map")).json()["min_depth_m"] == pytest.approx(before)
 
 
+async def mission_below(client: httpx.AsyncClient, datum_epsg: int | None) -> str:
+    path = f"/missions/{(await client.post('/missions', json=mission_spec())).json()['id']}"
+    if datum_epsg is not None:
+        answer = await client.put(f"{path}/tide", json={"level_m": 0.5, "datum_epsg": datum_epsg, "source": "gauge"})
+        assert answer.status_code == 200, answer.text
+    return path
+
+
+@pytest.mark.parametrize(
+    ("product", "filename"), [("map.tif", "t.tif"), ("map.nc", "t.nc"), ("map.bag", "t.bag"), ("map.s102", "t.h5")]
+)
+async def test_a_file_below_another_datum_is_taken_only_with_the_offset(
+    client: httpx.AsyncClient, product: str, filename: str
+) -> None:
+    source = await mission_below(client, 5861)
+    await client.post(f"{source}/measurements", json={"items": soundings(40)})
+    exported = await client.get(f"{source}/{product}")
+    assert exported.status_code == 200, exported.text
+    path = await mission_below(client, 5715)
+    query: dict[str, str | float] = {"filename": filename, "sd_m": 0.3}
+    for method, kind in (("POST", "imports"), ("PUT", "reference")):
+        refused = await client.request(method, f"{path}/{kind}", content=exported.content, params=query)
+        assert refused.status_code == 422, refused.text
+        (error,) = refused.json()["errors"]
+        assert "datum_offset_m" in error["field"]
+        assert "its values count from " in error["message"]
+        assert "LAT" in error["message"]
+        assert "the mission's depths from EPSG:5715 MSL depth" in error["message"]
+    assert (await client.get(f"{path}/imports")).json() == []
+    given = await client.post(f"{path}/imports", content=exported.content, params=query | {"datum_offset_m": 0.0})
+    assert given.status_code == 201, given.text
+    assert not any(note.startswith("vertical datum") for note in given.json()["notes"])
+
+    same = await client.post(f"{source}/imports", content=exported.content, params=query)
+    assert same.status_code == 201, same.text
+    assert not any(note.startswith("vertical datum") for note in same.json()["notes"])
+
+
+async def test_where_only_one_of_file_and_mission_states_a_datum_answer_and_log_say_so(
+    client: httpx.AsyncClient,
+) -> None:
+    tidal, plain = await mission_below(client, 5861), await mission_below(client, None)
+    await client.post(f"{tidal}/measurements", json={"items": soundings(40)})
+    exported = (await client.get(f"{tidal}/map.tif")).content
+    stated = await send(client, plain, exported, filename="t.tif", sd_m=0.3)
+    unstated = await send(client, tidal, prior_text())
+    for answer, words in (
+        (stated, "vertical datum: the file states EPSG:5861 LAT depth, the mission none"),
+        (unstated, "vertical datum: the mission states EPSG:5861 LAT depth, the file none"),
+    ):
+        assert answer.status_code == 201, answer.text
+        assert [note for note in answer.json()["notes"] if note.startswith(words)], answer.json()["notes"]
+    for path in (tidal, plain):
+        events = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+        assert [one for one in events if one["level"] == "warning" and "vertical datum: " in one["message"]]
+
+
+async def test_an_import_that_is_off_from_what_was_sounded_says_by_how_much(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    await client.post(f"{path}/measurements", json={"items": soundings(40)})
+    exported = (await client.get(f"{path}/map.tif")).content
+    fits = await send(client, path, exported, filename="t.tif", datum_offset_m=0.0, sd_m=0.3)
+    assert fits.status_code == 201, fits.text
+    assert not [note for note in fits.json()["notes"] if "median" in note]
+    await client.delete(f"{path}/imports/{fits.json()['id']}")
+    off = await send(client, path, exported, filename="t.tif", datum_offset_m=5.0, sd_m=0.3)
+    (note,) = [note for note in off.json()["notes"] if "median" in note]
+    assert "its depths are +5.0" in note
+
+
 async def test_a_map_begins_with_what_was_imported_and_tells_it_apart(client: httpx.AsyncClient, path: str) -> None:
     answer = await send(client, path, prior_text(), source="survey of 2019")
     assert answer.status_code == 201, answer.text

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from app.mapping.quality.crossovers import crossings
+from app.mapping.quality.sessions import set_back_s
 from app.mapping.quality.tracks import Lines, Tracks, crosslines, cut, dominant_rad
 from tests.support.mapping.tracks import flown, lawnmower
 
@@ -88,3 +89,53 @@ def test_a_survey_without_crosslines_has_none() -> None:
     tracks = Tracks.of({"a": flown(lawnmower(100, 200, 10)), "b": flown([(5, 0), (5, 200)])})
     lines = cut(tracks)
     assert not crosslines(lines, crossings(tracks, lines).line).any()
+
+
+CORNERS = lawnmower(100, 200, 10)
+
+
+@given(
+    st.floats(30.0, 1500.0),
+    st.lists(st.integers(50, 2000), min_size=1, max_size=3, unique=True),
+    st.floats(0.3, 2.0),
+)
+@example(679.0, [1153], 1.0)
+@example(700.0, [691, 728, 1394], 1.0)
+def test_a_clock_that_is_set_back_changes_no_line(back_s: float, at: list[int], spacing_m: float) -> None:
+    table = flown(CORNERS, spacing_m=spacing_m)
+    cuts = sorted(k for k in at if k < len(table) - 50)
+    clean = np.split(table, cuts)
+    ends = cut(Tracks.of({str(k): part for k, part in enumerate(clean)}))
+    for k, row in enumerate(cuts):
+        table[row:, 0] -= back_s + 0.25 * k
+    lines = cut(Tracks.of({"a": table}))
+    assert lines.length_m == pytest.approx(ends.length_m)
+
+
+@given(st.integers(0, 10**6), st.integers(2, 400))
+def test_soundings_that_arrive_late_are_put_where_they_belong(seed: int, batch: int) -> None:
+    table = flown(CORNERS)
+    random = np.random.default_rng(seed)
+    late = random.random(len(table) // batch + 1)[np.arange(len(table)) // batch] < 0.3
+    shuffled = np.concatenate([table[~late], table[late]])
+    on_time, mixed = cut(Tracks.of({"a": table})), cut(Tracks.of({"a": shuffled}))
+    assert mixed.length_m == pytest.approx(on_time.length_m)
+    assert mixed.start_s.tolist() == on_time.start_s.tolist()
+
+
+def test_nothing_is_joined_that_a_vehicle_could_not_have_flown() -> None:
+    table = flown([(0, 0), (3000, 0)], spacing_m=30.0)
+    table[50:, 2] += 90.0
+    table[:, 0] *= 0.2
+    lines = cut(Tracks.of({"a": table}))
+    assert lines.length_m == pytest.approx([49 * 30.0, 50 * 30.0])
+    far = cut(Tracks.of({"a": flown([(0, 0), (3000, 0)], spacing_m=150.0)}))
+    assert len(far) == 0
+
+
+def test_by_how_much_a_clock_was_set_back_is_told() -> None:
+    table = flown(CORNERS)
+    assert set_back_s(*table[:, :3].T) == 0.0
+    table[1153:, 0] -= 679.0
+    assert set_back_s(*table[:, :3].T) == 678.0
+    assert set_back_s(*np.concatenate([table[100:300], table[:100], table[300:500]])[:, :3].T) == 0.0

@@ -3,6 +3,7 @@
 import gzip
 import io
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import netCDF4
@@ -13,6 +14,7 @@ import rasterio
 from affine import Affine
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pyproj.crs import CompoundCRS
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
@@ -81,7 +83,17 @@ def test_our_own_maps_come_back_in_their_place(kind: str, tmp_path: Path) -> Non
     assert len(s) == found.found == np.isfinite(make_map().depth_m).sum()
     np.testing.assert_allclose(s.depth_m, depth_at(s.east_m, s.north_m), atol=2e-3)
     np.testing.assert_allclose(s.sd_m, 0.2, atol=1e-6)
-    assert found.notes == []
+    stated = {"tif": "EPSG:5861 LAT depth", "nc": "EPSG:5861 LAT depth", "bag": "LAT height"}.get(kind)
+    expected = [] if stated is None else [f"vertical datum: the file states {stated}, the mission none; "]
+    assert [note.partition("they are")[0] for note in found.notes] == expected
+    for datum_epsg in (5861, 9287):
+        below = replace(PLACE, datum_epsg=datum_epsg)
+        assert not place_soundings(content, ReadOptions(), below).notes or stated is None
+    if stated is not None:
+        for place in (place_soundings, place_reference):
+            with pytest.raises(ReadError, match=r"its values count from .*LAT.* from EPSG:5715 MSL depth") as refused:
+                place(content, ReadOptions(), replace(PLACE, datum_epsg=5715))
+            assert refused.value.field == "datum_offset_m"
     sampled, _ = place_reference(content, ReadOptions(), PLACE)
     np.testing.assert_allclose(sampled, make_map().depth_m, atol=2e-3)
 
@@ -510,3 +522,32 @@ def test_real_soundings_of_a_harbour_are_read(terrains: Path) -> None:
     found = place_soundings(content, SD, wide)
     assert found.found == 6354
     assert len(found.soundings) > 1000
+
+
+@pytest.mark.parametrize(
+    ("vertical", "words"),
+    [
+        ("EPSG:5714", "EPSG:5714 MSL height"),
+        ("EPSG:5703", "EPSG:5703 NAVD88 height"),
+        ('VERT_CS["a",VERT_DATUM["of some harbour",2005],UNIT["metre",1],AXIS["Up",UP]]', "EPSG does not list"),
+    ],
+)
+def test_a_vertical_system_of_heights_is_held_against_the_missions_depths(vertical: str, words: str) -> None:
+    crs = CompoundCRS("both", [FRAME.crs, pyproj.CRS.from_user_input(vertical)])
+    local = Raster(np.full((40, 40), -5.0), np.full((40, 40), 0.1), Affine(2, 0, -10, 0, -2, 70), crs, "up")
+    with pytest.raises(ReadError, match=words):
+        place_soundings(local, ReadOptions(), replace(PLACE, datum_epsg=5861))
+    for offset_m in (0.0, 1.5):
+        found = place_soundings(local, ReadOptions(datum_offset_m=offset_m), replace(PLACE, datum_epsg=5861))
+        assert found.soundings.depth_m == pytest.approx(5.0 + offset_m)
+    if "MSL" in words:
+        assert place_soundings(local, ReadOptions(), replace(PLACE, datum_epsg=5715)).notes == []
+
+
+def test_heights_above_the_ellipsoid_are_no_depths_below_a_datum() -> None:
+    values = np.full((40, 40), -5.0)
+    crs = pyproj.CRS.from_epsg(4979)
+    at = Affine(1e-5, 0, FRAME.origin_lon_deg - 1e-4, 0, -1e-5, FRAME.origin_lat_deg + 3e-4)
+    grid = Raster(values, np.full((40, 40), 0.1), at, crs, "up")
+    with pytest.raises(ReadError, match="count from EPSG:4979 WGS 84, above the ellipsoid, the mission"):
+        place_soundings(grid, ReadOptions(), replace(PLACE, datum_epsg=5861))

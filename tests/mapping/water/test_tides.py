@@ -140,12 +140,50 @@ def test_levels_too_far_apart_to_tell_the_tide_are_not_taken_for_extremes(every_
         (TABLE + "2019/01/02 00:08 1.0", "line 9: .* is not later"),
         (TABLE + "2019/01/02 06:08 110", "line 9: the level 110 is not between"),
         (TABLE.replace("UTC", "local"), "line 2: the time zone is 'local'"),
+        (TABLE + "2019-01/02 06:08 1.0", "line 9: .* is not of the form"),
+        ("30/11/2026 11:00 1.0\n30/11/2026 11:06 1.1", "line 1: '30/11/2026 11:00 1.0' .* write the year first"),
+        ("2026-11-30T11:00:00+25:00 1.0", "line 1: .* is no date and time"),
+        ("2026-11-30 11:00,1,0\n", "line 1: '2026-11-30 11:00,1,0' is not of the form"),
+        ("time (UTC+1);level\n", "line 1: the header states the time zone 'UTC\\+1'; times must be UTC"),
+        ("# of a gauge\nlocal time;level\n", "line 2: the header states the time zone 'local'"),
+        ("time,level (cm)\n", "line 1: the header states levels in 'cm'; they must be in metres"),
+        ("time,level\ntime,level\n", "line 2: 'time,level' is not of the form"),
         ("\x00\x01", "line 1"),
     ],
 )
 def test_a_bad_table_is_refused_with_its_line(text: str, message: str) -> None:
     with pytest.raises(TideTableError, match=message):
         parse_tid(text)
+
+
+ELEVEN_S, NOON_S = 1_796_036_400.0, 1_796_040_000.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "2026-11-30T11:00:00Z 1.0\n2026-11-30T12:00:00Z 1.25\n",
+        "2026-11-30T12:00+01:00 1.0\n2026-11-30T13:00+01:00 1.25\n",
+        "2026-11-30T06:30:00.000-0430\t1.0\n2026-11-30T07:30:00.000-0430\t1.25\n",
+        "2026-11-30 11:00Z,1.0\n2026-11-30 12:00Z, 1.25\n",
+        "# of a gauge\ntime (UTC);level (m)\n2026-11-30 11:00;1,0\n2026-11-30 12:00;1,25\n",
+        "\ufeffdate;time;level\r\n2026-11-30;11:00 UTC;1.0\r\n2026-11-30;12:00 UTC;1.25\r\n",
+    ],
+)
+def test_what_gauges_export_is_read_with_its_zone(text: str) -> None:
+    table = parse_tid(text)
+    assert (table.times_s.tolist(), table.levels_m.tolist()) == ([ELEVEN_S, NOON_S], [1.0, 1.25])
+    assert not table.utc_assumed
+
+
+@pytest.mark.parametrize("separator", [" ", "\t", ",", ";", " ; "])
+@pytest.mark.parametrize("seconds", ["", ":00"])
+def test_times_without_a_zone_are_utc_and_the_table_says_so(separator: str, seconds: str) -> None:
+    lines = [f"2026-11-30 {hour}:00{seconds}{separator}{level}" for hour, level in ((11, 1.0), (12, 1.25))]
+    table = parse_tid("\n".join(lines))
+    assert (table.times_s.tolist(), table.levels_m.tolist()) == ([ELEVEN_S, NOON_S], [1.0, 1.25])
+    assert table.utc_assumed
+    assert not parse_tid("\n".join(["# Time zone: UTC", *lines])).utc_assumed
 
 
 @given(st.text())

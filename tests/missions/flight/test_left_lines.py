@@ -73,4 +73,4 @@ async def test_a_mission_whose_vehicles_all_came_home_early_says_how_much_of_it_
     await until(lambda: live.team.named("a").legs, "it surveys")
     await homecoming.call_home(live, "a", "Ana")
     ended = await until_state(service, mission, MissionState.FINISHED)
-    assert ended.reason.startswith(f"nobody surveys any more, {left} before ")
+    assert ended.reason.startswith(f"nobody surveys any more, {left} before it")

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.missions.live.remaining import Remaining, remaining
+from app.missions.live.remaining import Remaining, left_words, remaining
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.team import Team, Withdrawal
@@ -48,3 +48,26 @@ def test_what_a_vehicle_leaves_that_goes_home_does_not_count(response: Response,
 def test_without_vehicles_nothing_is_known() -> None:
     spec, _ = described(budget={"minutes": 30})
     assert remaining(spec, Team()) == Remaining(None, None)
+
+
+@pytest.mark.parametrize(
+    ("length", "words", "left"),
+    [
+        ({"budget": {"minutes": 12}}, ": fast 7 min before its time was up; slow never surveyed", 7.0),
+        ({"budget": {"km_per_vehicle": 1.2}}, ": fast 0.8 km before it had flown its way; slow never surveyed", 7.0),
+    ],
+)
+def test_when_nobody_goes_on_each_vehicle_is_told_of(length: dict[str, Any], words: str, left: float) -> None:
+    spec, team = described(**length)
+    fast, slow = team
+    for member in team:
+        member.withdrawal = Withdrawal(Response.RETURN, "its energy lasts 160 s for sure")
+    fast.flown.survey_s, fast.flown.left_m, slow.flown.left_m = 300.0, 840.0, None
+    assert left_words(spec, team) == words
+    assert remaining(spec, team).minutes == left
+    fast.flown.left_m = 0.0
+    assert left_words(spec, team) == ": slow never surveyed"
+
+
+def test_of_a_mission_in_steps_no_length_is_told() -> None:
+    assert left_words(*described(steps=40)) == ""

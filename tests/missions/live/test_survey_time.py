@@ -9,13 +9,17 @@ import pytest
 from app.missions.clock import told_by
 from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, VehicleReport, WaypointOrder
 from app.missions.fleet.interface import WaypointStatus as Status
-from app.missions.flown import Phase
+from app.missions.flown import Flown, Phase
 from app.missions.live.mission import LiveMission
+from app.missions.running import homecoming
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
 from app.missions.states import MissionState
 from app.missions.team import Member, Withdrawal, WithdrawalCause
-from tests.support.missions.harbour import act, sim_spec, until_state
+from app.storage.queries import missions as mission_queries
+from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, view_of
+from tests.support.missions.specs import lon_lat
+from tests.support.waiting import until
 
 SPEED_MPS, MINUTES = 2.0, 30.0
 TIME_SCALE = 50.0
@@ -230,3 +234,51 @@ async def test_who_is_held_or_home_waits_for_no_decision(under_way: Callable[...
         member.withdrawal = Withdrawal(response, "asked by Ana", over=response is Response.RETURN)
         vehicle.reports(member.report.time_s + 10.0 if member.report else 0.0, 20.0)
     assert member.flown.idle_s == 10.0
+
+
+async def test_what_was_flown_is_stored_with_the_track(under_way: Made, service: MissionService) -> None:
+    """A process that is killed leaves both as of the same moment."""
+    vehicle = await under_way()
+    live = vehicle.live
+    for time_s in (5.0, 10.0, 15.0):
+        vehicle.reports(time_s, 10.0 + SPEED_MPS * time_s)
+        await live.journal.flush()
+    async with live.database.reading() as session:
+        (row,) = await mission_queries.vehicles_of(session, live.id)
+        positions = await mission_queries.last_positions(session, live.id)
+    stored = Flown.recall(row.flown)
+    assert positions["a"].time_s == 15.0
+    assert stored.flown_m == pytest.approx(30.0, abs=0.1)
+    assert stored.remember() == vehicle.member.flown.remember()
+
+
+async def test_while_the_service_was_down_nobody_was_idle(under_way: Made) -> None:
+    vehicle = await under_way()
+    vehicle.member.set_order(None)
+    vehicle.reports(5.0, 10.0)
+    assert vehicle.member.flown.idle_s == 5.0
+    # As it is known after a restart: where it was last, and nothing of its clock.
+    vehicle.member.clock_ahead_s = None
+    vehicle.reports(12.0, 10.0)
+    assert vehicle.member.flown.idle_s == 5.0
+    vehicle.reports(14.0, 10.0)
+    assert vehicle.member.flown.idle_s == 7.0
+
+
+async def test_of_a_mission_that_ended_phase_and_battery_are_told_after_a_restart(harbour_closed: Harbour) -> None:
+    service = await harbour_closed.open(time_scale=20.0)
+    spec = sim_spec("a", side_m=40.0, budget={"minutes": 5}, recovery={"point": lon_lat(5.0, 5.0)})
+    mission = (await service.create(spec)).id
+    live = await service.get(mission)
+    await act(service, mission, "start")
+    await until(lambda: live.team.named("a").flown.on_plan_m > 5.0, "it surveys")
+    await homecoming.call_home(live, "a", "Ana")
+    before = (await until_state(service, mission, MissionState.FINISHED)).vehicles[0]
+    service = await harbour_closed.reopen()
+    after = (await view_of(service, mission)).vehicles[0]
+    assert (before.phase, after.phase) == (Phase.HOME, Phase.HOME)
+    assert before.battery_pct is not None
+    assert after.battery_pct == pytest.approx(before.battery_pct, abs=1.0)
+    assert after.energy_left_pct == pytest.approx(before.energy_left_pct, abs=2.0)
+    figures = ("flown_m", "on_plan_m", "idle_s")
+    assert [getattr(after, name) for name in figures] == [getattr(before, name) for name in figures]

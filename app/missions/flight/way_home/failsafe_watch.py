@@ -14,6 +14,7 @@ from app.missions.fleet.interface import FaultKind, LinkState
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
+from app.missions.recovery.energy import CHARGED_PCT
 from app.missions.recovery.failsafes import (
     ALTITUDE_SHARE,
     CRITICAL_PCT,
@@ -38,6 +39,8 @@ HEARD_S = 3.0
 FRESH_S = 5.0
 """Places of two vehicles are compared where one came so soon after the other, seconds of the vehicles' time."""
 
+ENERGY = frozenset({Failsafe.LOW_ENERGY, Failsafe.CRITICAL_ENERGY})
+
 FAULTS = {FaultKind.LEAK: Failsafe.LEAK, FaultKind.ERROR: Failsafe.VEHICLE_ERROR}
 
 TEAM = ""
@@ -59,6 +62,8 @@ class FailsafeWatch:
         self._told = told_before(live)
         self._carried = self._told_at(asyncio.get_running_loop().time() * time_scale)
         """By vehicle: alarms that an earlier flight raised, and when each was so or not known at the latest."""
+        self._lowest: dict[str, tuple[float, float]] = {}
+        """By vehicle whose energy was told to be low: the lowest level since, percent, and the most used, seconds."""
         self._ships: dict[str, set[int]] = {}
         """By vehicle: the ships (MMSI) that came too close a moment ago."""
         self._words_of_ships: list[tuple[str, str]] = []
@@ -266,7 +271,8 @@ class FailsafeWatch:
         """Write down what begins and what is over."""
         before = self._told.get(name, frozenset())
         now = {one.failsafe: one for one in found}
-        self._told[name] = stay = self._undecided(name, before, frozenset(now), now_s) | now.keys()
+        undecided = self._undecided(name, before, frozenset(now), now_s)
+        self._told[name] = stay = undecided | self._still_low(name, before | now.keys()) | now.keys()
         who = f"{name}: " if name else ""
         for failsafe, one in now.items():
             if failsafe not in before:
@@ -285,6 +291,25 @@ class FailsafeWatch:
                 await self._live.journal.end([AlarmKind(failsafe.value)], words, **facts)
         if before != stay:
             self._live.publish_summary()
+
+    def _still_low(self, name: str, told: frozenset[Failsafe]) -> frozenset[Failsafe]:
+        """Return which alarms of a vehicle's energy are so as long as it was not charged.
+
+        Nearer to home, or at home, less is needed, and no battery has more in it.
+        """
+        member, low = self._live.team.get(name), told & ENERGY
+        if member is None or not low:
+            self._lowest.pop(name, None)
+            return frozenset()
+        level, used_s = member.energy.level_pct, member.energy.used_s
+        lowest, most_s = self._lowest.get(name, (math.inf, 0.0))
+        if level is None:
+            charged = used_s < most_s
+        else:
+            charged = level > lowest + CHARGED_PCT
+            lowest = min(lowest, level)
+        self._lowest[name] = lowest, max(most_s, used_s)
+        return frozenset() if charged else low
 
     def _told_at(self, now_s: float) -> dict[str, dict[Failsafe, float]]:
         return {name: dict.fromkeys(told, now_s) for name, told in self._told.items()}

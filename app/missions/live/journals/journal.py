@@ -20,7 +20,7 @@ from app.missions.alarm_kinds import ALARMS, AlarmKind
 from app.missions.alarms.raised import copy_of, make_alarm
 from app.missions.clock import now
 from app.missions.fleet.interface import PingReport, ScanReport, SoundingReport, VehicleReport, WaypointReport
-from app.missions.flown import is_flown
+from app.missions.flown import Flown, is_flown
 from app.missions.large_batches import made_of
 from app.missions.live.journals.db_retry import DatabaseRetry
 from app.missions.live.journals.write_behind import Committed, WriteBehind
@@ -132,6 +132,8 @@ class Journal(WriteBehind[Noted]):
         self._track_ends: dict[str, tuple[float, float]] = {}
         self._heard_s: dict[str, float] = {}
         """By vehicle the time of its last position, noted or not."""
+        self._flown: dict[str, Flown] = {}
+        """By vehicle what it has flown, to be written with its positions."""
 
     def sounding(self, report: SoundingReport) -> None:
         """Note a sounding; it is written within a moment."""
@@ -146,8 +148,11 @@ class Journal(WriteBehind[Noted]):
         if self._take_scans is not None:
             self._note(report)
 
-    def position(self, report: VehicleReport) -> None:
-        """Note a point of a track, unless it is close to the last one."""
+    def position(self, report: VehicleReport, flown: Flown | None = None) -> None:
+        """Note a point of a track, unless it is close to the last one.
+
+        ``flown``: what its vehicle has flown so far, which is written with the track; None where that stays as it is.
+        """
         end = report.position.lat_lon
         last = self._track_ends.get(report.vehicle)
         passed_s = report.time_s - self._heard_s.get(report.vehicle, report.time_s)
@@ -158,6 +163,8 @@ class Journal(WriteBehind[Noted]):
                 return
             self.travelled_m += leg_m if is_flown(leg_m, passed_s) else 0.0
         self._track_ends[report.vehicle] = end
+        if flown is not None:
+            self._flown[report.vehicle] = flown
         self._note(report)
 
     def waypoint(self, report: WaypointReport) -> None:
@@ -194,6 +201,10 @@ class Journal(WriteBehind[Noted]):
         _, seen = await self.take_scans(_of(ScanReport, noted), session)
         positions = [position_row(self._mission_id, report) for report in _of(VehicleReport, noted)]
         await mission_queries.add_positions(session, positions)
+        # With the track, so that a restart after a failure goes on from the same place with both.
+        moved = {row["vehicle"] for row in positions} & self._flown.keys()
+        flown = {name: self._flown[name].remember() for name in sorted(moved)}
+        await mission_queries.keep_flown(session, self._mission_id, flown)
         samples = [{"mission_id": self._mission_id} | asdict(sample) for sample in _of(VehicleSample, noted)]
         await telemetry_queries.add(session, samples)
         # Rows of a transaction that failed cannot be written again.

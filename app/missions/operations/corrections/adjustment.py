@@ -11,6 +11,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.arrays import FloatArray
 from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.quality.sessions import set_back_s
 from app.missions.clock import now
 from app.missions.errors import ConflictError
 from app.missions.live.mission import LiveMission
@@ -80,7 +81,7 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
     Raises
     ------
     ConflictError
-        When there are too few soundings.
+        When there are too few soundings, or a vehicle's clock was set back, so that two ways have the same times.
     InvalidRequestError
         When nothing is known of a vehicle at the time of a fix.
     PingsUnreadableError
@@ -92,6 +93,7 @@ async def adjust(live: LiveMission, request: AdjustmentRequest, actor: str) -> A
             raise ConflictError(
                 f"there are {len(soundings)} places with accepted soundings", f"tracks are adjusted from {FEWEST} on"
             )
+        await asyncio.to_thread(_refuse_set_back, places)
         told = await _positions(live)
         fixes = await asyncio.to_thread(_fixes, request.fixes, told, places, names, live.frame)
         model = DriftModel(walk_m=request.walk_m, rate_mph=request.rate_mph)
@@ -171,6 +173,18 @@ async def _soundings(live: LiveMission) -> tuple[list[str], TrackSoundings, Plac
     # Pieces were cut anywhere: what one vehicle sounded in one place is joined once more.
     joined = await asyncio.to_thread(lambda: thinned(TrackSoundings.joined(parts), cell_m, PERIOD_S))
     return names, joined, places
+
+
+def _refuse_set_back(places: Places) -> None:
+    """Raise ConflictError where two ways of a vehicle have the same times: what belongs to which is not known."""
+    for name, parts in places.items():
+        back_s = set_back_s(*np.concatenate(parts)[:, :3].T)
+        if back_s:
+            raise ConflictError(
+                f"the clock of {name} was set back by {back_s:.0f} s: two of its ways have the same times, and an "
+                "adjustment goes by time",
+                "leave the tracks as they are, or import one of the two ways into a mission of its own",
+            )
 
 
 def _of_pings(

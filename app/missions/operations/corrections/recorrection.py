@@ -46,7 +46,12 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
         tide=live.spec.tide,
         tide_table=table
         and TideTableView(
-            name=table.name, first=table.first, last=table.last, entries=len(table.times_s), sha256=table.digest
+            name=table.name,
+            first=table.first,
+            last=table.last,
+            entries=len(table.times_s),
+            sha256=table.digest,
+            utc_assumed=table.utc_assumed,
         ),
         sound_speed=live.spec.sound_speed,
         systematic_errors=live.spec.systematic_errors,
@@ -81,6 +86,8 @@ async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> Corre
         spec = live.spec.model_copy(update={"tide": plain})
         await recorrect(live, spec, table, live.gate.corrections.adjustment, store)
     what = f"tide table {table.name}" if table is not None else f"a constant level of {plain.level_m:+.2f} m"
+    if table is not None and table.utc_assumed:
+        what += ", whose times state no zone and are taken for UTC"
     await live.journal.log(Level.INFO, "corrections", f"tide corrected by {what}, set by {actor}", actor=actor)
     if (datum.epsg, offset_m) != (live.gate.corrections.vertical_datum.epsg, plain.datum_offset_m):
         await _warn_of_imports(live, datum)

@@ -17,9 +17,11 @@ from sqlalchemy.orm import defer
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.kriging.supersoundings import merge_soundings
+from app.mapping.offset import offset_between
 from app.mapping.readers.file_extensions import ending
-from app.mapping.readers.types import MapExtent, ReadError, ReadOptions
+from app.mapping.readers.types import DATUM_NOTE, MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid, SoundingRows, Soundings
+from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
 from app.missions.live.mission import LiveMission
@@ -37,6 +39,7 @@ from app.missions.views.measurements.imports import (
     ZoneOptions,
 )
 from app.missions.views.mission import Level
+from app.storage.bulk import read_in_pieces
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.models import ImportRow, ReferenceRow
 from app.storage.queries import soundings as sounding_queries
@@ -118,10 +121,11 @@ class Imports:
                 return known
             found = await self._reader.read(upload, kind, "soundings", _place(live), _read_options(options))
             kept, merged = await live.in_background(_kept, live, found.values)
+            off = await _off_by(live, kept)
             if not len(kept):
                 wrong = "none of its depths lies near the mission's area"
                 raise InvalidRequestError("file", wrong, "check file and crs")
-            notes = [*found.notes, *([f"{merged} soundings were merged per cell of the map"] if merged else [])]
+            notes = [*found.notes, *([f"{merged} soundings were merged per cell of the map"] if merged else []), *off]
             row = ImportRow(
                 id=str(uuid.uuid4()),
                 mission_id=live.id,
@@ -141,6 +145,7 @@ class Imports:
             view = await to_the_end(self._store(live, row, kept))
         words = f"{view.taken} prior soundings of {view.filename} imported by {actor}"
         await live.journal.log(Level.INFO, "import", words, actor=actor)
+        await _warn(live, view.filename, view.notes, actor)
         return view
 
     async def _store(self, live: LiveMission, row: ImportRow, kept: NDArray[np.float64]) -> ImportView:
@@ -286,6 +291,7 @@ class Imports:
                 session.add(row)
             live.show_reference(depths)
         await live.journal.log(Level.INFO, "import", f"reference grid {options.filename} set by {actor}", actor=actor)
+        await _warn(live, options.filename, view.notes, actor)
         return view
 
     async def delete_reference(self, live: LiveMission, actor: str) -> None:
@@ -391,11 +397,40 @@ def _refuse_ended(live: LiveMission) -> None:
 
 
 def _place(live: LiveMission) -> MapExtent:
-    return MapExtent(live.frame, live.builder.grid, live.margin_m)
+    epsg = live.facts.vertical_datum.epsg
+    datum = None if epsg == INSTANTANEOUS_WATER_LEVEL else epsg
+    return MapExtent(live.frame, live.builder.grid, live.margin_m, datum)
 
 
 def _read_options(options: ImportOptions) -> ReadOptions:
     return ReadOptions(**options.model_dump(mode="json", exclude={"filename", "source"}))
+
+
+async def _warn(live: LiveMission, filename: str, notes: Sequence[str], actor: str) -> None:
+    """Say in the mission's log what may be wrong with the depths of a file."""
+    for note in notes:
+        if note.startswith(DATUM_NOTE):
+            await live.journal.log(Level.WARNING, "import", f"{filename}: {note}", actor=actor)
+
+
+async def _off_by(live: LiveMission, kept: NDArray[np.float64]) -> list[str]:
+    """Return a note where imported depths (n, 4) are off from what the mission sounded in the same cells."""
+    await live.journal.flush()
+    own = [np.zeros((0, 4))]
+
+    def take(rows: Sequence[Any]) -> None:
+        own.append(np.array([tuple(row)[:4] for row in rows], dtype=float).reshape(-1, 4))
+
+    if live.journal.counts.accepted:
+        await read_in_pieces(live.database, sounding_queries.accepted_query(live.id), take)
+    grid = live.builder.grid
+    off = await asyncio.to_thread(lambda: offset_between(grid, *map(Soundings.of_rows, (np.concatenate(own), kept))))
+    if off is None or not off.is_significant:
+        return []
+    return [
+        f"{DATUM_NOTE}in {off.cells} cells that both know its depths are {off.median_m:+.2f} m beside those sounded "
+        f"in the mission (median), where {off.predicted_m:.2f} m is to be expected: check datum_offset_m and tide"
+    ]
 
 
 async def _imported(live: LiveMission, *, without: str = "") -> NDArray[np.float64]:
@@ -420,7 +455,7 @@ async def _same_file(live: LiveMission, digest: str, options: ImportOptions) -> 
     if row is None:
         return None
     asked = options.model_dump(mode="json", exclude={"filename", "source"})
-    if any(row.summary.get(name) != value for name, value in asked.items()):
+    if any((row.summary.get(name) or None) != (value or None) for name, value in asked.items()):
         raise ConflictError(
             f"the same file was imported before, as {row.filename}, with other options",
             f"take that import back first: DELETE /api/v1/missions/{live.id}/imports/{row.id}",

@@ -194,6 +194,7 @@ class Reader:
             "origin": (place.frame.origin_lat_deg, place.frame.origin_lon_deg),
             "grid": {name: getattr(grid, name) for name in ("west_m", "south_m", "cell_m", "rows", "cols")},
             "margin_m": place.margin_m,
+            "datum_epsg": place.datum_epsg,
             "unconfined": self._unconfined,
         }
 

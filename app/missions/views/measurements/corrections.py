@@ -15,9 +15,11 @@ class TideCorrection(Tide):
     table: str | None = Field(
         default=None,
         max_length=8_000_000,
-        description="Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water, or per "
-        "observed level. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings "
-        "beyond the table, or in a gap of it, are rejected until a table covers them. Null: level_m",
+        description="Text of a table: a line 'YYYY/MM/DD hh:mm:ss.sss level' (.tid) or '2026-11-30T11:00:00Z 1.0' per "
+        "high or low water, or per observed level. Times without a zone or an offset are UTC; blanks, a tab, a comma "
+        "or a semicolon before the level, in metres. A half cosine leads from one extreme to the next, observed levels "
+        "run smoothly; soundings beyond the table, or in a gap of it, are rejected until a table covers them. Null: "
+        "level_m",
     )
     table_name: str = Field(default="", max_length=200, description="Its name; default: the harbour that it states")
 
@@ -30,6 +32,7 @@ class TideTableView(View):
     last: datetime = Field(description="Time of the last entry")
     entries: int
     sha256: str = Field(description="Of the table as it was sent")
+    utc_assumed: bool = Field(description="Whether it states no zone for some of its times, which are taken for UTC")
 
 
 class CorrectionsView(View):

@@ -40,8 +40,12 @@ class ImportOptions(BaseModel):
     order: Order | None = Field(
         default=None, description="In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed"
     )
-    datum_offset_m: float = Field(
-        default=0.0, ge=-200, le=200, description="Added to every depth to bring it to the mission's datum"
+    datum_offset_m: float | None = Field(
+        default=None,
+        ge=-200,
+        le=200,
+        description="Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be "
+        "said where the file states another one",
     )
 
 

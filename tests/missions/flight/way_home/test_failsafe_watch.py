@@ -125,3 +125,38 @@ async def test_that_no_ship_is_heard_any_more_is_a_line_of_the_log(service: Miss
     assert "no ship is heard by AIS any more (TCP ais:10110: Connection refused)" in words
     assert (await told(0.0, ""))[1:] == [(Level.INFO, "AIS is heard again")]
     assert "nothing for 60" in (await told(601.0, ""))[2][1]
+
+
+@pytest.mark.parametrize("at_home", [False, True])
+async def test_low_energy_is_not_over_while_the_battery_empties(service: MissionService, at_home: bool) -> None:
+    spec = sim_spec("a", recovery={"point": lon_lat(2, 2)})
+    vehicles = [vehicle.model_copy(update={"endurance_min": 60.0}) for vehicle in spec.vehicles]
+    live = await service.get((await service.create(spec.model_copy(update={"vehicles": vehicles}))).id)
+    (a,) = live.team
+    watch, wait_s = watch_of(live, service), 0.0
+    loop = asyncio.get_running_loop()
+
+    async def told(east_m: float, level_pct: float) -> list[str]:
+        """Return what the log says of energy after a vehicle was here with this much for two minutes."""
+        nonlocal wait_s
+        lon, lat = lon_lat(east_m, 20)
+        a.report = VehicleReport("a", wait_s, Position(lat, lon, 2.0), battery_pct=level_pct)
+        a.energy.take_level(level_pct)
+        for _ in range(3):
+            wait_s += 61.0
+            await watch.look()
+        return [one.message for one in await events_after(live, 0, 1000) if "energy" in one.message]
+
+    began_s = loop.time()
+    watch_clock = pytest.MonkeyPatch()
+    watch_clock.setattr(loop, "time", lambda: began_s + wait_s)
+    try:
+        (low,) = await told(400.0, 12.0)
+        assert "for sure, and its way home takes" in low
+        if at_home:
+            assert a.withdrawal is not None
+            a.withdrawal.over = True
+        assert await told(5.0, 11.9) == [low]
+        assert await told(5.0, 90.0) == [low, "a: low energy is over"]
+    finally:
+        watch_clock.undo()

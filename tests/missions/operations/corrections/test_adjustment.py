@@ -1,8 +1,10 @@
 """The adjustment of a mission's tracks outlives the service."""
 
 import numpy as np
+import pytest
 
 from app.arrays import FloatArray
+from app.missions.errors import ConflictError
 from app.missions.operations.corrections.adjustment import adjust, adjustment_view, undo
 from app.missions.operations.history import events_after
 from app.missions.operations.measurements import measure
@@ -13,6 +15,15 @@ from tests.support.missions.specs import make_spec
 
 OFF_DEG = 3e-5
 """About 3 m to the north."""
+
+
+async def test_tracks_of_a_vehicle_whose_clock_was_set_back_are_not_adjusted(harbour: Harbour) -> None:
+    live = await harbour.service.get((await harbour.service.create(make_spec())).id)
+    items = measured(80, wrong=None)[:80]
+    later = [item.model_copy(update={"time_s": item.time_s - 445.0}) for item in items[40:]]
+    await measure(live, [*items[:40], *later])
+    with pytest.raises(ConflictError, match="the clock of a was set back by 435 s"):
+        await adjust(live, AdjustmentRequest(), "Ana")
 
 
 async def test_a_restart_places_soundings_as_before_it_and_an_undo_as_they_came(harbour: Harbour) -> None:

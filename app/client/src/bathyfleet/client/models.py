@@ -2217,9 +2217,10 @@ class TideCorrection(Model):
     datum_offset_m: float = 0.0
     """How far that datum lies above the zero that levels count from; added to every depth"""
     table: str | None = None
-    """Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water, or per observed
-    level. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings beyond the
-    table, or in a gap of it, are rejected until a table covers them. Null: level_m
+    """Text of a table: a line 'YYYY/MM/DD hh:mm:ss.sss level' (.tid) or '2026-11-30T11:00:00Z 1.0' per high or low
+    water, or per observed level. Times without a zone or an offset are UTC; blanks, a tab, a comma or a semicolon
+    before the level, in metres. A half cosine leads from one extreme to the next, observed levels run smoothly;
+    soundings beyond the table, or in a gap of it, are rejected until a table covers them. Null: level_m
     """
     table_name: str = ""
     """Its name; default: the harbour that it states"""
@@ -2236,6 +2237,8 @@ class TideTableView(Model):
     entries: int
     sha256: str
     """Of the table as it was sent"""
+    utc_assumed: bool
+    """Whether it states no zone for some of its times, which are taken for UTC"""
 
 
 class TieFeatureView(Model):

@@ -6768,7 +6768,7 @@ export interface components {
             datum_offset_m: number;
             /**
              * Table
-             * @description Text of a .tid table, UTC: a line 'YYYY/MM/DD hh:mm:ss.sss level' per high or low water, or per observed level. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings beyond the table, or in a gap of it, are rejected until a table covers them. Null: level_m
+             * @description Text of a table: a line 'YYYY/MM/DD hh:mm:ss.sss level' (.tid) or '2026-11-30T11:00:00Z 1.0' per high or low water, or per observed level. Times without a zone or an offset are UTC; blanks, a tab, a comma or a semicolon before the level, in metres. A half cosine leads from one extreme to the next, observed levels run smoothly; soundings beyond the table, or in a gap of it, are rejected until a table covers them. Null: level_m
              */
             table?: string | null;
             /**
@@ -6804,6 +6804,11 @@ export interface components {
              * @description Of the table as it was sent
              */
             sha256: string;
+            /**
+             * Utc Assumed
+             * @description Whether it states no zone for some of its times, which are taken for UTC
+             */
+            utc_assumed: boolean;
         };
         /**
          * TieFeatureView
@@ -12198,7 +12203,7 @@ export interface operations {
                 sd_m?: number;
                 /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
                 order?: components["schemas"]["Order"];
-                /** @description Added to every depth to bring it to the mission's datum */
+                /** @description Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said where the file states another one */
                 datum_offset_m?: number;
             };
             header?: never;
@@ -12476,7 +12481,7 @@ export interface operations {
                 sd_m?: number;
                 /** @description In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed */
                 order?: components["schemas"]["Order"];
-                /** @description Added to every depth to bring it to the mission's datum */
+                /** @description Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said where the file states another one */
                 datum_offset_m?: number;
             };
             header?: never;
