@@ -2,11 +2,9 @@
 
 import asyncio
 import os
-import signal
 import socket
 import ssl
 import sys
-import threading
 import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -53,6 +51,7 @@ from app.api.soundings import corrections, imports, measurements, pings, soundin
 from app.api.state import EdgeState
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
+from app.end_signals import EndSignals
 from app.malloc import keep_memory_together, settled
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
@@ -303,26 +302,20 @@ class Server(uvicorn.Server):
         if self._started is not None:
             self._started(self)
 
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop the vehicles, which may poll until then, and answer what is open."""
+        await self._app.state.edge.service.stop_vehicles()
+        await super().shutdown(sockets)
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """End on the first signal, at once on a second."""
+        """End on the first signal; a second Ctrl-C waits for no open request."""
         self._app.state.edge.stopping.set()
         super().handle_exit(sig, frame)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Handle signals while serving; not raised again, so that vehicles are stopped after the last request."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        loop = asyncio.get_running_loop()
-        signals = (signal.SIGINT, signal.SIGTERM)
-        for number in signals:
-            loop.add_signal_handler(number, self.handle_exit, number, None)
-        try:
-            yield
-        finally:
-            for number in signals:
-                loop.remove_signal_handler(number)
+        """Leave signals to :func:`serve`, which catches them for longer."""
+        yield
 
 
 def check_certificate(settings: Settings) -> None:
@@ -365,6 +358,8 @@ async def serve(
 ) -> None:
     """Serve until a signal or :meth:`Server.stop`; ``started`` is called once requests are answered.
 
+    A signal while it starts cancels the start. Either way every vehicle is stopped before this returns.
+
     ``with_first_token`` makes an operator's token where there never was one, beside the database or here.
 
     Raises
@@ -378,6 +373,7 @@ async def serve(
     allow_descriptors(settings.max_connections)
     listening = listen(settings)
     supervisor = Supervisor.of(os.environ)
+    signals = EndSignals()
 
     def begun(server: Server) -> None:
         supervisor.tell(READY="1", STATUS=f"answers at {server.url}")
@@ -386,12 +382,15 @@ async def serve(
 
     try:
         app = create_app(settings, port=listening.getsockname()[1])
-        # To the very end: vehicles are stopped when requests are over.
-        async with supervisor.watching(), app.router.lifespan_context(app):
-            first_token = await _first_token(app.state.edge) if with_first_token else None
-            with settled():
-                async with supervisor.told_of(app.state.edge.stopping):
-                    await Server(app, listening, begun, first_token).serve(sockets=[listening])
+        # Signals from before the first mission is taken up to the very end, when all vehicles are stopped.
+        with signals.caught():
+            async with supervisor.watching(), app.router.lifespan_context(app):
+                first_token = await _first_token(app.state.edge) if with_first_token else None
+                with settled():
+                    async with supervisor.told_of(app.state.edge.stopping):
+                        server = Server(app, listening, begun, first_token)
+                        signals.ended_by(lambda number: server.handle_exit(number, None))
+                        await server.serve(sockets=[listening])
     finally:
         listening.close()
 

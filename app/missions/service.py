@@ -19,7 +19,7 @@ from app.missions import states
 from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
+from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
@@ -157,6 +157,9 @@ class MissionService:
         self._succession = Succession(database, self.get, self._start_following)
         self._supervisor.ended = self._succession.ended
         self._started = False
+        self._ending = False
+        self.vehicles_stopped = asyncio.Event()
+        """Set when the service ends and has stopped the vehicles: until then they may poll, and are told so."""
 
     def _links(
         self, log_in: Callable[[str, str, bool], Awaitable[str | None]], is_own_user: Callable[[socket.socket], bool]
@@ -196,23 +199,34 @@ class MissionService:
         await self._succession.begin()
         self._started = True
 
+    async def stop_vehicles(self) -> None:
+        """Stop every vehicle, before anything else is waited for, and begin no flight any more."""
+        self._started, self._ending = False, True
+        self._failover.cancel()
+        flying = [live for live in self._registry if live.id in self._runs]
+        halted = await asyncio.gather(*map(self._supervisor.halt, flying), return_exceptions=True)
+        for live, stops in zip(flying, halted, strict=True):
+            if isinstance(stops, BaseException):
+                log.error("a mission's vehicles could not be stopped", mission=live.id, exc_info=stops)
+                continue
+            for stop in stops:
+                tell = log.info if stop.acknowledged else log.error
+                words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
+                tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
+        self.vehicles_stopped.set()
+
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down.
 
         Running missions stay running: another process takes them up, or this one at its next start.
         """
-        self._started = False
+        await self.stop_vehicles()
         await self._succession.close()
+        await self._failover.end()
+        await self.stop_vehicles()  # of flights that one of these was just beginning
         await self._processes.close()
         self.compute.end()
-        await self._failover.end()
         await self.alarms.close()
-        flying = [live for live in self._registry if live.id in self._runs]
-        for live, stops in zip(flying, await asyncio.gather(*map(self._supervisor.halt, flying)), strict=True):
-            for stop in stops:
-                tell = log.info if stop.acknowledged else log.error
-                words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
-                tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
         await self.maps.close()
         await self.traffic.close()
         await self.hub.close()
@@ -340,6 +354,8 @@ class MissionService:
             The latter when a vehicle is not ready or takes part in another mission, or none has a recovery point to go
             to.
         """
+        if self._ending and action in (Action.START, Action.RESUME):
+            raise ConflictError("the service ends: it begins no flight", "ask again when it runs")
         stops_all = action in (Action.PAUSE, Action.ABORT) and not return_home
         if stops_all and live.header.state is MissionState.RUNNING and await self._supervisor.held_up(live):
             await self._supervisor.halt(live)
