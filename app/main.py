@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import re
 import socket
 import ssl
 import sys
@@ -68,6 +69,9 @@ SWITCH_S = 0.001
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
 MAX_VIEWER_MESSAGE_BYTES = 4096
+
+CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----", re.DOTALL)
+"""A certificate in a PEM file (RFC 7468)."""
 
 log = structlog.get_logger(__name__)
 
@@ -151,7 +155,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 log_in,
                 is_own_user=is_own_user,
                 url=settings.peer_url or _own_url(settings, port or settings.port),
-                certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
+                certificate=certificates_in(settings.tls_certificate) if settings.tls_certificate else None,
             )
             app.state.edge = EdgeState(settings, service, tokens, limits, audit, SessionStore(database))
             await tokens.exists("")  # so that they are known when it matters
@@ -316,6 +320,11 @@ class Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave signals to :func:`serve`, which catches them for longer."""
         yield
+
+
+def certificates_in(file: Path) -> str:
+    """Return the certificates of a PEM file without anything else: its private key may be in the same file."""
+    return "".join(f"{block}\n" for block in CERTIFICATE.findall(file.read_text()))
 
 
 def check_certificate(settings: Settings) -> None:
