@@ -113,9 +113,10 @@ def _exit_code(error: Exception) -> int | None:
     """Return the exit code of an error that is expected; None for a fault of the program."""
     from app.missions.errors import MissionError
     from app.settings import SettingsError, StartupError
+    from app.storage.ping_files import PingFileError
     from app.storage.upkeep.prepare import DatabaseNotReadyError
 
     if isinstance(error, SettingsError):
         return USAGE
-    expected = isinstance(error, CommandError | StartupError | DatabaseNotReadyError | MissionError)
+    expected = isinstance(error, CommandError | StartupError | DatabaseNotReadyError | MissionError | PingFileError)
     return FAILURE if expected else None

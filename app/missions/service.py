@@ -156,6 +156,7 @@ class MissionService:
         """Places that are surveyed again and again."""
         self._succession = Succession(database, self.get, self._start_following)
         self._supervisor.ended = self._succession.ended
+        self._removing: asyncio.Task[None] | None = None
         self._started = False
         self._ending = False
         self.vehicles_stopped = asyncio.Event()
@@ -190,14 +191,21 @@ class MissionService:
             log.warning("planner cannot be used", planner=planner.name, package=planner.package, reason=planner.reason)
         self._compilation.begin()
         self.compute.start()
-        await finish_removing(self._database, self._ping_files)
         await self.hub.start()
         await self.traffic.start()
         self._registry.share(self.process, self._failover.may_take_up, self._taken_up)
         await self._failover.begin()
         self.alarms.start()
         await self._succession.begin()
+        self._removing = asyncio.create_task(self._finish_removing(), name="remove files of pings")
         self._started = True
+
+    async def _finish_removing(self) -> None:
+        """Remove what is left of missions that were removed; where their files are may not answer."""
+        try:
+            await finish_removing(self._database, self._ping_files)
+        except Exception as error:
+            log.warning("files of pings of removed missions stay: they could not be looked for", error=str(error))
 
     async def stop_vehicles(self) -> None:
         """Stop every vehicle, before anything else is waited for, and begin no flight any more."""
@@ -224,6 +232,9 @@ class MissionService:
         await self._succession.close()
         await self._failover.end()
         await self.stop_vehicles()  # of flights that one of these was just beginning
+        if self._removing is not None:
+            self._removing.cancel()
+            await asyncio.gather(self._removing, return_exceptions=True)
         await self._processes.close()
         self.compute.end()
         await self.alarms.close()
