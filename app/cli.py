@@ -16,6 +16,7 @@ from app.commands.logs import import_logs
 from app.commands.service.audit import audit
 from app.commands.service.backup import backup, prune, restore
 from app.commands.service.doctor import doctor
+from app.commands.service.health import health
 from app.commands.service.migrate import migrate
 from app.commands.service.serve import serve
 from app.commands.service.tokens import token_app
@@ -47,6 +48,7 @@ app.command()(prune)
 app.command()(serve)
 app.command()(migrate)
 app.command()(doctor)
+app.command()(health)
 app.command()(demo)
 
 
