@@ -27,6 +27,7 @@ def serve(
     ] = None,
     log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged [default: info]")] = None,
     log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
+    check: Annotated[bool, typer.Option("--check", help="Only read the settings, and say what is wrong.")] = False,
 ) -> None:
     """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
     settings = command_settings(
@@ -38,6 +39,9 @@ def serve(
         log_level=log_level,
         log_format=log_format,
     )
+    if check:
+        typer.echo("the settings can be used")
+        return
     from app.api import logs
     from app.compiled.cache import compile_beside
     from app.settings import overridden
