@@ -17,6 +17,7 @@ from app.commands.missions import missions_app
 from app.commands.service.audit import audit
 from app.commands.service.backup import backup, prune, restore
 from app.commands.service.doctor import doctor
+from app.commands.service.health import health
 from app.commands.service.migrate import migrate
 from app.commands.service.serve import serve
 from app.commands.service.tokens import token_app
@@ -49,6 +50,7 @@ app.command()(prune)
 app.command()(serve)
 app.command()(migrate)
 app.command()(doctor)
+app.command()(health)
 app.command()(demo)
 
 
@@ -115,9 +117,10 @@ def _exit_code(error: Exception) -> int | None:
     """Return the exit code of an error that is expected; None for a fault of the program."""
     from app.missions.errors import MissionError
     from app.settings import SettingsError, StartupError
+    from app.storage.ping_files import PingFileError
     from app.storage.upkeep.prepare import DatabaseNotReadyError
 
     if isinstance(error, SettingsError):
         return USAGE
-    expected = isinstance(error, CommandError | StartupError | DatabaseNotReadyError | MissionError)
+    expected = isinstance(error, CommandError | StartupError | DatabaseNotReadyError | MissionError | PingFileError)
     return FAILURE if expected else None

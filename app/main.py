@@ -2,11 +2,10 @@
 
 import asyncio
 import os
-import signal
+import re
 import socket
 import ssl
 import sys
-import threading
 import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -53,6 +52,7 @@ from app.api.soundings import corrections, imports, measurements, pings, soundin
 from app.api.state import EdgeState
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
+from app.end_signals import EndSignals
 from app.malloc import keep_memory_together, settled
 from app.missions.service import MissionService
 from app.settings import Settings, StartupError, is_loopback, load_settings
@@ -69,6 +69,9 @@ SWITCH_S = 0.001
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
 MAX_VIEWER_MESSAGE_BYTES = 4096
+
+CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----", re.DOTALL)
+"""A certificate in a PEM file (RFC 7468)."""
 
 log = structlog.get_logger(__name__)
 
@@ -152,7 +155,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 log_in,
                 is_own_user=is_own_user,
                 url=settings.peer_url or _own_url(settings, port or settings.port),
-                certificate=settings.tls_certificate.read_text() if settings.tls_certificate else None,
+                certificate=certificates_in(settings.tls_certificate) if settings.tls_certificate else None,
             )
             app.state.edge = EdgeState(settings, service, tokens, limits, audit, SessionStore(database))
             await tokens.exists("")  # so that they are known when it matters
@@ -303,26 +306,25 @@ class Server(uvicorn.Server):
         if self._started is not None:
             self._started(self)
 
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop the vehicles, which may poll until then, and answer what is open."""
+        await self._app.state.edge.service.stop_vehicles()
+        await super().shutdown(sockets)
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """End on the first signal, at once on a second."""
+        """End on the first signal; a second Ctrl-C waits for no open request."""
         self._app.state.edge.stopping.set()
         super().handle_exit(sig, frame)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Handle signals while serving; not raised again, so that vehicles are stopped after the last request."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        loop = asyncio.get_running_loop()
-        signals = (signal.SIGINT, signal.SIGTERM)
-        for number in signals:
-            loop.add_signal_handler(number, self.handle_exit, number, None)
-        try:
-            yield
-        finally:
-            for number in signals:
-                loop.remove_signal_handler(number)
+        """Leave signals to :func:`serve`, which catches them for longer."""
+        yield
+
+
+def certificates_in(file: Path) -> str:
+    """Return the certificates of a PEM file without anything else: its private key may be in the same file."""
+    return "".join(f"{block}\n" for block in CERTIFICATE.findall(file.read_text()))
 
 
 def check_certificate(settings: Settings) -> None:
@@ -365,6 +367,8 @@ async def serve(
 ) -> None:
     """Serve until a signal or :meth:`Server.stop`; ``started`` is called once requests are answered.
 
+    A signal while it starts cancels the start. Either way every vehicle is stopped before this returns.
+
     ``with_first_token`` makes an operator's token where there never was one, beside the database or here.
 
     Raises
@@ -378,6 +382,7 @@ async def serve(
     allow_descriptors(settings.max_connections)
     listening = listen(settings)
     supervisor = Supervisor.of(os.environ)
+    signals = EndSignals()
 
     def begun(server: Server) -> None:
         supervisor.tell(READY="1", STATUS=f"answers at {server.url}")
@@ -386,12 +391,15 @@ async def serve(
 
     try:
         app = create_app(settings, port=listening.getsockname()[1])
-        # To the very end: vehicles are stopped when requests are over.
-        async with supervisor.watching(), app.router.lifespan_context(app):
-            first_token = await _first_token(app.state.edge) if with_first_token else None
-            with settled():
-                async with supervisor.told_of(app.state.edge.stopping):
-                    await Server(app, listening, begun, first_token).serve(sockets=[listening])
+        # Signals from before the first mission is taken up to the very end, when all vehicles are stopped.
+        with signals.caught():
+            async with supervisor.watching(), app.router.lifespan_context(app):
+                first_token = await _first_token(app.state.edge) if with_first_token else None
+                with settled():
+                    async with supervisor.told_of(app.state.edge.stopping):
+                        server = Server(app, listening, begun, first_token)
+                        signals.ended_by(lambda number: server.handle_exit(number, None))
+                        await server.serve(sockets=[listening])
     finally:
         listening.close()
 

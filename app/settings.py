@@ -299,6 +299,23 @@ def load_settings(**overrides: Any) -> Settings:
         raise
 
 
+def overridden() -> dict[str, str]:
+    """Return the settings of the file that environment variables overrule, each with its variable."""
+    file = config_file()
+    if not file.is_file():
+        return {}
+    written = tomllib.loads(file.read_text(encoding="utf-8"))
+    found = {}
+    for variable in sorted(_variable_names(Settings, PREFIX) & set(os.environ)):
+        path = variable.removeprefix(PREFIX).lower().split("__")
+        value: Any = written
+        for part in path:
+            value = value.get(part) if isinstance(value, dict) else None
+        if value is not None and str(value).lower() != os.environ[variable].lower():
+            found[".".join(path)] = variable
+    return found
+
+
 def _variable_names(model: type[BaseModel], prefix: str) -> set[str]:
     names: set[str] = set()
     for name, field in model.model_fields.items():

@@ -1,4 +1,7 @@
 import gc
+import os
+import shutil
+import subprocess
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -101,3 +104,26 @@ def captures() -> Path:
     if not CAPTURES.is_dir():
         pytest.skip(f"no recorded sessions in {CAPTURES}: set BATHYFLEET_CAPTURES to a folder of recorded sessions")
     return CAPTURES
+
+
+@pytest.fixture(scope="session")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A certificate for localhost, signed by itself, and its key."""
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        pytest.skip("openssl is not installed: no certificate can be made")
+    folder = tmp_path_factory.mktemp("tls")
+    cert, key = folder / "cert.pem", folder / "key.pem"
+    name = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
+    new = [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2"]
+    subprocess.run([*new, *name, "-keyout", str(key), "-out", str(cert)], check=True, capture_output=True)
+    return cert, key
+
+
+@pytest.fixture
+def no_settings_around(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither the environment nor a file sets anything."""
+    for name in list(os.environ):
+        if name.startswith("BATHYFLEET_"):
+            monkeypatch.delenv(name)
+    monkeypatch.chdir(tmp_path)

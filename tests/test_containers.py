@@ -1,12 +1,10 @@
 """The image and the compose file say what the program understands. Building them takes a container engine."""
 
 import json
-import os
 import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ from benchmarks.installation.dockerfile import (
     words_of,
 )
 from tests.support.api.rest import running_in_thread
+from tests.support.commands import COMMAND, environment
 from tests.support.paths import PROJECT
 
 IMAGE = (PROJECT / "Dockerfile").read_text().replace("\\\n", " ")
@@ -36,19 +35,23 @@ def environment_of_the_image() -> dict[str, str]:
     return dict(word.split("=", 1) for word in shlex.split(line))
 
 
+def environment_of_a_container() -> dict[str, str]:
+    """Settings of the image and of the compose file, without those that it only passes on."""
+    service = COMPOSE["services"]["bathyfleet"]["environment"]
+    image = {name: value for name, value in environment_of_the_image().items() if name.startswith(PREFIX)}
+    given = {name: value for name, value in service.items() if value is not None}
+    return image | {name: filled_in(value, {"POSTGRES_PASSWORD": "x"}) for name, value in given.items()}
+
+
 def filled_in(value: str, given: dict[str, str]) -> str:
     """Fill in variables as compose does."""
     return re.sub(r"\$\{(\w+)(?::[-?]([^}]*))?\}", lambda m: given.get(m[1], m[2] or ""), value)
 
 
+@pytest.mark.usefixtures("no_settings_around")
 def test_every_variable_is_a_setting_with_a_value_that_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    service = COMPOSE["services"]["bathyfleet"]["environment"]
-    image = {name: value for name, value in environment_of_the_image().items() if name.startswith(PREFIX)}
-    together = image | {name: filled_in(value, {"POSTGRES_PASSWORD": "x"}) for name, value in service.items()}
-    assert set(together) <= KNOWN
-    for name in list(os.environ):
-        if name.startswith(PREFIX):
-            monkeypatch.delenv(name)
+    together = environment_of_a_container()
+    assert {*together, *COMPOSE["services"]["bathyfleet"]["environment"]} <= KNOWN
     for name, value in together.items():
         monkeypatch.setenv(name, value)
     settings = load_settings()
@@ -58,6 +61,27 @@ def test_every_variable_is_a_setting_with_a_value_that_is_taken(monkeypatch: pyt
     assert (settings.port, settings.log_format) == (8080, "json")
 
 
+@pytest.mark.usefixtures("no_settings_around")
+def test_the_settings_file_says_where_a_container_listens(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bathyfleet.toml").write_text('host = "192.0.2.7"\nport = 8443\n')
+    for name, value in environment_of_a_container().items():
+        monkeypatch.setenv(name, value)
+    settings = load_settings()
+    assert (settings.host, settings.port) == ("192.0.2.7", 8443)
+
+
+def test_vehicles_have_time_to_be_stopped() -> None:
+    """As under systemd, however a container is begun."""
+    unit = (PROJECT / "app" / "deploy" / "systemd" / "bathyfleet.service").read_text()
+    (seconds,) = re.findall(r"^TimeoutStopSec=(\d+)$", unit, re.MULTILINE)
+    assert COMPOSE["services"]["bathyfleet"]["stop_grace_period"] == f"{seconds}s"
+    guide = (PROJECT / "docs" / "administration.md").read_text()
+    begun = [line for line in guide.splitlines() if line.startswith("docker run -d")]
+    assert begun
+    assert all(f"--stop-timeout {seconds}" in line for line in begun)
+
+
 def test_ports_of_the_image_are_those_of_the_settings() -> None:
     (line,) = re.findall(r"^EXPOSE (.*)$", IMAGE, re.MULTILINE)
     imc = Settings().imc
@@ -65,14 +89,43 @@ def test_ports_of_the_image_are_those_of_the_settings() -> None:
     assert line.split() == [f"{Settings().port}/tcp", f"{imc.port}/udp", announces]
 
 
-def test_the_health_check_asks_what_there_is(database_url: str) -> None:
+@pytest.mark.parametrize("encrypted", [False, True])
+def test_the_health_check_asks_what_there_is(
+    database_url: str, tmp_path: Path, certificate: tuple[Path, Path], encrypted: bool
+) -> None:
     (line,) = re.findall(r"^HEALTHCHECK .* CMD (\[.*\])$", IMAGE, re.MULTILINE)
-    command = [sys.executable, *json.loads(line)[1:]]
-    settings = Settings(port=0, database_url=database_url, imc=ImcSettings(enabled=False))
+    program, *words = json.loads(line)
+    assert program == "bathyfleet"
+    tls: dict[str, Any] = {"tls_certificate": certificate[0], "tls_key": certificate[1]} if encrypted else {}
+    # One address of the machine's own, as where others than its users are to be kept out.
+    settings = Settings(host="127.0.0.2", port=0, database_url=database_url, imc=ImcSettings(enabled=False), **tls)
     with running_in_thread(settings) as server:
         for port, code in ((server.url.rpartition(":")[2], 0), ("9", 1)):
-            variables = {"BATHYFLEET_PORT": port, "PATH": os.environ["PATH"]}
-            assert subprocess.run(command, env=variables, capture_output=True, check=False).returncode == code
+            given = {"host": settings.host, "port": int(port)} | {name: str(file) for name, file in tls.items()}
+            text = "".join(f"{name} = {json.dumps(value)}\n" for name, value in given.items())
+            (tmp_path / "bathyfleet.toml").write_text(text)
+            done = subprocess.run(
+                [*COMMAND, *words], cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False
+            )
+            assert done.returncode == code, done.stdout + done.stderr
+
+
+def test_the_image_has_what_the_guides_offer_on_top() -> None:
+    build, last = stages_of((PROJECT / "Dockerfile").read_text())
+    arguments = [value.partition("=")[0] for word, value in build.instructions if word == "ARG"]
+    assert {*arguments} == {*COMPOSE["services"]["bathyfleet"]["build"]["args"]} == {"EXTRAS", "PACKAGES"}
+    (install,) = (value for word, value in build.instructions if word == "RUN" and "pip install" in value)
+    assert '".${EXTRAS:+[$EXTRAS]}" $PACKAGES' in install
+    for extras, packages, expected in (("", "", ["."]), ("cluster", "s3fs gcsfs", [".[cluster]", "s3fs", "gcsfs"])):
+        script = 'printf "%s\\n" ".${EXTRAS:+[$EXTRAS]}" $PACKAGES'
+        given = {"EXTRAS": extras, "PACKAGES": packages}
+        said = subprocess.run(["sh", "-c", script], env=given, capture_output=True, text=True, check=True).stdout
+        assert said.split() == expected
+    # Debian 13 has the programs of PostgreSQL 17; older ones refuse a newer server.
+    server = re.fullmatch(r"postgres:(\d+)-\w+", COMPOSE["services"]["database"]["image"])
+    assert server is not None
+    assert ({"trixie": 17}[last.image.rpartition("-")[2]]) >= int(server[1])
+    assert any("postgresql-client" in value for word, value in last.instructions if word == "RUN")
 
 
 def test_what_the_image_copies_is_what_the_package_is_made_of() -> None:

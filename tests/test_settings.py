@@ -15,7 +15,7 @@ from app.exploration.planner.options import PlannerOptions
 from app.missions.fleet.links.imc import bridge_settings
 from app.missions.settings import ImcSettings
 from app.missions.spec.mission import MissionSpec
-from app.settings import Settings, SettingsError, is_loopback, load_settings
+from app.settings import Settings, SettingsError, is_loopback, load_settings, overridden
 from imc_bridge.settings import BridgeSettings, ConsoleSettings
 from tests.support.paths import PROJECT
 
@@ -47,6 +47,20 @@ def test_the_command_line_beats_the_environment_beats_the_file(tmp_path: Path, m
     settings = load_settings(port=3, host=None)
     assert (settings.port, settings.host, settings.time_scale) == (3, "127.0.0.2", 2.5)
     assert (settings.imc.name, settings.imc.port) == ("quay", 7001)
+
+
+def test_what_the_environment_overrules_in_the_file_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "bathyfleet.toml").write_text('port = 8443\nhost = "127.0.0.1"\ninsecure = false\n[imc]\nport = 7001\n')
+    assert overridden() == {}
+    for name, value in {
+        "PORT": "8080",
+        "HOST": "127.0.0.1",
+        "INSECURE": "False",
+        "IMC__PORT": "1",
+        "AUDIT_DAYS": "99",
+    }.items():
+        monkeypatch.setenv(f"BATHYFLEET_{name}", value)
+    assert overridden() == {"port": "BATHYFLEET_PORT", "imc.port": "BATHYFLEET_IMC__PORT"}
 
 
 def test_imc_ids_are_taken_as_the_doctor_tells_them(monkeypatch: pytest.MonkeyPatch) -> None:

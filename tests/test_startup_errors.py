@@ -148,3 +148,13 @@ def test_nothing_remains_of_a_start_that_failed(beside_another: tuple[int, Path,
     _, folder, _, _ = beside_another
     assert (folder / "bathyfleet.db").exists(), "it came so far"
     assert not [path.name for path in folder.iterdir() if re.search(r"-process-", path.name)]
+
+
+def test_a_variable_that_overrules_the_settings_file_is_told(tmp_path: Path) -> None:
+    (tmp_path / "bathyfleet.toml").write_text('database_url = "sqlite+aiosqlite:///other/fleet.db"\n')
+    variables = {"BATHYFLEET_DATABASE_URL": "sqlite+aiosqlite:///absent/fleet.db", "BATHYFLEET_LOG_FORMAT": "json"}
+    serve = [*COMMAND, "serve", "--port", "0"]
+    done = subprocess.run(
+        serve, cwd=tmp_path, env=environment(**variables), capture_output=True, text=True, check=False
+    )
+    assert '"setting": "database_url", "variable": "BATHYFLEET_DATABASE_URL"' in done.stdout + done.stderr

@@ -23,6 +23,13 @@ def main(
     wheel: Annotated[
         Path | None, typer.Option(exists=True, dir_okay=False, help="bathyfleet's wheel [default: built from here]")
     ] = None,
+    extras: Annotated[
+        list[str] | None, typer.Option("--extra", help="An extra that is put in, such as cluster, as often as needed")
+    ] = None,
+    packages: Annotated[
+        list[str] | None,
+        typer.Option("--with", help="A package beside it, such as s3fs, or a wheel's file, as often as needed"),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("dist"),
 ) -> None:
     """Put bathyfleet and all that it needs into one file for each kind of computer.
@@ -36,7 +43,15 @@ def main(
                 if PAGE not in archive.namelist():
                     raise BundleError(f"{own.name} has no dashboard: build it without BATHYFLEET_SKIP_DASHBOARD")
             for name in machines or [machine()]:
-                path = bundle(own, name, out, command="bathyfleet")
+                path = bundle(
+                    own,
+                    name,
+                    out,
+                    command="bathyfleet",
+                    check="serve --check",
+                    extras=extras or [],
+                    packages=packages or [],
+                )
                 typer.echo(f"{path}: {path.stat().st_size / 2**20:.0f} MiB")
         except BundleError as error:
             typer.echo(f"Error: {error}", err=True)

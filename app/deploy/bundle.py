@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from email.parser import HeaderParser
 from pathlib import Path
@@ -60,7 +60,17 @@ def python_version() -> str:
     return f"{sys.version_info.major}.{sys.version_info.minor}"
 
 
-def bundle(wheel: Path, machine: str, folder: Path, *, command: str, pip_options: Sequence[str] = ()) -> Path:
+def bundle(
+    wheel: Path,
+    machine: str,
+    folder: Path,
+    *,
+    command: str,
+    check: str = "",
+    extras: Sequence[str] = (),
+    packages: Sequence[str] = (),
+    pip_options: Sequence[str] = (),
+) -> Path:
     """Write the file and return its path; the same wheels give the same bytes.
 
     Parameters
@@ -73,6 +83,12 @@ def bundle(wheel: Path, machine: str, folder: Path, *, command: str, pip_options
         Where the file goes.
     command : str
         The program that tells by ``--version`` whether it was installed well.
+    check : str
+        Its arguments by which it tells whether it can use its settings; empty: it has none.
+    extras : sequence of str
+        Of the wheel, for example ``cluster``.
+    packages : sequence of str
+        What is put in beside it: names with or without versions, or files of wheels.
     pip_options : sequence of str
         For pip, for example where else to look for wheels.
 
@@ -85,7 +101,9 @@ def bundle(wheel: Path, machine: str, folder: Path, *, command: str, pip_options
         raise BundleError(f"machine: {machine!r} is not one of {', '.join(MACHINES)}")
     own = Wheel.of(wheel)
     with tempfile.TemporaryDirectory() as place:
-        _download(wheel, machine, Path(place), [*pip_options, *_built(wheel, Path(place), pip_options)])
+        own_extras = f"[{','.join(extras)}]" if extras else ""
+        wanted = [f"{wheel.resolve()}{own_extras}", *packages]
+        _download(wanted, machine, Path(place), [*pip_options, *_built(wheel, Path(place), pip_options)])
         wheels = sorted(map(Wheel.of, Path(place).glob("*.whl")), key=lambda w: w.path.name)
         size = sum(w.path.stat().st_size for w in wheels)
         if size > LIMIT_BYTES:
@@ -93,7 +111,7 @@ def bundle(wheel: Path, machine: str, folder: Path, *, command: str, pip_options
         stem = f"{own.name}-{own.version}-python{python_version()}-linux-{machine}"
         target = folder / f"{stem}.tar"
         folder.mkdir(parents=True, exist_ok=True)
-        _write(target, stem, own, wheels, machine, command)
+        _write(target, stem, own, wheels, {"MACHINE": machine, "COMMAND": command, "CHECK": check})
     return target
 
 
@@ -116,27 +134,21 @@ def _built(wheel: Path, place: Path, options: Sequence[str]) -> list[str]:
     return ["--find-links", str(folder)]
 
 
-def _download(wheel: Path, machine: str, place: Path, options: Sequence[str]) -> None:
+def _download(wanted: Sequence[str], machine: str, place: Path, options: Sequence[str]) -> None:
     platforms = [f"manylinux_2_{minor}_{machine}" for minor in range(NEWEST_GLIBC, 16, -1)]
     command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", *options]
     command += ["--only-binary", ":all:", "--dest", str(place), "--implementation", "cp"]
     command += ["--python-version", python_version(), "--abi", f"cp{python_version().replace('.', '')}"]
     for name in (*platforms, f"manylinux2014_{machine}"):
         command += ["--platform", name]
-    done = subprocess.run([*command, str(wheel), "pip"], capture_output=True, text=True, check=False)  # noqa: S603
+    done = subprocess.run([*command, *wanted, "pip"], capture_output=True, text=True, check=False)  # noqa: S603
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if line.startswith("ERROR")]
         raise BundleError("pip finds no wheels for it: " + " ".join(lines or done.stderr.splitlines()[-3:]))
 
 
-def _write(target: Path, stem: str, own: Wheel, wheels: Sequence[Wheel], machine: str, command: str) -> None:
-    values = {
-        "NAME": own.name,
-        "VERSION": own.version,
-        "PYTHON": python_version(),
-        "MACHINE": machine,
-        "COMMAND": command,
-    }
+def _write(target: Path, stem: str, own: Wheel, wheels: Sequence[Wheel], given: Mapping[str, str]) -> None:
+    values = {"NAME": own.name, "VERSION": own.version, "PYTHON": python_version(), **given}
     script = re.sub(r"@([A-Z]+)@", lambda match: values[match[1]], SCRIPT.read_text())
     texts = {
         "install.sh": script,

@@ -19,7 +19,7 @@ from app.missions import states
 from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
+from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
@@ -156,7 +156,11 @@ class MissionService:
         """Places that are surveyed again and again."""
         self._succession = Succession(database, self.get, self._start_following)
         self._supervisor.ended = self._succession.ended
+        self._removing: asyncio.Task[None] | None = None
         self._started = False
+        self._ending = False
+        self.vehicles_stopped = asyncio.Event()
+        """Set when the service ends and has stopped the vehicles: until then they may poll, and are told so."""
 
     def _links(
         self, log_in: Callable[[str, str, bool], Awaitable[str | None]], is_own_user: Callable[[socket.socket], bool]
@@ -187,32 +191,53 @@ class MissionService:
             log.warning("planner cannot be used", planner=planner.name, package=planner.package, reason=planner.reason)
         self._compilation.begin()
         self.compute.start()
-        await finish_removing(self._database, self._ping_files)
         await self.hub.start()
         await self.traffic.start()
         self._registry.share(self.process, self._failover.may_take_up, self._taken_up)
         await self._failover.begin()
         self.alarms.start()
         await self._succession.begin()
+        self._removing = asyncio.create_task(self._finish_removing(), name="remove files of pings")
         self._started = True
+
+    async def _finish_removing(self) -> None:
+        """Remove what is left of missions that were removed; where their files are may not answer."""
+        try:
+            await finish_removing(self._database, self._ping_files)
+        except Exception as error:
+            log.warning("files of pings of removed missions stay: they could not be looked for", error=str(error))
+
+    async def stop_vehicles(self) -> None:
+        """Stop every vehicle, before anything else is waited for, and begin no flight any more."""
+        self._started, self._ending = False, True
+        self._failover.cancel()
+        flying = [live for live in self._registry if live.id in self._runs]
+        halted = await asyncio.gather(*map(self._supervisor.halt, flying), return_exceptions=True)
+        for live, stops in zip(flying, halted, strict=True):
+            if isinstance(stops, BaseException):
+                log.error("a mission's vehicles could not be stopped", mission=live.id, exc_info=stops)
+                continue
+            for stop in stops:
+                tell = log.info if stop.acknowledged else log.error
+                words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
+                tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
+        self.vehicles_stopped.set()
 
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down.
 
         Running missions stay running: another process takes them up, or this one at its next start.
         """
-        self._started = False
+        await self.stop_vehicles()
         await self._succession.close()
+        await self._failover.end()
+        await self.stop_vehicles()  # of flights that one of these was just beginning
+        if self._removing is not None:
+            self._removing.cancel()
+            await asyncio.gather(self._removing, return_exceptions=True)
         await self._processes.close()
         self.compute.end()
-        await self._failover.end()
         await self.alarms.close()
-        flying = [live for live in self._registry if live.id in self._runs]
-        for live, stops in zip(flying, await asyncio.gather(*map(self._supervisor.halt, flying)), strict=True):
-            for stop in stops:
-                tell = log.info if stop.acknowledged else log.error
-                words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
-                tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
         await self.maps.close()
         await self.traffic.close()
         await self.hub.close()
@@ -340,6 +365,8 @@ class MissionService:
             The latter when a vehicle is not ready or takes part in another mission, or none has a recovery point to go
             to.
         """
+        if self._ending and action in (Action.START, Action.RESUME):
+            raise ConflictError("the service ends: it begins no flight", "ask again when it runs")
         stops_all = action in (Action.PAUSE, Action.ABORT) and not return_home
         if stops_all and live.header.state is MissionState.RUNNING and await self._supervisor.held_up(live):
             await self._supervisor.halt(live)

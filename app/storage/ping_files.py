@@ -3,8 +3,8 @@
 import hashlib
 import os
 import re
-from collections.abc import Collection, Iterable
-from contextlib import suppress
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,45 @@ REMOVED = ".removed"
 
 class PingFileError(Exception):
     """A file of pings is missing or damaged; ``str()`` names it."""
+
+
+class PingPlaceError(PingFileError):
+    """Where files of pings are cannot be reached, or refuses; ``str()`` says what its library says."""
+
+
+class _Remote:
+    """A file system of fsspec on another machine: whatever its library raises is a PingPlaceError.
+
+    Libraries have errors of their own, such as those of HTTP, which nobody else knows. Only a file that is not there
+    is FileNotFoundError as everywhere.
+    """
+
+    def __init__(self, file_system: Any, shown: str) -> None:
+        self._file_system = file_system
+        self._shown = shown
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._file_system, name)
+        if not callable(found):
+            return found
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            with _reaching(self._shown):
+                return found(*arguments, **options)
+
+        return call
+
+
+@contextmanager
+def _reaching(shown: str) -> Iterator[None]:
+    """Tell in PingPlaceError what keeps from reaching another machine."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise
+    except Exception as error:
+        said = str(error).partition("\n")[0] or type(error).__name__
+        raise PingPlaceError(f"the files of pings at {shown} cannot be reached: {said}") from error
 
 
 def check_place(url: str) -> None:
@@ -72,8 +111,17 @@ class PingFiles:
     def _place(self) -> tuple[Any, str]:
         import fsspec  # slow to import, and needed by those only who have pings
 
-        file_system, root = fsspec.core.url_to_fs(self.url)
-        return file_system, str(root).rstrip("/")
+        if "://" not in self.url:
+            file_system, root = fsspec.core.url_to_fs(self.url)
+            return file_system, str(root).rstrip("/")
+        with _reaching(self._shown):
+            file_system, root = fsspec.core.url_to_fs(self.url)
+        return _Remote(file_system, self._shown), str(root).rstrip("/")
+
+    @property
+    def _shown(self) -> str:
+        """The URL without a user's name and password."""
+        return re.sub(r"://[^/]*@", "://", self.url).rstrip("/")
 
     @property
     def folder(self) -> Path | None:
@@ -84,8 +132,7 @@ class PingFiles:
 
     def where(self, name: str) -> str:
         """Return where a file is, for people: without a user's name and password in a URL."""
-        shown = re.sub(r"://[^/]*@", "://", self.url).rstrip("/")
-        return f"{self.folder / name}" if self.folder else f"{shown}/{name}".rstrip("/")
+        return f"{self.folder / name}" if self.folder else f"{self._shown}/{name}".rstrip("/")
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file; it has its name only when all of it is on the disk."""
@@ -141,16 +188,19 @@ class PingFiles:
         below = root if mission_id is None else f"{root}/{mission_id}"
         return sorted(str(path).removeprefix(f"{root}/") for path in file_system.find(below))
 
-    def tidy(self, mission_id: str) -> list[str]:
-        """Remove what is left of a mission's files that were not written to their end; returns which.
+    def unfinished(self, mission_id: str) -> list[str]:
+        """Return what is left of a mission's files that were not written to their end."""
+        return [name for name in self._found(mission_id) if name.endswith(PART)]
+
+    def remove_unfinished(self, names: Iterable[str]) -> None:
+        """Remove what :meth:`unfinished` returned.
 
         A whole file is never removed because a database does not list it: another one may, whose only copy it is.
         """
         file_system, root = self._place
-        left = [name for name in self._found(mission_id) if name.endswith(PART)]
-        for name in left:
-            file_system.rm_file(f"{root}/{name}")
-        return left
+        for name in names:
+            with suppress(FileNotFoundError):  # it has been finished since
+                file_system.rm_file(f"{root}/{name}")
 
     def remove(self, mission_id: str, names: Iterable[str]) -> None:
         """Remove files of a mission that was removed from its database, and no others.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pathspec
 
-KNOWN = ("ENV", "WORKDIR", "COPY", "RUN", "USER", "VOLUME", "EXPOSE", "HEALTHCHECK", "ENTRYPOINT", "CMD")
+KNOWN = ("ARG", "ENV", "WORKDIR", "COPY", "RUN", "USER", "VOLUME", "EXPOSE", "HEALTHCHECK", "ENTRYPOINT", "CMD")
 
 
 class DockerfileError(Exception):

@@ -90,7 +90,7 @@ class Image:
         for word, value in stage.instructions:
             with Step(f"{word} {value}"):
                 match word:
-                    case "ENV":
+                    case "ENV" | "ARG":  # with the value that it has where the build is told none
                         root.variables |= variables_of(value, root.variables)
                     case "WORKDIR":
                         self.directory = value

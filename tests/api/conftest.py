@@ -1,4 +1,3 @@
-import os
 from collections.abc import AsyncIterator, Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -31,15 +30,6 @@ def shared_server(databases: Databases) -> Iterator[Server]:
     settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False))
     with running_in_thread(settings) as server:
         yield server
-
-
-@pytest.fixture
-def no_settings_around(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither the environment nor a file sets anything."""
-    for name in list(os.environ):
-        if name.startswith("BATHYFLEET_"):
-            monkeypatch.delenv(name)
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture

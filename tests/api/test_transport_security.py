@@ -2,10 +2,11 @@
 
 import asyncio
 import os
-import shutil
+import sqlite3
 import ssl
 import subprocess
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,11 @@ import pytest
 
 from app.main import create_app, serve
 from app.settings import Settings, SettingsError, StartupError, load_settings
+from app.storage.upkeep.backup import back_up
+from app.storage.upkeep.prepare import prepare_database
 from tests.support.api.rest import make_client, running
 
 HTTPS_ONLY = "strict-transport-security"
-
-
-@pytest.fixture(scope="session")
-def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A certificate for localhost, signed by itself, and its key."""
-    openssl = shutil.which("openssl")
-    if openssl is None:
-        pytest.skip("openssl is not installed: no certificate can be made")
-    folder = tmp_path_factory.mktemp("tls")
-    cert, key = folder / "cert.pem", folder / "key.pem"
-    name = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
-    new = [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2"]
-    subprocess.run([*new, *name, "-keyout", str(key), "-out", str(cert)], check=True, capture_output=True)
-    return cert, key
 
 
 async def test_https_is_served_with_the_certificate_and_asked_for_from_then_on(
@@ -53,6 +42,27 @@ async def test_https_is_served_with_the_certificate_and_asked_for_from_then_on(
         async with httpx.AsyncClient(base_url=server.url, verify=old) as client:
             with pytest.raises(httpx.TransportError):
                 await client.get("/health/live")
+
+
+async def test_the_private_key_comes_neither_into_the_database_nor_into_backups(
+    make_settings: Callable[..., Settings], certificate: tuple[Path, Path], tmp_path: Path
+) -> None:
+    cert, key = certificate
+    both = tmp_path / "both.pem"
+    both.write_text(key.read_text() + cert.read_text())
+    settings = make_settings(tls_certificate=both, database_url=f"sqlite+aiosqlite:///{tmp_path / 'fleet.db'}")
+    await prepare_database(settings.database_url, may_upgrade=True)
+    with closing(sqlite3.connect(tmp_path / "fleet.db")) as connection:  # as a process that was killed left it
+        words = "INSERT INTO processes (id, url, secret, certificate, began_at) VALUES (99, '', '', ?, '2026-01-01')"
+        connection.execute(words, [both.read_text()])
+        connection.commit()
+    async with running(settings) as server, make_client(server) as client:
+        assert (await client.get("/missions")).status_code == 200
+        with closing(sqlite3.connect(tmp_path / "fleet.db")) as connection:
+            assert connection.execute("SELECT certificate FROM processes").fetchall() == [(cert.read_text(),)]
+        copy, _ = await asyncio.to_thread(back_up, settings.database_url, tmp_path / "copy.db")
+    with closing(sqlite3.connect(copy)) as connection:
+        assert connection.execute("SELECT secret, certificate FROM processes").fetchall() == [("", None)]
 
 
 @pytest.mark.usefixtures("no_settings_around")

@@ -7,6 +7,7 @@ import sys
 import tarfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -67,9 +68,9 @@ def boat(tmp_path: Path) -> Path:
     return make_wheel(tmp_path, "boat", "1.0", needs="sounder>=2", code=code)
 
 
-def made(boat: Path, index: Path, machine: str = MACHINE) -> Path:
+def made(boat: Path, index: Path, machine: str = MACHINE, **more: Any) -> Path:
     options = ["--no-index", "--find-links", str(index)]
-    return bundle(boat, machine, boat.parent / "dist", command="boat", pip_options=options)
+    return bundle(boat, machine, boat.parent / "dist", command="boat", pip_options=options, **more)
 
 
 def unpacked(file: Path, folder: Path) -> Path:
@@ -78,13 +79,13 @@ def unpacked(file: Path, folder: Path) -> Path:
     return folder / file.name.removesuffix(".tar")
 
 
-def install(files: Path, folder: Path) -> "subprocess.CompletedProcess[str]":
+def install(files: Path, folder: Path, **more: str) -> "subprocess.CompletedProcess[str]":
     variables = {
         "PATH": "/usr/bin:/bin",
         "PYTHON": sys.executable,
         "HOME": str(folder.parent),
         "PIP_INDEX_URL": "http://none.invalid",
-    }
+    } | more
     return subprocess.run(
         ["sh", files / "install.sh", folder], env=variables, capture_output=True, text=True, check=False
     )
@@ -102,6 +103,63 @@ def test_it_installs_upgrades_and_keeps_the_version_before(boat: Path, index: Pa
     second = install(files, folder)
     assert second.stdout == f"boat 1.0 is in {folder}, the version before in {folder}.old\n"
     subprocess.run([folder / "bin" / "boat"], check=True)
+
+
+NEEDS = 'sounder>=2\nProvides-Extra: deck\nRequires-Dist: sail; extra == "deck"'
+THAT_HAS_SETTINGS = """
+import os, pathlib, sys
+def main() -> None:
+    if sys.argv[1:] == ["serve", "--check"]:
+        import sail
+        sys.exit(pathlib.Path("boat.toml").read_text() + os.environ.get("BOAT_SAILS", ""))
+"""
+
+
+def test_an_upgrade_that_lacks_what_was_put_in_is_refused(index: Path, tmp_path: Path) -> None:
+    boat = make_wheel(tmp_path, "boat", "1.0", needs=NEEDS, code="def main() -> None: ...")
+    make_wheel(index, "sail", "1.0", needs="rope")
+    make_wheel(index, "anchor", "4.0")
+    make_wheel(index, "rope", "1.0")
+    folder = tmp_path / "opt" / "boat"
+    full = unpacked(made(boat, index, extras=["deck"], packages=["anchor"]), tmp_path / "full")
+    assert install(full, folder).returncode == 0
+    assert {path.name.partition("-")[0] for path in (full / "wheels").iterdir()} == {
+        *("boat", "sounder", "sail", "rope", "anchor", "pip")
+    }
+    bare = unpacked(made(boat, index), tmp_path / "bare")
+    refused = install(bare, folder)
+    assert refused.returncode == 1
+    assert f"{folder} has packages that these files lack: anchor rope sail. Nothing was changed" in refused.stderr
+    subprocess.run([folder / "bin" / "python", "-c", "import anchor, sail"], check=True)
+    assert not folder.with_name("boat.old").exists()
+    assert install(full, folder).returncode == 0
+    left_out = install(bare, folder, WITHOUT="anchor rope sail")
+    assert left_out.returncode == 0, left_out.stderr
+
+
+def test_what_a_version_no_longer_needs_itself_is_not_missed(boat: Path, index: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "opt" / "boat"
+    assert install(unpacked(made(boat, index), tmp_path / "one"), folder).returncode == 0
+    light = make_wheel(tmp_path, "boat", "2.0", needs="pip", code="def main() -> None: ...")
+    done = install(unpacked(made(light, index), tmp_path / "two"), folder)
+    assert done.returncode == 0, done.stderr
+
+
+def test_an_upgrade_that_cannot_use_the_settings_is_refused(boat: Path, index: Path, tmp_path: Path) -> None:
+    folder, state, defaults = tmp_path / "opt" / "boat", tmp_path / "state", tmp_path / "defaults"
+    assert install(unpacked(made(boat, index), tmp_path / "one"), folder).returncode == 0
+    state.mkdir()
+    (state / "boat.toml").write_text("no sail; ")
+    defaults.write_text('# of the service\nBOAT_SAILS=["main", "jib"]\n')
+    make_wheel(index, "sail", "1.0")
+    newer = make_wheel(tmp_path, "boat", "2.0", needs=NEEDS, code=THAT_HAS_SETTINGS)
+    files = unpacked(made(newer, index, check="serve --check", extras=["deck"]), tmp_path / "two")
+    refused = install(files, folder, STATE=str(state), DEFAULTS=str(defaults))
+    assert refused.returncode == 1
+    assert 'no sail; ["main", "jib"]' in refused.stderr
+    assert "the new version cannot use the settings, see above. Nothing was changed" in refused.stderr
+    told = subprocess.run([folder / "bin" / "boat"], capture_output=True, text=True, check=True).stdout
+    assert told == f"boat 1.0: depth on {MACHINE}\n"
 
 
 @pytest.mark.parametrize("victim", ["wheels/sounder-2.0", "requirements.txt", "install.sh"])

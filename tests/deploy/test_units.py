@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.main import GRACE_S
+from app.mapping.readers.confinement import LOCKING_CALLS
 from tests.support.paths import PROJECT
 
 UNITS = PROJECT / "app" / "deploy" / "systemd"
@@ -62,6 +63,14 @@ def test_the_service_is_watched_and_has_time_to_stop_its_vehicles() -> None:
     cache = unit("bathyfleet-backup.service")["Service"]["CacheDirectory"]
     assert f"XDG_CACHE_HOME=/var/cache/{cache}" in (UNITS / "bathyfleet.service").read_text()
     assert service["CacheDirectory"] == cache
+
+
+def test_the_service_may_lock_in_what_reads_files_under_systemd_of_any_age() -> None:
+    """Sets of system calls of systemd 252 (Debian 12) know neither."""
+    lines = (UNITS / "bathyfleet.service").read_text().splitlines()
+    allowed = " ".join(line.partition("=")[2] for line in lines if line.startswith("SystemCallFilter=")).split()
+    assert {*LOCKING_CALLS} <= {*allowed}
+    assert lines.index("SystemCallFilter=@system-service") < lines.index("SystemCallFilter=" + " ".join(LOCKING_CALLS))
 
 
 def test_copies_are_made_daily_by_a_command_that_there_is() -> None:

@@ -2,11 +2,18 @@
 
 import hashlib
 import os
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from pyftpdlib.authorizers import DummyAuthorizer
+from pyftpdlib.handlers import FTPHandler
+from pyftpdlib.ioloop import IOLoop
+from pyftpdlib.servers import FTPServer
 
-from app.storage.ping_files import PingFileError, PingFiles, digest_in, file_name
+from app.storage.ping_files import PingFileError, PingFiles, PingPlaceError, digest_in, file_name
+from tests.support.ports import free_ports
 
 CONTENT = b"pings"
 DIGEST = hashlib.sha256(CONTENT).hexdigest()
@@ -44,10 +51,12 @@ def test_no_password_is_told_of_where_files_are() -> None:
 def test_halves_are_removed_and_whole_files_never(files: PingFiles) -> None:
     for name in (NAME, f"{NAME}.part", "m2/other.parquet.part"):
         files.write(name, CONTENT)
-    assert files.tidy("m1") == [f"{NAME}.part"]
-    assert files.tidy("m3") == []
+    assert files.unfinished("m1") == [f"{NAME}.part"]
+    assert files.unfinished("m3") == []
+    files.remove_unfinished([*files.unfinished("m1"), "m1/finished-meanwhile.part"])
+    assert files.unfinished("m1") == []
     assert files.read(NAME, DIGEST) == CONTENT
-    assert files.tidy("m2") == ["m2/other.parquet.part"]
+    assert files.unfinished("m2") == ["m2/other.parquet.part"]
 
 
 def test_a_mission_is_removed_with_its_files_and_no_others(files: PingFiles) -> None:
@@ -110,3 +119,54 @@ def test_the_usual_place_is_beside_the_database(tmp_path: Path) -> None:
     assert beside.folder == tmp_path / "pings"
     assert PingFiles.beside("postgresql+asyncpg://fleet@db/fleet").folder == Path.cwd() / "pings"
     assert PingFiles.beside("sqlite+aiosqlite:///fleet.db", "memory://pings").folder is None
+
+
+@pytest.fixture
+def refusing() -> Iterator[int]:
+    """The port of an FTP server that lets nobody in."""
+
+    class Handler(FTPHandler):  # type: ignore[misc]
+        authorizer = DummyAuthorizer()
+        auth_failed_timeout = 0
+
+    loop = IOLoop()
+    server = FTPServer(("127.0.0.1", 0), Handler, ioloop=loop)
+    ended = threading.Event()
+
+    def serve() -> None:
+        while not ended.is_set():
+            loop.loop(timeout=0.05, blocking=False)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        yield server.address[1]
+    finally:
+        ended.set()
+        thread.join()
+        server.close_all()
+        loop.close()
+
+
+@pytest.mark.filterwarnings("ignore:write permissions assigned to anonymous user")
+def test_errors_of_the_library_that_reaches_files_are_told_as_such(refusing: int) -> None:
+    """That of FTP is no OSError, nor are those of object stores."""
+    files = PingFiles(f"ftp://watch:swordfish@127.0.0.1:{refusing}/pings")
+    asked: list[Callable[[], object]] = [
+        files.condemned,
+        lambda: files.names("m1"),
+        lambda: files.read(NAME, DIGEST),
+        lambda: files.write(NAME, CONTENT),
+        lambda: files.unfinished("m1"),
+    ]
+    for ask in asked:
+        with pytest.raises(
+            PingPlaceError, match=rf"at ftp://127.0.0.1:{refusing}/pings cannot be reached: 530"
+        ) as told:
+            ask()
+        assert "swordfish" not in str(told.value)
+
+
+def test_a_place_where_nobody_answers_is_told_as_such() -> None:
+    with pytest.raises(PingPlaceError, match=r"cannot be reached: .*refused"):
+        PingFiles(f"ftp://127.0.0.1:{free_ports(1)[0]}/pings").read(NAME, DIGEST)

@@ -10,7 +10,7 @@ from app.api.http.first_completed import first_of
 from app.api.http.problems import ProblemError, body_problems, problems
 from app.api.mission import Mission
 from app.api.schemas import API, MeasurementBatch, VehicleName
-from app.api.state import Service, State
+from app.api.state import Service
 from app.missions.operations.measurements import measure
 from app.missions.operations.polling import waypoint
 from app.missions.soundings.measurement import Measurement
@@ -73,7 +73,6 @@ async def get_waypoint(
     name: VehicleName,
     request: Request,
     service: Service,
-    state: State,
     vehicle: VehicleOrOperator,
     mission: Mission,
     after_step: Annotated[
@@ -92,7 +91,8 @@ async def get_waypoint(
     """Wait for the vehicle's next waypoint (long poll). Fetching a waypoint acknowledges it."""
     check_vehicle(vehicle, name)
     found: WaypointView | None = None
-    if timeout_s == 0.0 and not state.stopping.is_set():
+    stopped = service.vehicles_stopped
+    if timeout_s == 0.0 and not stopped.is_set():
         return _answer(await waypoint(mission, name, after_step=after_step))
 
     async def fetch() -> None:
@@ -103,8 +103,9 @@ async def get_waypoint(
         while (await request.receive())["type"] != "http.disconnect":
             pass
 
-    # A vehicle that left must not be taken to have acknowledged: the wait ends with its connection.
-    if await first_of(fetch(), leave(), state.stopping.wait()) == 2:
+    # A vehicle that left must not be taken to have acknowledged: the wait ends with its connection. When the service
+    # ends it goes on until those that follow were told to stop.
+    if await first_of(fetch(), leave(), stopped.wait()) == 2:
         raise ProblemError(
             "not-ready", "the service is shutting down", remedy="Ask again", headers={"Retry-After": "2"}
         )

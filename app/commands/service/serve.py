@@ -4,10 +4,13 @@ import asyncio
 import gc
 from typing import Annotated
 
+import structlog
 import typer
 
 from app.commands.command import Database, command_settings
 from app.log_choices import LogFormat, LogLevel
+
+log = structlog.get_logger(__name__)
 
 
 def serve(
@@ -24,6 +27,7 @@ def serve(
     ] = None,
     log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged [default: info]")] = None,
     log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
+    check: Annotated[bool, typer.Option("--check", help="Only read the settings, and say what is wrong.")] = False,
 ) -> None:
     """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
     settings = command_settings(
@@ -35,12 +39,18 @@ def serve(
         log_level=log_level,
         log_format=log_format,
     )
+    if check:
+        typer.echo("the settings can be used")
+        return
     from app.api import logs
     from app.compiled.cache import compile_beside
+    from app.settings import overridden
     from app.storage.upkeep.prepare import prepare_database
 
     compile_beside()
     logs.configure(settings.log_level, settings.log_format)
+    for setting, variable in overridden().items():
+        log.warning("an environment variable overrules the settings file", setting=setting, variable=variable)
     # Before the rest is loaded, which takes seconds: most starts that fail do so here.
     asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
     # What is imported stays: looking for garbage in it takes a fifth of a start, and later keeps requests waiting.

@@ -26,7 +26,7 @@ from app.missions.views.measurements.soundings import ItemVerdict, Verdict
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
 from app.storage.models import PingBlockRow, PingChunkRow
-from app.storage.ping_files import PingFileError, PingFiles, file_name
+from app.storage.ping_files import PingFileError, PingFiles, PingPlaceError, file_name
 from app.storage.queries import pings as ping_queries
 from app.storage.queries.pings import Totals
 
@@ -103,6 +103,7 @@ class PingStore:
         self._took = False
         self._moving = asyncio.Lock()
         self._mover: asyncio.Task[None] | None = None
+        self._tidying: asyncio.Task[None] | None = None
         self._not_before_s = -math.inf
 
     async def open(self, session: AsyncSession) -> Totals:
@@ -115,12 +116,40 @@ class PingStore:
         return stored
 
     async def tidy(self) -> None:
-        """Remove halves of files that a killed process left behind; only for the process that has the mission."""
+        """Remove halves of files that a killed process left behind; only for the process that has the mission.
+
+        Raises
+        ------
+        MissionElsewhereError
+            When another process has it now: then nothing is removed.
+        """
         if not self._any:
             return  # a file is made of what is stored
-        left = await asyncio.to_thread(self._files.tidy, self._mission_id)
+        async with self._moving:
+            # In this order: what another process writes once it has the mission was not found before.
+            left = await asyncio.to_thread(self._files.unfinished, self._mission_id)
+            if left:
+                async with self._database.writing():
+                    pass  # it is refused where the mission is another process's
+                await asyncio.to_thread(self._files.remove_unfinished, left)
         if left:
             log.warning("files of pings that were not written to the end are removed", files=left)
+
+    def begin_to_tidy(self) -> None:
+        """Do so beside everything else: files may be on a machine that does not answer, and vehicles do not wait."""
+        self._tidying = asyncio.create_task(self._try_to_tidy(), name=f"tidy pings of {self._mission_id}")
+
+    async def _try_to_tidy(self) -> None:
+        try:
+            await self.tidy()
+        except MissionElsewhereError:
+            pass  # nothing of it is ours to remove
+        except Exception as error:
+            log.warning(
+                "files of pings that were not written to the end stay: they could not be looked for",
+                mission=self._mission_id,
+                error=str(error),
+            )
 
     async def judge(self, reports: Sequence[PingReport]) -> JudgedBatch:
         """Return what the gate says of pings, and how they are stored; changes nothing."""
@@ -327,12 +356,17 @@ class PingStore:
 
     def abandon(self) -> None:
         """Move nothing any more: the mission is another process's."""
-        if self._mover is not None:
-            self._mover.cancel()
+        for task in (self._mover, self._tidying):
+            if task is not None:
+                task.cancel()
         self._took = False
 
     async def close(self) -> None:
-        """Move what is left to files, if anything came."""
+        """Move what is left to files, if anything came; not while those there are being looked through."""
+        if self._tidying is not None and not self._tidying.done():
+            self._tidying.cancel()
+            await asyncio.gather(self._tidying, return_exceptions=True)
+            return  # it stays in the database, and nobody waits for a machine that does not answer
         if self._mover is not None:
             await asyncio.gather(self._mover, return_exceptions=True)
         if self._took:
@@ -344,6 +378,8 @@ def _duplicate(index: int) -> ItemVerdict:
 
 
 def _unreadable(error: PingFileError) -> PingsUnreadableError:
+    if isinstance(error, PingPlaceError):
+        return PingsUnreadableError(str(error), "ask again when it answers; see that pings_url names it")
     return PingsUnreadableError(str(error), "bring the file back from a backup, or set pings_url to where it is")
 
 

@@ -60,6 +60,8 @@ class Failover:
         self._failed_s: dict[str, float] = {}
         """When a mission could not be taken up, by the fault of none but itself."""
         self._telling: set[asyncio.Task[None]] = set()
+        self._ended: list[asyncio.Task[None]] = []
+        """What was cancelled when the watch ended, and may not have ended yet."""
         self._trouble = "did not begin yet"
 
     @property
@@ -81,13 +83,17 @@ class Failover:
         else:
             taking.result()
 
-    async def end(self) -> None:
-        """Keep watch no longer."""
+    def cancel(self) -> None:
+        """Keep watch no longer and take nothing up; what is under way ends when it can."""
         watch, self._task = self._task, None
-        tasks = [task for task in (watch, self._taking, *self._telling) if task is not None]
-        for task in tasks:
+        self._ended = [task for task in (watch, self._taking, *self._telling, *self._ended) if task is not None]
+        for task in self._ended:
             task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def end(self) -> None:
+        """Keep watch no longer, and wait for what is under way."""
+        self.cancel()
+        await asyncio.gather(*self._ended, return_exceptions=True)
 
     def _begin_watch(self) -> None:
         self._task = asyncio.create_task(self._keep(), name="watch")

@@ -177,6 +177,8 @@ class MissionRegistry:
                 live.survey_late_changes(partial(self._maps.survey, live))
                 self._maps.survey(live)
             await self._taken_up(live)
+            if self._ownership is not None:
+                live.pings.begin_to_tidy()
             return live
 
     async def _complete(self, live: LiveMission, row: MissionRow) -> None:
@@ -186,8 +188,6 @@ class MissionRegistry:
         live.ships.traffic = self._traffic
         if self._compute is not None:
             live.compute_by(self._compute)
-        if self._ownership is not None:
-            await live.pings.tidy()
         await self._make_room()
 
     async def _was_removed(self, live: LiveMission) -> bool:

@@ -281,7 +281,7 @@ def _copy_sqlite(url: URL, target: Path) -> dict[str, int]:
         if "processes" in rows:
             # By the secret of a process that lives its holder could speak in anybody's name.
             copy.execute("PRAGMA secure_delete=ON")
-            copy.execute("UPDATE processes SET secret = ''")
+            copy.execute("UPDATE processes SET secret = '', certificate = NULL")
             copy.commit()
         # One file, whole in itself: no journal has to go with it.
         copy.execute("PRAGMA journal_mode=DELETE")

@@ -4,7 +4,9 @@ import asyncio
 import gzip
 import hashlib
 import os
+import platform
 import socket
+import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,8 @@ from app.missions.errors import FileTooLargeError, ImportUnavailableError, Inval
 from app.missions.operations.imports import reader_process, uploads
 from tests.support.api.rest import make_client, mission_spec, prior_text, running
 from tests.support.faults.leading_out import grids, told
+from tests.support.faults.service import service_in
+from tests.support.paths import PROJECT
 
 GRID: dict[str, Any] = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
 
@@ -46,6 +50,17 @@ async def test_no_file_brings_another_one_back(
         events = await client.get(f"{path}/events", headers={"Accept": "application/json"})
         assert not told(events.text)
     assert not told("".join(capfd.readouterr()))
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "aarch64"), reason="no list of system calls for it")
+async def test_a_filter_that_forbids_to_lock_the_reader_in_is_told_from_a_kernel_that_cannot(tmp_path: Path) -> None:
+    filtered = [sys.executable, str(PROJECT / "tests" / "support" / "faults" / "forbidding.py")]
+    async with service_in(tmp_path, prefix=filtered) as (_, api):
+        path = f"/missions/{(await api.post('/missions', json=mission_spec())).json()['id']}"
+        answer = await api.post(f"{path}/imports", content=b"-8.7049 41.1851 5\n", params=GRID | {"filename": "a.xyz"})
+        assert answer.status_code == 503, answer.text
+        assert "the service is forbidden to use Landlock and seccomp" in answer.json()["detail"]
+        assert "SystemCallFilter=" in answer.json()["remedy"]
 
 
 async def test_what_a_file_says_is_not_quoted(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

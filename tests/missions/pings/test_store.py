@@ -201,7 +201,7 @@ async def test_a_kill_while_pings_are_moved_loses_and_doubles_nothing(
     opened, counts = await open_store(database, files)
     assert (counts.pings, counts.rejected_pings) == (20, 0)
     assert await times_of(opened) == {"a": times(*range(20))}
-    assert files.tidy("m1") == [], "no half is left"
+    assert files.unfinished("m1") == [], "no half is left"
     taken = await take(opened, database, [ping(number) for number in range(25)])
     assert taken.totals.pings == 5
     await opened.close()

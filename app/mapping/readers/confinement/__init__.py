@@ -4,6 +4,13 @@ Each layer holds where another has a hole or the kernel lacks it: Landlock (file
 (system calls), namespaces (network), limits (memory, time, processes).
 """
 
-from app.mapping.readers.confinement.sandbox import LAYERS, ResourceLimits, confine, limit
+from app.mapping.readers.confinement.sandbox import (
+    FORBIDDEN,
+    LAYERS,
+    LOCKING_CALLS,
+    ResourceLimits,
+    confine,
+    limit,
+)
 
-__all__ = ["LAYERS", "ResourceLimits", "confine", "limit"]
+__all__ = ["FORBIDDEN", "LAYERS", "LOCKING_CALLS", "ResourceLimits", "confine", "limit"]

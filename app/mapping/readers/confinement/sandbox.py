@@ -1,6 +1,7 @@
 """The layers in their order."""
 
 import contextlib
+import errno
 import os
 import resource
 import signal
@@ -20,6 +21,11 @@ from app.mapping.readers.confinement.kernel import (
 
 LAYERS = ("namespaces", "landlock", "seccomp")
 """What a kernel may lack. Limits and lost privileges are had everywhere."""
+
+LOCKING_CALLS = ("landlock_create_ruleset", "landlock_add_rule", "landlock_restrict_self", "seccomp")
+"""System calls by which the process locks itself in: a filter that it is started under has to allow them."""
+FORBIDDEN = "a filter of system calls forbids it"
+"""Why a layer does not hold that the kernel may well have."""
 
 _NEW_USER, _NEW_NETWORK, _NEW_IPC = 0x10000000, 0x40000000, 0x08000000
 MAX_DESCRIPTORS = 64
@@ -97,7 +103,9 @@ def _put_on(layer: str, readable: Sequence[Path], *, told_apart: bool) -> str:
             # Without Landlock no file can be told from another: then none is opened at all.
             system_calls.restrict(opening=told_apart)
     except OSError as error:
-        return error.strerror or type(error).__name__
+        # What the kernel lacks is ENOSYS, or EOPNOTSUPP where it is switched off.
+        filtered = error.errno == errno.EPERM and layer != "namespaces"
+        return FORBIDDEN if filtered else error.strerror or type(error).__name__
     return ""
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import app
+from app.mapping.readers.confinement import FORBIDDEN, LOCKING_CALLS
 from app.mapping.readers.types import (
     MAX_CORNERS,
     MAX_DEPTH_M,
@@ -205,6 +206,12 @@ class Reader:
         if answer is None:
             raise _broken_off()
         self._note(answer.confined)
+        if code == UNCONFINED and FORBIDDEN in answer.confined.values():
+            calls = " ".join(LOCKING_CALLS)
+            raise ImportUnavailableError(
+                "the service is forbidden to use Landlock and seccomp: nothing would keep a file from reading others",
+                f"allow it these system calls, in a unit of systemd by a line SystemCallFilter={calls}",
+            )
         if code == UNCONFINED:
             raise ImportUnavailableError(
                 "this system has neither Landlock nor seccomp, so nothing would keep a file from reading others",

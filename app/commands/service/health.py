@@ -1,0 +1,53 @@
+"""The command that asks the service of these settings how it is, for whoever watches over it."""
+
+import ipaddress
+from typing import Annotated
+
+import typer
+
+from app.commands.command import CommandError, command_settings
+
+PATIENCE_S = 4.0
+
+
+def health(
+    ready: Annotated[
+        bool, typer.Option("--ready", help="Ask whether it can do its work, not only whether it lives.")
+    ] = False,
+    host: Annotated[str | None, typer.Option(help="Address that it listens on [default: as for serve]")] = None,
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="Its TCP port [default: as for serve]")] = None,
+) -> None:
+    """Ask the service that runs here with these settings how it is.
+
+    Exit code 1 when it does not answer, or is not well.
+    """
+    settings = command_settings(host=host, port=port)
+    import httpx
+
+    if settings.port == 0:
+        raise CommandError("port is 0: any free one, which is not known here", "Name it with --port")
+    url = f"{'http' if settings.tls_certificate is None else 'https'}://{_reached(settings.host)}:{settings.port}"
+    try:
+        # The certificate is for the name by which others reach the service. A proxy has no part in this.
+        with httpx.Client(verify=False, trust_env=False, timeout=PATIENCE_S) as client:  # noqa: S501
+            answer = client.get(f"{url}/health/{'ready' if ready else 'live'}")
+            said = answer.json()
+    except httpx.HTTPError as error:
+        raise CommandError(f"{url} does not answer: {error}", "Is the service running with these settings?") from None
+    except ValueError:
+        raise CommandError(f"{url} answers, but not as bathyfleet does", "Is the port another program's?") from None
+    components = ", ".join(f"{name} {state}" for name, state in said.get("components", {}).items())
+    if not answer.is_success:
+        raise CommandError(f"{url} is not well: {components or answer.status_code}")
+    typer.echo(f"{url} is well{f': {components}' if components else ''}")
+
+
+def _reached(host: str) -> str:
+    """Return where a service that listens on an address is reached from its own machine, as in a URL."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    if address.is_unspecified:
+        address = ipaddress.ip_address("::1" if address.version == 6 else "127.0.0.1")
+    return f"[{address}]" if address.version == 6 else str(address)
