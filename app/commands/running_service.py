@@ -73,7 +73,7 @@ def own_url(settings: "Settings") -> str:
     Raises CommandError where it takes any free port, which nobody knows beforehand.
     """
     if settings.port == 0:
-        raise CommandError("port is 0: any free one, which is not known here", "Name the service with --url")
+        raise CommandError("port is 0: any free one, which is not known here", "Name it with --url, or --port")
     host = settings.host
     try:
         address = ipaddress.ip_address(host)

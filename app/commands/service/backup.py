@@ -92,7 +92,7 @@ def prune(
     settings = command_settings(database_url=database)
     check_database(settings)
     from app.storage.database import Database as Store
-    from app.storage.ping_files import PingFiles
+    from app.storage.ping_files import PingFiles, PingPlaceError
     from app.storage.upkeep import retention
     from app.storage.upkeep.prepare import prepare_database
 
@@ -116,7 +116,10 @@ def prune(
 
     from imc_bridge.printable import printable
 
-    missions, unlisted, note = asyncio.run(run())
+    try:
+        missions, unlisted, note = asyncio.run(run())
+    except PingPlaceError as error:
+        raise CommandError(str(error), "Is pings_url right? Run it again when that place answers") from None
     for mission in missions:
         typer.echo(
             f"{mission.id}  ended {mission.ended:%Y-%m-%d}  {mission.soundings} soundings  {printable(mission.name)}"

@@ -1,11 +1,11 @@
 """The command that asks the service of these settings how it is, for whoever watches over it."""
 
-import ipaddress
 from typing import Annotated
 
 import typer
 
 from app.commands.command import CommandError, command_settings
+from app.commands.running_service import own_url
 
 PATIENCE_S = 4.0
 
@@ -24,9 +24,7 @@ def health(
     settings = command_settings(host=host, port=port)
     import httpx
 
-    if settings.port == 0:
-        raise CommandError("port is 0: any free one, which is not known here", "Name it with --port")
-    url = f"{'http' if settings.tls_certificate is None else 'https'}://{_reached(settings.host)}:{settings.port}"
+    url = own_url(settings)
     try:
         # The certificate is for the name by which others reach the service. A proxy has no part in this.
         with httpx.Client(verify=False, trust_env=False, timeout=PATIENCE_S) as client:  # noqa: S501
@@ -40,14 +38,3 @@ def health(
     if not answer.is_success:
         raise CommandError(f"{url} is not well: {components or answer.status_code}")
     typer.echo(f"{url} is well{f': {components}' if components else ''}")
-
-
-def _reached(host: str) -> str:
-    """Return where a service that listens on an address is reached from its own machine, as in a URL."""
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return host
-    if address.is_unspecified:
-        address = ipaddress.ip_address("::1" if address.version == 6 else "127.0.0.1")
-    return f"[{address}]" if address.version == 6 else str(address)
