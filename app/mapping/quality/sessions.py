@@ -17,6 +17,9 @@ SAME_MOMENT_M = 15.0
 FASTEST_MPS, UNCERTAIN_M = 10.0, 5.0
 """No vehicle goes faster, in whatever current, beside so many metres by which its position may change at a fix."""
 
+LATE_S = 10.0
+"""Soundings come out of order by so much, as of several beams: no clock is taken to have been set back by less."""
+
 LEAST_S = 30.0
 
 NEXT_OF_USUAL = 5.0
@@ -39,17 +42,53 @@ def sessions(time_s: FloatArray, east_m: FloatArray, north_m: FloatArray) -> lis
     east_m, north_m : (n,)
     """
     place = np.column_stack([east_m, north_m])
-    begins = np.flatnonzero(np.diff(time_s) < 0.0) + 1
-    found: list[IntArray] = []
-    for run in np.split(np.arange(len(time_s)), begins):
+    found: list[_Session] = []
+    for run in np.split(np.arange(len(time_s)), _set_back(time_s)):
+        run = run[np.argsort(time_s[run], kind="stable")]
         for number in range(len(found) - 1, max(len(found) - MOST, 0) - 1, -1):
             if _continues(found[number], run, time_s, place, newest=number == len(found) - 1):
-                both = np.concatenate([found[number], run])
-                found[number] = both[np.argsort(time_s[both], kind="stable")]
+                found[number].add(run, time_s[run])
                 break
         else:
             if len(run):
-                found.append(run)
+                found.append(_Session(run, time_s[run]))
+    return [session.rows for session in found]
+
+
+class _Session:
+    """Rows in the order of time, and their times, with room for more: soundings may come in many small parts."""
+
+    def __init__(self, rows: IntArray, times: FloatArray) -> None:
+        self._rows, self._times, self._size = rows.copy(), times.copy(), len(rows)
+
+    @property
+    def rows(self) -> IntArray:
+        return self._rows[: self._size]
+
+    @property
+    def times(self) -> FloatArray:
+        return self._times[: self._size]
+
+    def add(self, rows: IntArray, times: FloatArray) -> None:
+        """Put further rows in; both are in the order of time."""
+        size = self._size + len(rows)
+        if size > len(self._rows):
+            self._rows, self._times = np.resize(self._rows, 2 * size), np.resize(self._times, 2 * size)
+        begin = int(np.searchsorted(self.times, times[0]))
+        late_rows = np.concatenate([self.rows[begin:], rows])
+        late_times = np.concatenate([self.times[begin:], times])
+        order = np.argsort(late_times, kind="stable")
+        self._rows[begin:size], self._times[begin:size], self._size = late_rows[order], late_times[order], size
+
+
+def _set_back(time_s: FloatArray) -> list[int]:
+    """Return the rows (k,) at which the clock may have been set back: some before them are later by ``LATE_S``."""
+    found, latest_s = list[int](), -np.inf
+    for row in np.flatnonzero(np.diff(time_s) < 0.0) + 1:
+        latest_s = max(latest_s, time_s[row - 1])
+        if time_s[row] < latest_s - LATE_S:
+            found.append(int(row))
+            latest_s = -np.inf
     return found
 
 
@@ -76,15 +115,15 @@ def set_back_s(time_s: FloatArray, east_m: FloatArray, north_m: FloatArray) -> f
     return most_s
 
 
-def _continues(session: IntArray, run: IntArray, time_s: FloatArray, place_m: FloatArray, *, newest: bool) -> bool:
+def _continues(session: _Session, run: IntArray, time_s: FloatArray, place_m: FloatArray, *, newest: bool) -> bool:
     """Return whether a run of soundings lies on the way of a session, or before or after it."""
-    times, of_run = time_s[session], time_s[run]
+    rows, times, of_run = session.rows, session.times, time_s[run]
     if of_run[0] >= times[-1]:
-        return newest or _follows(session[-MOST:], run[:MOST], time_s, place_m)
+        return newest or _follows(rows[-MOST:], run[:MOST], time_s, place_m)
     if of_run[-1] <= times[0]:
-        return _follows(run[-MOST:], session[:MOST], time_s, place_m)
+        return _follows(run[-MOST:], rows[:MOST], time_s, place_m)
     # Of both what lies at the same times, and one more on either side.
-    known = session[
+    known = rows[
         max(int(np.searchsorted(times, of_run[0])) - 1, 0) : int(np.searchsorted(times, of_run[-1], "right")) + 1
     ]
     low, high = int(np.searchsorted(of_run, times[0])), int(np.searchsorted(of_run, times[-1], "right"))
