@@ -297,8 +297,12 @@ class Server(uvicorn.Server):
 
     def stop(self) -> None:
         """Answer what is open, close every stream and end."""
-        self._app.state.edge.stopping.set()
+        self._begin_to_end()
         self.should_exit = True
+
+    def _begin_to_end(self) -> None:
+        self._app.state.edge.stopping.set()
+        self._app.state.edge.service.begin_no_more()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begin to answer."""
@@ -313,7 +317,7 @@ class Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """End on the first signal; a second Ctrl-C waits for no open request."""
-        self._app.state.edge.stopping.set()
+        self._begin_to_end()
         super().handle_exit(sig, frame)
 
     @contextmanager

@@ -207,9 +207,13 @@ class MissionService:
         except Exception as error:
             log.warning("files of pings of removed missions stay: they could not be looked for", error=str(error))
 
+    def begin_no_more(self) -> None:
+        """Refuse to start and resume missions from now on: the vehicles are about to be stopped."""
+        self._started, self._ending = False, True
+
     async def stop_vehicles(self) -> None:
         """Stop every vehicle, before anything else is waited for, and begin no flight any more."""
-        self._started, self._ending = False, True
+        self.begin_no_more()
         self._failover.cancel()
         flying = [live for live in self._registry if live.id in self._runs]
         halted = await asyncio.gather(*map(self._supervisor.halt, flying), return_exceptions=True)
