@@ -4,7 +4,7 @@ import difflib
 import itertools
 import math
 import types
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -98,11 +98,8 @@ def field_problem(
     if kind in _BOUNDS:
         expected = _BOUNDS[kind].format_map(error.get("ctx", {}))
     elif kind == "extra_forbidden":
-        known = sorted(_fields_at(model, path[:-1]))
-        name = str(path[-1])
-        close = difflib.get_close_matches(name, known, n=1) if known and len(name) <= MAX_SUGGESTED else []
         message = "There is no such field"
-        expected = f"{SUGGESTION} {close[0]}?" if close else "one of " + ", ".join(known) if known else "no such field"
+        expected = suggestion(str(path[-1]), _fields_at(model, path[:-1])) or "no such field"
     elif kind == "value_error":
         # The validators' own messages end with what would be right.
         head, separator, tail = message.rpartition(": ")
@@ -116,6 +113,13 @@ def field_problem(
         message=shortened(message),
         expected=shortened(expected),
     )
+
+
+def suggestion(name: str, known: Collection[str]) -> str:
+    """Return which of the ``known`` names ``name`` was meant for, or else all of them; nothing without any."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1) if names and len(name) <= MAX_SUGGESTED else []
+    return f"{SUGGESTION} {close[0]}?" if close else "one of " + ", ".join(names) if names else ""
 
 
 def _fields_at(annotation: object, path: Sequence[str | int]) -> set[str]:
