@@ -43,6 +43,7 @@ REQUESTS: list[tuple[str, str, dict[str, Any]]] = [
     # What a route does not know is refused the same way.
     ("GET", "/missions?all=1", {}),
     ("POST", "/missions/{id}/start?dry_run=true", {}),
+    ("POST", "/missions/{id}/start", {"headers": {"Idempotency-Key": "a"}}),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Parameters of the query that a route does not know are refused, with what was meant."""
+"""What a route does not know is refused: parameters of the query, and an `Idempotency-Key` without effect."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ import pytest
 from app.api.access.address_key import UNNAMED
 from app.main import Server, create_app
 from app.settings import Settings
-from tests.support.api.rest import Guarded, soundings
+from tests.support.api.rest import Guarded, mission_spec, soundings
 
 INVALID = "urn:bathyfleet:problem:invalid-request"
 
@@ -77,6 +77,28 @@ async def test_a_step_that_was_not_flown_and_a_stranger_s_soundings_are_none(
     stranger = await client.get(f"{path}/soundings?vehicle=nobody")
     assert (stranger.status_code, stranger.json()["type"]) == (404, "urn:bathyfleet:problem:vehicle-not-found")
     assert "rover" in stranger.json()["remedy"]
+
+
+async def test_an_idempotency_key_without_effect_is_refused(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    key = {"Idempotency-Key": "a-1"}
+    path = f"/missions/{mission['id']}"
+    before = len((await client.get("/missions")).json())
+    for target, body in (
+        ("/missions", mission_spec()),
+        ("/sites", {"name": "Quay"}),
+        (f"{path}/notes", {"text": "Ferry"}),
+        (f"{path}/vehicles", {"name": "second"}),
+        (f"{path}/vehicles/rover/go", {"position": [-8.7046, 41.1853]}),
+        (f"{path}/start", None),
+    ):
+        answer = await client.post(target, json=body, headers=key)
+        assert (answer.status_code, answer.json()["type"]) == (400, "urn:bathyfleet:problem:invalid-parameter"), target
+        assert "Idempotency-Key" in answer.json()["detail"]
+    assert len((await client.get("/missions", headers=key)).json()) == before
+    for _ in range(2):
+        answer = await client.post(f"{path}/measurements", json={"items": soundings(2)}, headers=key)
+        assert answer.status_code == 200
+    assert answer.json()["replayed"]
 
 
 def test_the_document_tells_that_every_operation_may_refuse_parameters() -> None:

@@ -7829,7 +7829,7 @@ export interface operations {
                     "application/json": components["schemas"]["MissionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8215,7 +8215,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8341,7 +8341,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8467,7 +8467,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8593,7 +8593,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8719,7 +8719,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9057,7 +9057,7 @@ export interface operations {
                     "application/json": components["schemas"]["EventView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9172,6 +9172,15 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -9249,6 +9258,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -9330,6 +9348,15 @@ export interface operations {
                     "application/json": components["schemas"]["MissionView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -9407,6 +9434,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -9490,7 +9526,7 @@ export interface operations {
                     "application/json": components["schemas"]["MissionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9612,6 +9648,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -9829,7 +9874,7 @@ export interface operations {
                     "application/json": components["schemas"]["SiteView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10702,7 +10747,7 @@ export interface operations {
                     "application/json": components["schemas"]["ForecastView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10810,7 +10855,7 @@ export interface operations {
                     "application/json": components["schemas"]["ForecastView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10918,7 +10963,7 @@ export interface operations {
                     "application/json": components["schemas"]["PlanView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11955,7 +12000,7 @@ export interface operations {
                     "application/json": components["schemas"]["AdjustmentView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12251,7 +12296,7 @@ export interface operations {
                     "application/json": components["schemas"]["ImportView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12712,7 +12757,7 @@ export interface operations {
                     "application/json": components["schemas"]["ProposedZonesView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14492,7 +14537,7 @@ export interface operations {
                     "application/json": components["schemas"]["RulingsView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14618,7 +14663,7 @@ export interface operations {
                     "application/json": components["schemas"]["RulingsView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14746,7 +14791,7 @@ export interface operations {
                     "application/json": components["schemas"]["SoundingView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14874,7 +14919,7 @@ export interface operations {
                     "application/json": components["schemas"]["SoundingView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15300,7 +15345,7 @@ export interface operations {
                     "application/json": components["schemas"]["BatchVerdict"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15970,7 +16015,7 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16094,6 +16139,15 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -16177,7 +16231,7 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16303,7 +16357,7 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16489,7 +16543,7 @@ export interface operations {
                     "application/json": components["schemas"]["AlarmReport"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16659,6 +16713,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AlarmReport"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -16856,6 +16919,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["SessionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
