@@ -4,16 +4,15 @@ An unknown query parameter that went unnoticed could have been meant to keep som
 `Idempotency-Key` that has no effect lets an order that is sent again happen twice.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 
-from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
-from pydantic import BaseModel
 from starlette.requests import Request
 
 from app.api.access.auth import RoleCheck
 from app.api.http.field_problems import MAX_ERRORS, invalid, plain, shortened, suggestion
 from app.api.http.problems import FieldProblem, Problem, ProblemError
+from app.api.http.route_parameters import parts_of, query_names
 from app.api.schemas import API
 from app.api.state import edge_state
 
@@ -24,11 +23,11 @@ class KnownParameters:
     """What a route of the REST interface takes in its query, and whether it takes an `Idempotency-Key`."""
 
     def __init__(self, route: APIRoute) -> None:
-        parts = list(_parts(route.dependant))
+        parts = list(parts_of(route.dependant))
         # The standards' own interfaces have rules of their own for parameters.
         self._of_rest = route.path.startswith(API)
         self._role = next((part.call for part in parts if isinstance(part.call, RoleCheck)), None)
-        self._query = {name for part in parts for name in _query_names(part)}
+        self._query = query_names(route.dependant)
         headers = {field.alias.lower() for part in parts for field in part.header_params}
         self._ignores_keys = "POST" in (route.methods or ()) and IDEMPOTENCY_KEY not in headers
 
@@ -66,19 +65,3 @@ class KnownParameters:
             for name in list(names)[:MAX_ERRORS]
         ]
         return invalid(errors, len(names), request.scope)
-
-
-def _parts(dependant: Dependant) -> Iterator[Dependant]:
-    """Return an endpoint's own parameters and those of everything that it depends on."""
-    yield dependant
-    for part in dependant.dependencies:
-        yield from _parts(part)
-
-
-def _query_names(dependant: Dependant) -> Iterator[str]:
-    for field in dependant.query_params:
-        annotation = field.field_info.annotation
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            yield from (one.alias or name for name, one in annotation.model_fields.items())
-        else:
-            yield field.alias

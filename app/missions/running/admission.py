@@ -140,8 +140,8 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
         try:
             spec.check_recovery_point(name, vehicle.recovery_point)
         except ValueError as error:
-            words = str(error).removeprefix(name).strip()
-            raise InvalidRequestError(name, words, "give [longitude, latitude] of a place near the area") from None
+            words, _, advice = str(error).removeprefix(name).strip().partition(": ")
+            raise InvalidRequestError(name, words, advice) from None
     taken = {name for target in spec.targets for name in (target.name, target.called)}
     if vehicle.name in taken:
         raise InvalidRequestError(

@@ -9,6 +9,10 @@ from shapely.validation import explain_validity
 
 from app.arrays import FloatArray
 
+NOT_BLANK = r"\S"
+SHOWN_PATTERN = r"^[^\r\n]*\S[^\r\n]*$"
+"""Something to be seen, in one line: names are subjects of messages and headings of reports."""
+
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
 Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
@@ -17,13 +21,23 @@ ShownName = Annotated[
     Field(
         min_length=1,
         max_length=120,
-        # Something to be seen, in one line: names are subjects of messages and headings of reports.
-        pattern=r"^[^\r\n]*\S[^\r\n]*$",
+        pattern=SHOWN_PATTERN,
         description="Shown to people; need not be unique",
     ),
 ]
 
 MAX_POSITIONS = 1000
+
+
+class FieldError(ValueError):
+    """What is wrong with one field beside others.
+
+    ``field`` is its path from the model that says so, for example ``recovery.point``.
+    """
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(message)
+        self.field = field
 
 
 class Model(BaseModel):
