@@ -58,8 +58,28 @@ class MissionKind(StrEnum):
 class PlannerSpec(Model):
     """Which planner decides, and its options."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _options_are_a_planner_s(cls, data: Any) -> Any:
+        """Say of an option that there is none of which there are, in this planner."""
+        options = data.get("options") if isinstance(data, dict) else None
+        unknown = [n for n in options if n not in PlannerOptions.model_fields] if isinstance(options, dict) else []
+        if unknown:
+            # Needed for words only: it brings all planners along.
+            from app.exploration.planners import COVERERS, PLANNERS, SEARCHERS, options_of
+
+            name = data.get("name", DEFAULT_PLANNER)
+            known = SEARCHERS | COVERERS | PLANNERS
+            if isinstance(name, str) and name in known:
+                has = ", ".join(sorted(options_of(known[name])))
+                words = f"planner {name!r} has no option {str(unknown[0])[:40]!r}: its options are {has}"
+                raise FieldError(f"options.{unknown[0]}", words)
+        return data
+
     name: str = Field(default=DEFAULT_PLANNER, description="One of the planners of GET /api/v1/planners")
-    options: PlannerOptions = Field(default_factory=PlannerOptions, description="Its settings")
+    options: PlannerOptions = Field(
+        default_factory=PlannerOptions, description="Its settings: those that GET /api/v1/planners lists for it"
+    )
 
 
 HALF_ROUND_DEG = 180.0

@@ -265,6 +265,13 @@ async def test_an_unknown_planner_names_those_there_are(client: httpx.AsyncClien
     assert "cao" in problem["remedy"]
 
 
+async def test_an_option_that_there_is_none_of_names_those_of_its_planner(client: httpx.AsyncClient) -> None:
+    answer = await client.post("/missions", json=mission_spec(planner={"name": "lawnmower", "options": {"gap_m": 5}}))
+    [error] = assert_problem(answer, 422, "invalid-request")["errors"]
+    assert (error["field"], error["value"]) == ("planner.options.gap_m", 5)
+    assert error["expected"] == "its options are cruise_depth_m, turn_radius_m"
+
+
 async def test_a_move_that_is_not_allowed_says_what_to_do(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
     problem = assert_problem(await client.post(f"/missions/{mission['id']}/pause"), 409, "move-refused")
     assert problem["detail"] == "cannot pause a mission that is ready; allowed from: running"

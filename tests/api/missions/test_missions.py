@@ -108,6 +108,9 @@ async def test_vehicles_and_planners_are_listed(client: httpx.AsyncClient, missi
     planners = {p["name"]: p for p in (await client.get("/planners")).json()}
     assert {"cao", "random", "lawnmower"} <= set(planners)
     assert planners["cao"]["options"]["type"] == "object"
+    assert set(planners["lawnmower"]["options"]["properties"]) == {"cruise_depth_m", "turn_radius_m"}
+    assert "rollouts" in planners["rollout"]["options"]["properties"]
+    assert "rollouts" not in planners["cao"]["options"]["properties"]
 
 
 async def test_a_mission_is_as_long_as_its_minutes_and_keeps_both_figures(client: httpx.AsyncClient) -> None:

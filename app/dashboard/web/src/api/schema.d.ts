@@ -4572,7 +4572,7 @@ export interface components {
         };
         /**
          * PlannerOptions
-         * @description Settings of the planners. Every planner reads those that concern it.
+         * @description Settings of the planners; each reads those that GET /api/v1/planners lists for it.
          */
         PlannerOptions: {
             /**
@@ -4680,7 +4680,7 @@ export interface components {
              * @default cao
              */
             name: string;
-            /** @description Its settings */
+            /** @description Its settings: those that GET /api/v1/planners lists for it */
             options?: components["schemas"]["PlannerOptions"];
         };
         /**
