@@ -13994,7 +13994,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.geojson`: the vehicles' tracks with times and depths; `.kml`: the vehicles' tracks; `.gpx`: the vehicles' tracks with times and depths */
+            /** @description `.geojson`: the vehicles' tracks with times and depths; `.kml`: the vehicles' tracks with times and depths; `.gpx`: the vehicles' tracks with times and depths */
             200: {
                 headers: {
                     [name: string]: unknown;
