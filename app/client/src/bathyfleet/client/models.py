@@ -1310,7 +1310,9 @@ class PointView(Model):
 
 
 class PolygonGeometry(Model):
-    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
+    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes. A Feature of one and a
+    MultiPolygon of one part are taken as that polygon; heights are left out.
+    """
 
     coordinates: list[list[tuple[float, float]]]
     """One ring of [longitude, latitude]; the last position repeats the first"""

@@ -4730,6 +4730,8 @@ export interface components {
         /**
          * PolygonGeometry
          * @description A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes.
+         *
+         *     A Feature of one and a MultiPolygon of one part are taken as that polygon; heights are left out.
          */
         PolygonGeometry: {
             /**
