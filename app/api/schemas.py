@@ -22,7 +22,7 @@ from app.api.http.problems import FieldProblem
 from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
 from app.missions.soundings.measurement import Measurement
-from app.missions.spec.base import Name
+from app.missions.spec.base import NOT_BLANK, Name
 from app.missions.spec.site import SiteId
 
 API = "/api/v1"
@@ -86,7 +86,7 @@ class NoteRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"text": "Ferry passes at 14:10"}]})
 
-    text: str = Field(min_length=1, max_length=2000, pattern=r"\S", description="Kept in the mission's log")
+    text: str = Field(min_length=1, max_length=2000, pattern=NOT_BLANK, description="Kept in the mission's log")
 
 
 Item = TypeVar("Item", Measurement, Scan)

@@ -17,7 +17,7 @@ from app.exploration.lines.formation import FormationLawnmower
 from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.pcao.planner import PcaoPlanner
 from app.exploration.planner.base import PlannerBase
-from app.exploration.planner.options import PlannerOptions
+from app.exploration.planner.options import OF_EVERY_PLANNER, PlannerOptions
 from app.exploration.planner.random_walk import RandomPlanner
 from app.exploration.rollout.planner import RolloutPlanner
 from app.exploration.site_search import SearchTask
@@ -85,6 +85,13 @@ def create_planner(
     if planner is RolloutPlanner and not isinstance(sensor, RangeSensor):
         return CaoPlanner(options, sensor)
     return planner(options, sensor)
+
+
+def options_of(planner: type[PlannerBase]) -> frozenset[str]:
+    """Return the options that a planner reads: all of them where its class does not say."""
+    # What a planner of another package inherits says nothing about what it reads itself.
+    own: frozenset[str] | None = vars(planner).get("own_options")
+    return frozenset(PlannerOptions.model_fields) if own is None else own | OF_EVERY_PLANNER
 
 
 def missing(name: str) -> str:

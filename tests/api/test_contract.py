@@ -34,7 +34,8 @@ from tests.support.api.rest import mission_spec, running_in_thread, soundings
 from tests.support.storage.databases import Databases
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
-# what they are called, profiles go down, times go on, there is such a site, there is a reference grid to differ from.
+# what they are called, profiles go down, times go on, steps were flown, there is such a site, there is a reference grid
+# to differ from.
 BEYOND_THE_SCHEMA = {
     "changeSite",
     "createMission",
@@ -47,6 +48,7 @@ BEYOND_THE_SCHEMA = {
     "getMap",
     "getMapOverlay",
     "getMapFile",
+    "getMapTiles",
     "getProfile",
     "getSoundingsFile",
     "getTracksFile",

@@ -111,8 +111,8 @@ LINE = ring((0, 0), (10, 0), (30, 0), (0, 0))
             "at most 1",
             "",
         ),
-        ({"area": rectangle(0, 0, 3, 30)}, "", "3.0 m x 30.0 m", "make cell_m smaller"),
-        ({"area": rectangle(0, 0, 9000, 9000)}, "", "cells", "make cell_m larger or the area smaller"),
+        ({"area": rectangle(0, 0, 3, 30)}, "", "3.0 m x 30.0 m", "make cell_m at most 1.5"),
+        ({"area": rectangle(0, 0, 9000, 9000)}, "", "cells", "make cell_m at least"),
         (
             {"area": {"type": "Polygon", "coordinates": [[[-80, 0], [80, 0], [80, 1], [-80, 0]]]}},
             "",

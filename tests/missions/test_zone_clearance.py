@@ -103,7 +103,7 @@ def zoned(planner: str, **changes: Any) -> MissionSpec:
         **changes,
         keep_out=[rectangle(45, 45, 60, 60)],
         limits={"max_step_m": 12.0, "max_depth_m": 20.0, "keep_out_margin_m": 5.0},
-        planner={"name": planner, "options": {"candidates": 20, "search": 100}},
+        planner={"name": planner, "options": {"candidates": 20, "search": 100} if planner == "cao" else {}},
     )
 
 

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from starlette.responses import Response
 from starlette.types import Scope
 
+from app.api.http.error_handlers import SENT
 from app.api.http.field_problems import invalid, validation_problem
 from app.api.http.json_text import (
     Bounds,
@@ -26,6 +27,9 @@ from app.api.http.problems import FieldProblem, Problem, instance_of, make_probl
 
 IN_THREAD_BYTES = 32_768
 """Longer bodies are read and checked in a thread."""
+
+SHOWN_BYTES = 131_072
+"""Longer bodies are not kept beside what is made of them, to show what was sent."""
 
 # One after the other: what a body becomes takes many times its memory.
 _reader = ThreadPoolExecutor(1, thread_name_prefix="bodies")
@@ -66,6 +70,8 @@ class JsonRoute(APIRoute):
                     parsed["items"][int(path[1])] = Unreadable(words)
             if parsed is None:
                 return None, None
+            if len(body) <= SHOWN_BYTES:
+                scope.setdefault("state", {})[SENT] = parsed
             value, errors = field.validate(parsed, {}, loc=("body",))
             return value, validation_problem(errors, model, scope) if errors else None
 

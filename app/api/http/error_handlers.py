@@ -5,13 +5,15 @@ from http import HTTPStatus
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.types import Scope
 
-from app.api.http.field_problems import plain, shortened, validation_problem
+from app.api.http.field_problems import plain, shortened, validation_problem, value_at
 from app.api.http.problems import FieldProblem, Problem, ProblemError, instance_of, make_problem, problem_response
+from app.api.http.route_parameters import query_names
 from app.missions.errors import (
     AlarmNotFoundError,
     ConflictError,
@@ -37,6 +39,9 @@ from app.missions.states import MoveRefusedError
 from app.storage.db_errors import trouble_of
 
 RETRY_AFTER_S = 5
+
+SENT = "sent"
+"""Of a request's state: the JSON of its body, where one was read and is not long."""
 
 KINDS: dict[type[MissionError], str] = {
     AlarmNotFoundError: "alarm-not-found",
@@ -110,7 +115,7 @@ def _mission_problem(request: Request, error: MissionError) -> Response:
             FieldProblem(
                 location=_location_of(request, error.field),
                 field=error.field,
-                value=None,  # it may name what is on this machine
+                value=plain(_sent(request, error.field)),
                 message=shortened(detail),
                 expected=shortened(remedy),
             )
@@ -121,10 +126,19 @@ def _mission_problem(request: Request, error: MissionError) -> Response:
 
 
 def _location_of(request: Request, field: str) -> str:
-    """Return where a field was sent."""
+    """Return where a field was sent, or was to be."""
+    if field in request.path_params:
+        return "path"
+    route = request.scope.get("route")
+    known = query_names(route.dependant) if isinstance(route, APIRoute) else ()
+    return "query" if field in request.query_params or field in known else "body"
+
+
+def _sent(request: Request, field: str) -> object:
+    """Return what was sent for a field; None where that is not known."""
     if field in request.query_params:
-        return "query"
-    return "path" if field in request.path_params else "body"
+        return request.query_params[field]
+    return value_at(request.scope.get("state", {}).get(SENT), field.split("."))
 
 
 def _validation_problem(request: Request, error: RequestValidationError) -> Response:

@@ -4,12 +4,13 @@ import difflib
 import itertools
 import math
 import types
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
 from app.api.http.problems import FieldProblem, Problem, instance_of, make_problem
+from app.missions.spec.base import NOT_BLANK, SHOWN_PATTERN, FieldError
 
 T = TypeVar("T")
 
@@ -63,6 +64,13 @@ _BOUNDS = {
 }
 
 
+_PATTERNS = {
+    SHOWN_PATTERN: ("It is blank or has several lines", "one line of text that is not blank"),
+    NOT_BLANK: ("It is blank", "text that is not blank"),
+}
+"""What is wrong with texts that do not match, and what would be right."""
+
+
 def validation_problem(entries: Sequence[Mapping[str, Any]], body_model: object, scope: Mapping[str, Any]) -> Problem:
     """Explain errors of pydantic, the first :data:`MAX_ERRORS` of them; ``body_model`` is what the body should be."""
     listed = [
@@ -94,15 +102,18 @@ def field_problem(
 ) -> FieldProblem:
     """Explain one error of pydantic; ``model`` is the annotation that ``path`` starts from, for suggestions."""
     kind = error["type"]
+    reason, value = error.get("ctx", {}).get("error"), error.get("input")
+    if isinstance(reason, FieldError):
+        inner = reason.field.split(".")
+        path, value = [*path, *inner], value_at(value, inner)
     message = str(error["msg"]).removeprefix("Value error, ")
-    if kind in _BOUNDS:
+    if kind == "string_pattern_mismatch" and error.get("ctx", {}).get("pattern") in _PATTERNS:
+        message, expected = _PATTERNS[error["ctx"]["pattern"]]
+    elif kind in _BOUNDS:
         expected = _BOUNDS[kind].format_map(error.get("ctx", {}))
     elif kind == "extra_forbidden":
-        known = sorted(_fields_at(model, path[:-1]))
-        name = str(path[-1])
-        close = difflib.get_close_matches(name, known, n=1) if known and len(name) <= MAX_SUGGESTED else []
         message = "There is no such field"
-        expected = f"{SUGGESTION} {close[0]}?" if close else "one of " + ", ".join(known) if known else "no such field"
+        expected = suggestion(str(path[-1]), _fields_at(model, path[:-1])) or "no such field"
     elif kind == "value_error":
         # The validators' own messages end with what would be right.
         head, separator, tail = message.rpartition(": ")
@@ -112,10 +123,17 @@ def field_problem(
     return FieldProblem(
         location=location,
         field=shortened(".".join(shortened(str(part)) for part in path)) or location,
-        value=None if kind == "missing" else plain(error.get("input")),
+        value=None if kind == "missing" else plain(value),
         message=shortened(message),
         expected=shortened(expected),
     )
+
+
+def suggestion(name: str, known: Collection[str]) -> str:
+    """Return which of the ``known`` names ``name`` was meant for, or else all of them; nothing without any."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1) if names and len(name) <= MAX_SUGGESTED else []
+    return f"{SUGGESTION} {close[0]}?" if close else "one of " + ", ".join(names) if names else ""
 
 
 def _fields_at(annotation: object, path: Sequence[str | int]) -> set[str]:
@@ -132,6 +150,18 @@ def _fields_at(annotation: object, path: Sequence[str | int]) -> set[str]:
     if path and isinstance(path[0], int) and get_args(annotation):
         return _fields_at(get_args(annotation)[0], path[1:])
     return set()
+
+
+def value_at(value: object, path: Sequence[str]) -> object:
+    """Return what a path leads to in JSON; None where it leads nowhere."""
+    for part in path:
+        if isinstance(value, Mapping):
+            value = value.get(part)
+        elif isinstance(value, list | tuple) and part.isdecimal() and int(part) < len(value):
+            value = value[int(part)]
+        else:
+            return None
+    return value
 
 
 def plain(value: object) -> Any:

@@ -95,12 +95,15 @@ def _complete(schema: dict[str, Any]) -> dict[str, Any]:
         components[name] = own
     schema["components"]["schemas"] = dict(sorted(components.items()))
     for methods in schema["paths"].values():
-        for operation in methods.values():
+        for method, operation in methods.items():
             for parameter in operation.get("parameters", []):
                 parameter["schema"] = _without_null(parameter["schema"])
             responses = operation["responses"]
             if "requestBody" in operation:
                 _add(responses, problems("request-timeout", "too-many-bytes", "overloaded"))
+            _add(responses, problems("invalid-request"))  # unknown parameters are none anywhere
+            if method == "post" and not any(p["name"] == "idempotency-key" for p in operation.get("parameters", ())):
+                _add(responses, problems("invalid-parameter"))
             if "401" in responses:
                 _add(responses, problems("too-many-requests"))
             operation["responses"] = dict(sorted(responses.items()))
@@ -111,7 +114,7 @@ def _add(responses: dict[str, Any], more: dict[int | str, dict[str, Any]]) -> No
     """Add problems that any operation may answer with, beside those that it already does with the same status."""
     for status, described in more.items():
         present = responses.setdefault(str(status), described)
-        if present is not described:
+        if present is not described and described["description"] not in present["description"]:
             present["description"] += f"; {described['description'][0].lower()}{described['description'][1:]}"
             present["content"][MEDIA_TYPE]["examples"] |= described["content"][MEDIA_TYPE]["examples"]
 

@@ -13,7 +13,7 @@ URN = "urn:bathyfleet:problem:"
 
 TITLES: dict[str, tuple[int, str]] = {
     "malformed-body": (400, "The body cannot be read"),
-    "invalid-parameter": (400, "A parameter of the address cannot be taken"),
+    "invalid-parameter": (400, "A parameter of the address or the head cannot be taken"),
     "unauthenticated": (401, "An access token is needed"),
     "forbidden": (403, "Not allowed"),
     "not-found": (404, "There is no such resource"),

@@ -25,6 +25,7 @@ from app.api.bodies.admission import replayed
 from app.api.bodies.json_route import JsonRoute
 from app.api.http.problems import problem_response
 from app.api.http.route_index import RouteIndex
+from app.api.middleware.unknown_parameters import KnownParameters
 from app.api.state import AT_HAND
 
 
@@ -177,12 +178,18 @@ def _read(dependant: Dependant, request: Request, values: dict[str, Any]) -> Non
 
 
 class DirectRoutes:
-    """The innermost middleware: answers requests of the routers' routes, and leaves the rest to the framework."""
+    """The innermost middleware: answers requests of the routers' routes, and leaves the rest to the framework.
+
+    Requests with parameters that their route does not know are refused here, whoever would answer them.
+    """
 
     def __init__(self, app: ASGIApp, routers: Iterable[APIRouter]) -> None:
         self.app = app
         self._index = RouteIndex(
-            (route, plan_of(route)) for router in routers for route in router.routes if isinstance(route, APIRoute)
+            (route, (plan_of(route), KnownParameters(route)))
+            for router in routers
+            for route in router.routes
+            if isinstance(route, APIRoute)
         )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -190,12 +197,20 @@ class DirectRoutes:
         found = None
         if scope["type"] == "http" and not scope.get("root_path"):
             found = self._index.find(scope["method"], scope["path"])
-        route, parameters, plan = found or (None, {}, None)
-        if route is None or plan is None or scope["app"].dependency_overrides:
+        if found is None:
+            await self.app(scope, receive, send)
+            return
+        route, parameters, (plan, known) = found
+        request = Request(scope, receive, send)
+        refusal = await _refusal(known, request)
+        if refusal is not None:
+            scope["route"] = route
+            await refusal(scope, receive, send)
+            return
+        if plan is None or scope["app"].dependency_overrides:
             await self.app(scope, receive, send)
             return
         body = None
-        request = Request(scope, receive, send)
         scope.update(route=route, endpoint=route.endpoint, path_params=parameters)
         try:
             content = None
@@ -214,6 +229,15 @@ class DirectRoutes:
         except Exception as error:
             response = _explained(error, request)
         await _send(response, request, receive, send)
+
+
+async def _refusal(known: KnownParameters, request: Request) -> Response | None:
+    """Return the answer to a request with parameters that its route does not know; None where there are none."""
+    try:
+        problem = await known.problem(request)
+    except Exception as error:
+        return _explained(error, request)
+    return None if problem is None else problem_response(problem)
 
 
 async def _send(response: Response, request: Request, receive: Receive, send: Send) -> None:

@@ -52,7 +52,12 @@ class RulingRequest(ActionRequest):
 SoundingId = Annotated[int, Path(ge=1, lt=2**62, description="The sounding's id")]
 
 
-@router.get("", operation_id="listSoundings", summary="See which soundings are not in the map, and why")
+@router.get(
+    "",
+    operation_id="listSoundings",
+    summary="See which soundings are not in the map, and why",
+    responses=problems("vehicle-not-found"),
+)
 async def list_soundings(
     reader: Reader,
     mission: Mission,

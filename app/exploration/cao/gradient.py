@@ -119,6 +119,7 @@ class SpsaPlanner(GradientPlanner):
     """Simultaneous perturbation: one random direction of the whole team, two evaluations on the current map."""
 
     name: ClassVar[str] = "spsa"
+    own_options: ClassVar[frozenset[str]] = frozenset({"search", "accuracy_sd_m"})
     method: ClassVar[Method] = "spsa"
 
 
@@ -126,4 +127,5 @@ class FdsaPlanner(GradientPlanner):
     """Finite differences: coordinate by coordinate, two evaluations each on the current map."""
 
     name: ClassVar[str] = "fdsa"
+    own_options: ClassVar[frozenset[str]] = frozenset({"search", "accuracy_sd_m"})
     method: ClassVar[Method] = "fdsa"

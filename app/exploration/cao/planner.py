@@ -20,7 +20,7 @@ from app.exploration.cao.regressors.survey import SurveyRegressors
 from app.exploration.core.bottom import Bottom
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.planner.base import PlannerBase, settle
-from app.exploration.planner.options import PlannerOptions
+from app.exploration.planner.options import OF_CAO, PlannerOptions
 
 WINDOW = 30
 POLYNOMIAL_WINDOW = 15
@@ -70,6 +70,7 @@ class CaoPlanner(PlannerBase):
     """CAO with the regressors that the options and the sensor call for."""
 
     name: ClassVar[str] = "cao"
+    own_options: ClassVar[frozenset[str]] = OF_CAO
 
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         super().__init__(options, sensor)

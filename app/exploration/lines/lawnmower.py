@@ -159,6 +159,7 @@ class LawnmowerPlanner(PlannerBase):
     """
 
     name: ClassVar[str] = "lawnmower"
+    own_options: ClassVar[frozenset[str]] = frozenset()
     plans_for_all = True
     flies_lines = True
     decides_apart = True

@@ -62,6 +62,7 @@ class PcaoPlanner(PlannerBase):
     """A controller that was trained in simulation: one product of matrices per step, for any number of vehicles."""
 
     name: ClassVar[str] = "pcao"
+    own_options: ClassVar[frozenset[str]] = frozenset({"model", "accuracy_sd_m"})
 
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         super().__init__(options, sensor)

@@ -28,6 +28,9 @@ class PlannerBase(ABC):
 
     name: ClassVar[str]
 
+    own_options: ClassVar[frozenset[str] | None] = None
+    """Options that it reads beside those that every planner does; None: it does not say, and takes them all."""
+
     runs_errands: ClassVar[bool] = True
     """Whether single vehicles leave the plan for targets and the surface; see :mod:`app.exploration.core.errands`."""
 

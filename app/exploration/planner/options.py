@@ -7,9 +7,17 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.exploration.core.objective import Terms
 from app.exploration.pcao.model import PcaoModel
 
+OF_EVERY_PLANNER = frozenset({"turn_radius_m", "cruise_depth_m"})
+"""Options that concern how vehicles fly, whoever plans."""
+
+OF_CAO = frozenset(
+    ("regressors", "objective", "contribution", "degree", "candidates", "window", "alpha", "alpha_decay", "alpha_floor")
+) | {"search", "accuracy_sd_m"}
+"""What CAO reads; in surveys `rollout` is CAO, too."""
+
 
 class PlannerOptions(BaseModel):
-    """Settings of the planners. Every planner reads those that concern it."""
+    """Settings of the planners; each reads those that GET /api/v1/planners lists for it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

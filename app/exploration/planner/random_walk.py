@@ -19,6 +19,7 @@ class RandomPlanner(PlannerBase):
     """
 
     name: ClassVar[str] = "random"
+    own_options: ClassVar[frozenset[str]] = frozenset()
     runs_errands: ClassVar[bool] = False
     decides_apart = True
 

@@ -21,7 +21,7 @@ from app.exploration.core.information_need import Lacking, lacking
 from app.exploration.core.problem import Belief, Proposal, Situation
 from app.exploration.core.routes import FreeSpace
 from app.exploration.planner.base import PlannerBase, settle
-from app.exploration.planner.options import PlannerOptions
+from app.exploration.planner.options import OF_CAO, PlannerOptions
 from app.exploration.rollout.flight import (
     DIVE,
     LIFTED_AT_LEISURE,
@@ -120,6 +120,7 @@ class RolloutPlanner(PlannerBase):
     """
 
     name: ClassVar[str] = "rollout"
+    own_options: ClassVar[frozenset[str]] = OF_CAO | {"rollouts"}
 
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         if not isinstance(sensor, RangeSensor):

@@ -99,6 +99,7 @@ class CaoSearch(CriterionSearch):
     """
 
     name: ClassVar[str] = "cao"
+    own_options: ClassVar[frozenset[str]] = frozenset({"candidates", "window"})
 
     def __init__(self, options: PlannerOptions, sensor: Sensor) -> None:
         super().__init__(options, sensor)
@@ -154,6 +155,7 @@ class SpsaSearch(CriterionSearch):
     """
 
     name: ClassVar[str] = "spsa"
+    own_options: ClassVar[frozenset[str]] = frozenset()
 
     def _seek(self, scene: Scene, seed: int) -> FloatArray:
         self._criterion.next(scene.task)

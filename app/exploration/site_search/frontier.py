@@ -28,6 +28,7 @@ class FrontierSearch(SearchPlanner):
     """Looks at the goal area first, then at the rest: every vehicle goes for the view with most to see per metre."""
 
     name: ClassVar[str] = "rollout"
+    own_options: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

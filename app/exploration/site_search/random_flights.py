@@ -18,6 +18,7 @@ class RandomFlights(SearchPlanner):
     """Goes straight for a length drawn from a power law, or until something is ahead, then in another direction."""
 
     name: ClassVar[str] = "random"
+    own_options: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

@@ -33,6 +33,7 @@ class SwathPlanner(PlannerBase):
     """Full coverage with swath sonars: lines as far apart as the measured depth allows, gaps filled last."""
 
     name: ClassVar[str] = "swath"
+    own_options: ClassVar[frozenset[str]] = frozenset()
     runs_errands: ClassVar[bool] = False
     plans_for_all = True
     flies_lines = True

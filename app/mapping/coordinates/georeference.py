@@ -85,9 +85,18 @@ class LocalFrame:
             i = np.unravel_index(int(np.argmin(near)), near.shape)
             raise ValueError(
                 f"position ({lat[i]}, {lon[i]}) is not within {MAX_EXTENT_M / 1000:.0f} km of "
-                f"({self.origin_lat_deg}, {self.origin_lon_deg}), where the map begins: choose a smaller area"
+                f"({self.origin_lat_deg}, {self.origin_lon_deg}), where the map begins: "
+                f"{self._advice(float(lat[i]), float(lon[i]))}"
             )
         return east, north
+
+    def _advice(self, lat_deg: float, lon_deg: float) -> str:
+        """Return in words what to give in place of a position that is far away."""
+        if abs(lon_deg) <= 90.0:
+            swapped = self._transformer.transform(lat_deg, lon_deg)
+            if math.hypot(*swapped) <= MAX_EXTENT_M:
+                return f"latitude and longitude look exchanged, give latitude {lon_deg} and longitude {lat_deg}"
+        return "give a position near the map"
 
     def to_geographic(self, east_m: ArrayLike, north_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return ``(lat_deg, lon_deg)``, WGS 84, of local positions; the shapes are those of the input."""

@@ -1,12 +1,14 @@
 """Depth contours and tracks as KML, for Google Earth and chart plotters."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from app.mapping.products.contours import Contour
-from app.mapping.products.tracks import Track, lines_of
+from app.mapping.products.tracks import Track, elevation_text, lines_of, utc_text
 
 NAMESPACE = "http://www.opengis.net/kml/2.2"
+GOOGLE_NAMESPACE = "http://www.google.com/kml/ext/2.2"
+"""Of tracks with times."""
 
 
 def contours_kml(contours: Sequence[Contour], *, title: str, vertical_datum: str) -> bytes:
@@ -24,13 +26,18 @@ def contours_kml(contours: Sequence[Contour], *, title: str, vertical_datum: str
 
 
 def tracks_kml(tracks: Sequence[Track], *, title: str) -> bytes:
-    """Return one placemark per vehicle, drawn on the surface; its depths and times are in GPX and GeoJSON."""
+    """Return one placemark per vehicle, a track with times; its altitudes are minus the vehicle's depth."""
     document = _document(title, "Tracks of the vehicles")
     for track in lines_of(tracks):
         mark = _child(document, "Placemark")
         _child(mark, "name", track.vehicle)
-        _line(mark, [(point.lon_deg, point.lat_deg) for point in track.points])
-    return _text(document)
+        element = _child(mark, "gx:Track")
+        _child(element, "altitudeMode", "absolute")
+        for point in track.points:
+            _child(element, "when", utc_text(point.time_s))
+        for point in track.points:
+            _child(element, "gx:coord", f"{point.lon_deg:.8f} {point.lat_deg:.8f} {elevation_text(point.depth_m)}")
+    return _text(document, {"xmlns:gx": GOOGLE_NAMESPACE})
 
 
 def _document(title: str, description: str) -> ET.Element:
@@ -52,8 +59,8 @@ def _line(parent: ET.Element, line: Iterable[tuple[float, float]]) -> None:
     _child(element, "coordinates", " ".join(f"{lon:.8f},{lat:.8f}" for lon, lat in line))
 
 
-def _text(document: ET.Element) -> bytes:
-    root = ET.Element("kml", xmlns=NAMESPACE)
+def _text(document: ET.Element, further: Mapping[str, str] | None = None) -> bytes:
+    root = ET.Element("kml", {"xmlns": NAMESPACE, **(further or {})})
     root.append(document)
     ET.indent(root, " ")
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))

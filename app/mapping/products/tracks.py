@@ -38,7 +38,7 @@ def tracks_geojson(tracks: Sequence[Track]) -> bytes:
             "properties": {
                 "kind": "track",
                 "vehicle": track.vehicle,
-                "depths_m": [round(point.depth_m, 3) for point in track.points],
+                "depths_m": [round(point.depth_m, 3) + 0.0 for point in track.points],
                 "times": [utc_text(point.time_s) for point in track.points],
             },
             "geometry": {
@@ -61,7 +61,7 @@ def tracks_gpx(tracks: Sequence[Track], *, title: str) -> bytes:
         segment = ET.SubElement(element, "trkseg")
         for point in track.points:
             place = ET.SubElement(segment, "trkpt", lat=f"{point.lat_deg:.8f}", lon=f"{point.lon_deg:.8f}")
-            ET.SubElement(place, "ele").text = f"{-point.depth_m:.3f}"
+            ET.SubElement(place, "ele").text = elevation_text(point.depth_m)
             ET.SubElement(place, "time").text = utc_text(point.time_s)
     ET.indent(root, " ")
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
@@ -70,6 +70,11 @@ def tracks_gpx(tracks: Sequence[Track], *, title: str) -> bytes:
 def lines_of(tracks: Sequence[Track]) -> list[Track]:
     """Return the tracks that are lines: one place makes none."""
     return [track for track in tracks if len(track.points) >= 2]
+
+
+def elevation_text(depth_m: float) -> str:
+    """Return minus a depth in metres, to the millimetre; at the surface it is 0.000, never -0.000."""
+    return f"{round(-depth_m, 3) + 0.0:.3f}"
 
 
 def utc_text(time_s: float) -> str:

@@ -1,6 +1,7 @@
 """Soundings as text: XYZ and CSV, with or without names for the columns."""
 
 import math
+import re
 from collections.abc import Sequence
 from typing import BinaryIO, Literal
 
@@ -25,6 +26,10 @@ NAMES = {
     "verdict": ("verdict",),
 }
 """What columns may be called, without regard to case."""
+
+WITH_COMMA = re.compile(r"[+-]?[0-9]+(,[0-9]+)?")
+"""A number, perhaps with a decimal comma."""
+WHOLE_DEGREES = re.compile(r"[+-]?[0-9]{1,3}")
 
 EPSG_4326 = 4326
 MAX_COLUMNS = 256
@@ -53,6 +58,8 @@ def read_text(file: BinaryIO, *, packed: bool = False) -> Points:
                 continue
             begin += layout.named
         lines = block.lines[begin:]
+        if not table.size and lines:
+            _check_decimals(lines[0], layout, block.first + begin)
         rows = _at_once(lines, layout) if layout.verdict is None else None
         if rows is not None:
             table.add(rows, range(block.first + begin, block.first + len(block.lines)))
@@ -77,10 +84,13 @@ class _Layout:
         Names and numbers of the columns that are read: x, y, depth, and the standard deviation if there is one.
     verdict
         Number of the column that says whether a sounding is taken.
+    count
+        How many columns the line has.
     """
 
-    def __init__(self, columns: dict[str, int], separator: str, *, named: bool) -> None:
+    def __init__(self, columns: dict[str, int], separator: str, count: int, *, named: bool) -> None:
         self.named = named
+        self.count = count
         self.separator = separator
         self.wanted = _wanted(columns)
         self.verdict = columns.get("verdict")
@@ -109,14 +119,58 @@ def _layout(line: str, number: int) -> _Layout | None:
     """Return what a line shows of the columns; None for an empty one and for a comment that names none."""
     bare = line.strip().lstrip("\ufeff")
     text = bare.lstrip("# ")
-    if len(_split(text, _separator(text))) > MAX_COLUMNS:
+    cells = _split(text, _separator(text))
+    if len(cells) > MAX_COLUMNS:
         raise ReadError(f"line {number}", f"it has more than {MAX_COLUMNS} columns", "send fewer columns")
     columns = _named(text)
     if columns is not None:
-        return _Layout(columns, _separator(text), named=True)
+        return _Layout(columns, _separator(text), len(cells), named=True)
     if not bare or bare.startswith("#"):
         return None
-    return _Layout({"x": 0, "y": 1, "z": 2}, _separator(bare), named=False)
+    _check_names(cells, number)
+    return _Layout({"x": 0, "y": 1, "z": 2}, _separator(bare), len(cells), named=False)
+
+
+def _check_names(cells: Sequence[str], number: int) -> None:
+    """Refuse a line of names that does not say where position and depth are. Raises ReadError."""
+    words = [cell.strip().strip('"') for cell in cells]
+    if len(words) < 2 or not all(word[:1].isalpha() for word in words):
+        return
+    known = {name for names in NAMES.values() for name in names}
+    strange = [word[:40] for word in words if word.lower() not in known]
+    raise ReadError(
+        f"line {number}",
+        f"column {', '.join(strange[:5])} is not known" if strange else "it names no position, or no depth",
+        "name position and depth, in metres, by two of lon, lat, x, y, east_m, north_m and by one of depth_m (down), "
+        "elevation_m (up) or z; known are " + ", ".join(sorted(known)),
+    )
+
+
+def _check_decimals(line: str, layout: _Layout, number: int) -> None:
+    """Refuse decimal commas in the first line of numbers, where commas are between columns, too. Raises ReadError."""
+    if layout.separator != "," or "." in line:
+        return
+    cells = _split(line.strip().lstrip("\ufeff"), ",")
+    halves = [cell for cell in cells if cell]
+    if layout.named:
+        torn = len(halves) > layout.count + 1 and all(map(WITH_COMMA.fullmatch, halves))
+    else:  # degrees: a few digits, then many
+        torn = len(halves) >= 5 and all(_is_degrees(*halves[i : i + 2]) for i in (0, 2))
+    if torn or _decimal_commas(line.split()):
+        raise _decimal_comma(f"line {number}")
+
+
+def _is_degrees(whole: str, fraction: str) -> bool:
+    return WHOLE_DEGREES.fullmatch(whole) is not None and fraction.isdecimal() and len(fraction) >= 4
+
+
+def _decimal_commas(cells: Sequence[str]) -> bool:
+    """Tell whether cells are numbers, some of them with a decimal comma."""
+    return len(cells) > 1 and all(map(WITH_COMMA.fullmatch, cells)) and any("," in cell for cell in cells)
+
+
+def _decimal_comma(place: str) -> ReadError:
+    return ReadError(place, "its numbers have decimal commas", "write numbers with a decimal point, such as 41.1851")
 
 
 def _taken(block: LineBlock, begin: int, layout: _Layout) -> tuple[list[str], list[int]]:
@@ -194,6 +248,8 @@ def _row(line: str, layout: _Layout, number: int) -> tuple[float, ...]:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
+            if "," in said and WITH_COMMA.fullmatch(said):
+                raise _decimal_comma(f"line {number}, column {column + 1}")
             seen = "it is not a number" if column < len(cells) else f"the line has only {len(cells)} columns"
             what = {"down": "depth", "up": "height"}.get(name, name)
             raise ReadError(

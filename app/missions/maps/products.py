@@ -432,9 +432,7 @@ PRODUCTS = {
             of_vehicle=True,
         ),
         ProductKind(TRACKS, "geojson", GEOJSON, TIMED_TRACKS, lambda m, _: tracks_geojson(m.tracks), {TRACKS}),
-        ProductKind(
-            TRACKS, "kml", KML, "the vehicles' tracks", lambda m, _: tracks_kml(m.tracks, title=m.facts.title), {TRACKS}
-        ),
+        ProductKind(TRACKS, "kml", KML, TIMED_TRACKS, lambda m, _: tracks_kml(m.tracks, title=m.facts.title), {TRACKS}),
         ProductKind(
             TRACKS,
             "gpx",

@@ -8,7 +8,6 @@ from shapely.geometry import Polygon
 
 from app.missions.fleet.hub import called
 from app.missions.live.mission import LiveMission
-from app.missions.spec.vehicle import VehicleKind
 from app.missions.views.mission import CheckStatus, CheckView
 from app.storage.models import MissionRow
 
@@ -22,12 +21,11 @@ Ring = Sequence[tuple[float, float]]
 def neighbour_checks(live: LiveMission, at_sea: Sequence[MissionRow]) -> Iterator[CheckView]:
     """Return a line for each mission at sea that is flown where this one is, among some as they are stored.
 
-    Legs of different missions are not decided apart, and not every vehicle can give way. Simulated ones meet no others.
+    Legs of different missions are not decided apart, and not every vehicle can give way. Simulated ones are told of,
+    too: what is tried out goes as it would at sea.
     """
-    if all(member.capabilities.simulated for member in live.team):
-        return
     for row in at_sea:
-        if row.id in (live.id, live.spec.after) or _simulated(row):
+        if row.id in (live.id, live.spec.after):
             continue
         if _apart_m(live.spec.area.ring, row.spec["area"]["coordinates"][0]) > BESIDE_M:
             continue
@@ -40,11 +38,6 @@ def neighbour_checks(live: LiveMission, at_sea: Sequence[MissionRow]) -> Iterato
             remedy="Fly them one after the other, or all vehicles in one mission; else at depths that are far apart, "
             "with an eye on who comes up",
         )
-
-
-def _simulated(row: MissionRow) -> bool:
-    vehicles = row.spec.get("vehicles") or []
-    return bool(vehicles) and all(vehicle.get("kind") == VehicleKind.SIM for vehicle in vehicles)
 
 
 def _apart_m(one: Ring, other: Ring) -> float:

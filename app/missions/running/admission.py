@@ -1,13 +1,14 @@
 """What a mission may not ask of this service: planners and vehicles that it does not have, limits that contradict."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from shapely import Polygon, unary_union
 
 from app.exploration.pcao.planner import PcaoPlanner
-from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing, options_of
 from app.missions.errors import InvalidRequestError
-from app.missions.spec.mission import MissionKind, MissionSpec
+from app.missions.spec.mission import MissionKind, MissionSpec, PlannerSpec
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
 from app.missions.task.way import least_way_m
@@ -32,6 +33,7 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
             f"a trained controller is given, and planner {name!r} does not fly with one",
             f"only {PcaoPlanner.name} flies with a model: leave it out, or use that planner",
         )
+    _check_options(spec.planner, options_of(there[name]))
     if name in COVERERS and spec.limits.com_range_m is not None:
         raise InvalidRequestError(
             "limits.com_range_m",
@@ -41,6 +43,24 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
     check_limits(spec)
     for index, vehicle in enumerate(spec.vehicles):
         check_vehicle(vehicle, spec, kinds, f"vehicles.{index}.")
+
+
+def _check_options(planner: PlannerSpec, read: Collection[str]) -> None:
+    """Refuse options that a planner does not read, unless they say what they would anyway. Raises InvalidRequestError.
+
+    Not a part of the description's own checks: a mission that was stored with such options can still be opened.
+    """
+    unread = [
+        name
+        for name in sorted(planner.options.model_fields_set - set(read))
+        if getattr(planner.options, name) != PlannerOptions.model_fields[name].default
+    ]
+    if unread:
+        raise InvalidRequestError(
+            f"planner.options.{unread[0]}",
+            f"planner {planner.name!r} has no option {' and no option '.join(unread)}",
+            f"its options are {', '.join(sorted(read))}",
+        )
 
 
 def check_limits(spec: MissionSpec) -> None:
@@ -140,8 +160,8 @@ def check_vehicle(vehicle: VehicleSpec, spec: MissionSpec, kinds: Sequence[Vehic
         try:
             spec.check_recovery_point(name, vehicle.recovery_point)
         except ValueError as error:
-            words = str(error).removeprefix(name).strip()
-            raise InvalidRequestError(name, words, "give [longitude, latitude] of a place near the area") from None
+            words, _, advice = str(error).removeprefix(name).strip().partition(": ")
+            raise InvalidRequestError(name, words, advice) from None
     taken = {name for target in spec.targets for name in (target.name, target.called)}
     if vehicle.name in taken:
         raise InvalidRequestError(

@@ -3,10 +3,12 @@
 import inspect
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
+from typing import Any
 
 from app import __version__
+from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.planners import COVERERS, INSTALLED, PLANNERS
+from app.exploration.planners import COVERERS, INSTALLED, PLANNERS, options_of
 from app.missions.fleet.interface import StopReceipt, VehicleInfo
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.broadcast import Subscription
@@ -100,13 +102,12 @@ def idle_vehicle_view(info: VehicleInfo) -> VehicleView:
 
 def planner_views() -> list[PlannerView]:
     """Return the planners that a mission may name, and those that are installed and cannot be used."""
-    options = PlannerOptions.model_json_schema()
     usable = [
         PlannerView(
             name=name,
             summary=_summary(kind),
             package=INSTALLED.packages.get(name, f"bathyfleet {__version__}"),
-            options=options,
+            options=_options(kind),
         )
         for name, kind in (PLANNERS | COVERERS).items()
     ]
@@ -116,6 +117,13 @@ def planner_views() -> list[PlannerView]:
         if planner.name not in PLANNERS | COVERERS
     ]
     return usable + broken
+
+
+def _options(kind: type[PlannerBase]) -> dict[str, Any]:
+    """Return the JSON schema of the options that a planner reads."""
+    schema = PlannerOptions.model_json_schema()
+    read = options_of(kind)
+    return schema | {"properties": {name: one for name, one in schema["properties"].items() if name in read}}
 
 
 def _summary(kind: type[object]) -> str:

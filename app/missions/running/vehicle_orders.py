@@ -100,7 +100,8 @@ def _place_m(book: OrderBook, field: str, lon: float, lat: float) -> FloatArray:
     try:
         return book.local_m(lon, lat)
     except ValueError as error:
-        raise InvalidRequestError(field, f"it is far from the mission: {error}", "a place in its area") from error
+        words, _, advice = str(error).rpartition(": ")
+        raise InvalidRequestError(field, f"it is far from the mission: {words}", advice) from error
 
 
 def _nearest_first(live: LiveMission, part: Polygon) -> list[str]:

@@ -3,11 +3,15 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, Field, field_validator, model_validator
 from shapely.geometry import Polygon
 from shapely.validation import explain_validity
 
 from app.arrays import FloatArray
+
+NOT_BLANK = r"\S"
+SHOWN_PATTERN = r"^[^\r\n]*\S[^\r\n]*$"
+"""Something to be seen, in one line: names are subjects of messages and headings of reports."""
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Latitude, WGS84 degrees")]
 Longitude = Annotated[float, Field(ge=-180, le=180, description="Longitude, WGS84 degrees")]
@@ -17,13 +21,23 @@ ShownName = Annotated[
     Field(
         min_length=1,
         max_length=120,
-        # Something to be seen, in one line: names are subjects of messages and headings of reports.
-        pattern=r"^[^\r\n]*\S[^\r\n]*$",
+        pattern=SHOWN_PATTERN,
         description="Shown to people; need not be unique",
     ),
 ]
 
 MAX_POSITIONS = 1000
+
+
+class FieldError(ValueError):
+    """What is wrong with one field beside others.
+
+    ``field`` is its path from the model that says so, for example ``recovery.point``.
+    """
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(message)
+        self.field = field
 
 
 class Model(BaseModel):
@@ -32,14 +46,17 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-def _is_no_longer_than_taken(ring: object) -> object:
+def _plain_ring(ring: object) -> object:
+    """Return a ring without the heights that some programs add."""
     if isinstance(ring, list | tuple) and len(ring) > MAX_POSITIONS:
         raise ValueError(f"the ring has {len(ring)} positions, at most {MAX_POSITIONS} are taken: simplify it")
+    if isinstance(ring, list | tuple):
+        return [place[:2] if isinstance(place, list | tuple) and len(place) == 3 else place for place in ring]
     return ring
 
 
 # Looked at before its positions are, and no further than to the first that is wrong.
-Ring = Annotated[list[tuple[Longitude, Latitude]], FailFast(), BeforeValidator(_is_no_longer_than_taken)]
+Ring = Annotated[list[tuple[Longitude, Latitude]], FailFast(), BeforeValidator(_plain_ring)]
 
 
 def cell_count(size_m: FloatArray, cell_m: float) -> float:
@@ -49,7 +66,10 @@ def cell_count(size_m: FloatArray, cell_m: float) -> float:
 
 
 class PolygonGeometry(Model):
-    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
+    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes.
+
+    A Feature of one and a MultiPolygon of one part are taken as that polygon; heights are left out.
+    """
 
     type: Literal["Polygon"] = "Polygon"
     coordinates: list[Ring] = Field(
@@ -58,6 +78,22 @@ class PolygonGeometry(Model):
         description="One ring of [longitude, latitude]; the last position repeats the first",
         examples=[[[[-8.705, 41.185], [-8.7038, 41.185], [-8.7038, 41.1859], [-8.705, 41.1859], [-8.705, 41.185]]]],
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_programs_write_it(cls, data: object) -> object:
+        """Take the polygon out of a Feature, and out of a MultiPolygon that is one polygon."""
+        if isinstance(data, dict) and data.get("type") == "Feature":
+            data = data.get("geometry")
+            if data is None:
+                raise FieldError("geometry", "the Feature has no geometry: give one with a Polygon")
+        if isinstance(data, dict) and data.get("type") == "MultiPolygon":
+            parts = data.get("coordinates")
+            if not isinstance(parts, list | tuple) or len(parts) != 1:
+                count = len(parts) if isinstance(parts, list | tuple) else "no"
+                raise FieldError("coordinates", f"the MultiPolygon has {count} parts: give one polygon")
+            data = {**data, "type": "Polygon", "coordinates": parts[0]}
+        return data
 
     @field_validator("coordinates")
     @classmethod

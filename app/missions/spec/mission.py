@@ -3,6 +3,7 @@
 The REST schema, the command line's help and the dashboard's forms are all made from these models.
 """
 
+import math
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import lru_cache
@@ -13,12 +14,13 @@ from pydantic import Field, field_validator, model_validator
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
+from app.arrays import FloatArray
 from app.estimation.uncertainty import SoundingErrors
 from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
-from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.georeference import MAX_EXTENT_M, LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
-from app.missions.spec.base import Model, PolygonGeometry, ShownName, cell_count
+from app.missions.spec.base import FieldError, Model, PolygonGeometry, ShownName, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.limits import Limits
@@ -56,12 +58,34 @@ class MissionKind(StrEnum):
 class PlannerSpec(Model):
     """Which planner decides, and its options."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _options_are_a_planner_s(cls, data: Any) -> Any:
+        """Say of an option that there is none of which there are, in this planner."""
+        options = data.get("options") if isinstance(data, dict) else None
+        unknown = [n for n in options if n not in PlannerOptions.model_fields] if isinstance(options, dict) else []
+        if unknown:
+            # Needed for words only: it brings all planners along.
+            from app.exploration.planners import COVERERS, PLANNERS, SEARCHERS, options_of
+
+            name = data.get("name", DEFAULT_PLANNER)
+            known = SEARCHERS | COVERERS | PLANNERS
+            if isinstance(name, str) and name in known:
+                has = ", ".join(sorted(options_of(known[name])))
+                words = f"planner {name!r} has no option {str(unknown[0])[:40]!r}: its options are {has}"
+                raise FieldError(f"options.{unknown[0]}", words)
+        return data
+
     name: str = Field(default=DEFAULT_PLANNER, description="One of the planners of GET /api/v1/planners")
-    options: PlannerOptions = Field(default_factory=PlannerOptions, description="Its settings")
+    options: PlannerOptions = Field(
+        default_factory=PlannerOptions, description="Its settings: those that GET /api/v1/planners lists for it"
+    )
 
 
 HALF_ROUND_DEG = 180.0
 """An area that is wider crosses the line at which longitudes begin anew."""
+QUARTER_ROUND_DEG = 90.0
+"""No latitude is larger."""
 
 
 class MissionSpec(Model):
@@ -205,12 +229,16 @@ class MissionSpec(Model):
             object.__setattr__(self, "budget", Budget(steps=self.steps))
             return self
         if self.kind is MissionKind.SEARCH and self.budget.steps is None:
-            raise ValueError("kind is search, whose length is search.window_s: leave budget out, or give it in steps")
+            raise FieldError(
+                "budget", "kind is search, whose length is search.window_s: leave budget out, or give it in steps"
+            )
         fastest = max([self.speed_of(vehicle) for vehicle in self.vehicles], default=self.speed_mps)
         steps = self.budget.allowance(fastest).most_legs(self.limits.max_step_m)
         if "steps" in given and self.steps != steps:
-            raise ValueError(
-                f"steps is {self.steps} but budget, {self.budget.model_dump_json()}, comes to {steps}: give one of them"
+            raise FieldError(
+                "steps",
+                f"steps is {self.steps} but budget, {self.budget.model_dump_json()}, comes to {steps}: give one of "
+                "them",
             )
         object.__setattr__(self, "steps", steps)
         return self
@@ -225,9 +253,17 @@ class MissionSpec(Model):
     def _everything_is_near_the_area(self) -> Self:
         lons, _ = zip(*self.area.ring, strict=True)
         if max(lons) - min(lons) > HALF_ROUND_DEG:
-            raise ValueError(
+            raise FieldError(
+                "area",
                 f"area reaches from longitude {min(lons)} to {max(lons)}: one that crosses 180 degrees cannot be "
-                "surveyed; give the part on each side of it as a mission of its own"
+                "surveyed; give the part on each side of it as a mission of its own",
+            )
+        if not self._is_near(self.area.ring):
+            away = next(corner for corner in self.area.ring if not self._is_near([corner]))
+            raise FieldError(
+                "area",
+                f"area reaches to {list(away)}, which is not within {MAX_EXTENT_M / 1000:.0f} km of its south-western "
+                "corner: choose a smaller one",
             )
         places = {f"keep_out.{index}": zone.ring for index, zone in enumerate(self.keep_out)}
         if self.search is not None:
@@ -239,9 +275,14 @@ class MissionSpec(Model):
         if not places or self._is_near([place for ring in places.values() for place in ring]):
             return self
         name, place = next((name, at) for name, ring in places.items() for at in ring if not self._is_near([at]))
-        raise ValueError(
-            f"{name} is at {list(place)}, nowhere near the area: give [longitude, latitude], in that order"
-        )
+        raise FieldError(name, f"{name} is at {list(place)}, nowhere near the area: {self._where_it_belongs(place)}")
+
+    def _where_it_belongs(self, place: tuple[float, float]) -> str:
+        """Return in words what to give in place of one that is not near the area."""
+        lon, lat = place
+        if abs(lon) <= QUARTER_ROUND_DEG and self._is_near([(lat, lon)]):
+            return f"latitude and longitude look exchanged, give [longitude, latitude], here [{lat}, {lon}]"
+        return "give [longitude, latitude] of a place near it"
 
     def _is_near(self, places: Sequence[tuple[float, float]]) -> bool:
         """Whether places, [longitude, latitude], can be told in the mission's frame."""
@@ -266,25 +307,29 @@ class MissionSpec(Model):
         try:
             east, north = self.frame().to_local(np.array(point[1]), np.array(point[0]))
         except ValueError:
-            raise ValueError(f"{name} is {point}: it is nowhere near the area") from None
+            words = f"{name} is at {list(point)}, nowhere near the area: {self._where_it_belongs(point)}"
+            raise FieldError(name, words) from None
         place = Point(float(east), float(north))
         away_m = float(Polygon(self.local_area()).distance(place))
         if away_m > FARTHEST_HOME_M:
-            raise ValueError(
-                f"{name} lies {away_m:.0f} m from the area: vehicles come home over at most {FARTHEST_HOME_M:.0f} m"
+            raise FieldError(
+                name,
+                f"{name} lies {away_m:.0f} m from the area: vehicles come home over at most {FARTHEST_HOME_M:.0f} m",
             )
         for index, zone in enumerate(self.keep_out):
             if Polygon(self.to_local(zone)).buffer(self.limits.keep_out_margin_m).contains(place):
-                raise ValueError(f"{name} lies in keep_out.{index} or in its margin: give one that vehicles may go to")
+                words = f"{name} lies in keep_out.{index} or in its margin: give one that vehicles may go to"
+                raise FieldError(name, words)
 
     @model_validator(mode="after")
     def _targets_can_be_told_apart(self) -> Self:
         taken = {vehicle.name: "a vehicle" for vehicle in self.vehicles}
-        for target in self.targets:
+        for index, target in enumerate(self.targets):
             for name in {target.name, target.called}:
                 if name in taken:
-                    raise ValueError(
-                        f"target {target.name!r}: {name!r} is the name of {taken[name]} already: give it another one"
+                    raise FieldError(
+                        f"targets.{index}",
+                        f"target {target.name!r}: {name!r} is the name of {taken[name]} already: give it another one",
                     )
             taken |= dict.fromkeys((target.name, target.called), f"target {target.name!r}")
         return self
@@ -293,35 +338,39 @@ class MissionSpec(Model):
     def _a_search_says_what_is_sought(self) -> Self:
         if (self.kind is MissionKind.SEARCH) != (self.search is not None):
             told = "missing" if self.search is None else "given"
-            raise ValueError(
-                f"kind is {self.kind} and search is {told}: a mission of kind search needs it, and no other has it"
+            raise FieldError(
+                "search",
+                f"kind is {self.kind} and search is {told}: a mission of kind search needs it, and no other has it",
             )
         if self.search is None:
             return self
         if self.site is not None:
-            raise ValueError("site is given and kind is search: only surveys find depths, leave site out")
+            raise FieldError("site", "site is given and kind is search: only surveys find depths, leave site out")
         site = Polygon(self.local_area())
         for name in ("goal", "entry"):
             lon, lat = getattr(self.search, name)
             east, north = self.frame().to_local(np.array(lat), np.array(lon))
             outside_m = float(site.distance(Point(float(east), float(north))))
             if outside_m > 0:
-                raise ValueError(
+                raise FieldError(
+                    f"search.{name}",
                     f"search.{name} lies {outside_m:.1f} m outside the area: it must be a place [longitude, latitude] "
-                    "in it"
+                    "in it",
                 )
         size = self.local_area().max(axis=0)
         cells = cell_count(size, self.cell_m)
         if cells > MAX_SEARCH_CELLS:
-            raise ValueError(
+            raise FieldError(
+                "cell_m",
                 f"the site has {cells:.0f} cells of {self.cell_m} m, at most {MAX_SEARCH_CELLS} are searched: make "
-                "cell_m larger or the area smaller"
+                f"cell_m at least {_least_cell_m(size, MAX_SEARCH_CELLS):g}, or the area smaller",
             )
         if self.search.safety_m < self.arrival_radius_m:
-            raise ValueError(
+            raise FieldError(
+                "search.safety_m",
                 f"search.safety_m is {self.search.safety_m} m but arrival_radius_m is {self.arrival_radius_m} m: a "
                 "vehicle that arrives beside its waypoint must not be nearer to an obstacle than that; make "
-                "arrival_radius_m smaller or safety_m larger"
+                "arrival_radius_m smaller or safety_m larger",
             )
         return self
 
@@ -331,25 +380,30 @@ class MissionSpec(Model):
         size = area.max(axis=0) - area.min(axis=0)
         cells = cell_count(size, self.cell_m)
         if min(size) < 2 * self.cell_m:
-            raise ValueError(
+            raise FieldError(
+                "cell_m",
                 f"the area is {size[0]:.1f} m x {size[1]:.1f} m, less than two cells of {self.cell_m} m: "
-                "enlarge it or make cell_m smaller"
+                f"enlarge it, or make cell_m at most {_rounded_down(0.5 * float(min(size))):g}",
             )
         # A disc of this radius holds the centre of a cell wherever it lies.
         if Polygon(area).buffer(-self.cell_m * np.sqrt(0.5)).is_empty:
-            raise ValueError(
-                f"the area is nowhere wide enough for cells of {self.cell_m} m: enlarge it or make cell_m smaller"
+            raise FieldError(
+                "cell_m",
+                f"the area is nowhere wide enough for cells of {self.cell_m} m: enlarge it or make cell_m smaller",
             )
         within = Polygon(area).buffer(-self.limits.border_margin_m, join_style="mitre")
         if within.is_empty or not isinstance(within, Polygon):
-            raise ValueError(
+            raise FieldError(
+                "limits.border_margin_m",
                 f"limits.border_margin_m is {self.limits.border_margin_m} m, which leaves no area in one piece: "
-                "make it smaller"
+                "make it smaller",
             )
         if cells > MAX_GRID_CELLS:
-            raise ValueError(
-                f"the area of {size[0]:.0f} m x {size[1]:.0f} m has {cells:.0f} cells of {self.cell_m} m, "
-                f"at most {MAX_GRID_CELLS} are taken: make cell_m larger or the area smaller"
+            raise FieldError(
+                "cell_m",
+                f"the area of {size[0]:.0f} m x {size[1]:.0f} m has {cells:.0f} cells of {self.cell_m} m, at most "
+                f"{MAX_GRID_CELLS} are taken: make cell_m at least {_least_cell_m(size, MAX_GRID_CELLS):g}, or the "
+                "area smaller",
             )
         return self
 
@@ -410,6 +464,21 @@ class MissionSpec(Model):
         vertices = np.column_stack([east, north])
         ring_area = Polygon(vertices).exterior.is_ccw
         return vertices if ring_area else vertices[::-1]
+
+
+def _least_cell_m(size_m: FloatArray, most: int) -> float:
+    """Return about the least cell of which no more than ``most`` cover a rectangle, in two digits."""
+    digit_m = 10.0 ** (math.floor(math.log10(math.sqrt(float(np.prod(size_m)) / most))) - 1)
+    tried = math.ceil(math.sqrt(float(np.prod(size_m)) / most) / digit_m)
+    while cell_count(size_m, tried * digit_m) > most:
+        tried += 1
+    return tried * digit_m
+
+
+def _rounded_down(value: float) -> float:
+    """Return a positive number in two digits, no larger than it is."""
+    digit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.floor(value / digit) * digit
 
 
 @lru_cache(maxsize=256)

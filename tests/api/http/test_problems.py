@@ -9,7 +9,7 @@ import pytest
 
 from app.api.http.problems import TITLES, URN
 from app.main import Server
-from tests.support.api.rest import make_client, mission_spec
+from tests.support.api.rest import make_client, mission_spec, soundings
 from tests.support.missions.specs import AREA
 
 
@@ -20,6 +20,15 @@ async def client(shared_server: Server) -> AsyncIterator[httpx.AsyncClient]:
 
 
 JSON = {"Content-Type": "application/json"}
+
+
+def box(west: float, south: float, wide: float, high: float) -> dict[str, Any]:
+    """A rectangle, degrees."""
+    east, north = west + wide, south + high
+    return {
+        "type": "Polygon",
+        "coordinates": [[[west, south], [east, south], [east, north], [west, north], [west, south]]],
+    }
 
 
 def assert_problem(answer: httpx.Response, status: int, kind: str) -> dict[str, Any]:
@@ -40,7 +49,7 @@ def assert_problem(answer: httpx.Response, status: int, kind: str) -> dict[str, 
         ({"steps": 0}, "steps", "a number ≥ 1"),
         ({"steps": 2.5}, "steps", "a whole number"),
         ({"steps": 10**30}, "steps", "a number ≤ 100000"),
-        ({"budget": {"steps": 4}}, "body", "give one of them"),
+        ({"budget": {"steps": 4}}, "steps", "give one of them"),
         ({"budget": {}}, "budget", "give exactly one of minutes, km_per_vehicle, steps"),
         ({"budget": {"minutes": 0}}, "budget.minutes", "a number > 0"),
         ({"budget": {"minute": 5}}, "budget.minute", "did you mean minutes?"),
@@ -56,9 +65,9 @@ def assert_problem(answer: httpx.Response, status: int, kind: str) -> dict[str, 
         ({"area": {"type": "Point"}}, "area.type", "'Polygon'"),
         ({"area": AREA | {"coordinates": [AREA["coordinates"][0][:-1]]}}, "area.coordinates", "repeat the first"),
         ({"name": ""}, "name", "at least 1 character"),
-        ({"name": "   "}, "name", "text that matches"),
-        ({"name": " \n "}, "name", "text that matches"),
-        ({"name": "Quay\nSubject: x"}, "name", "text that matches"),
+        ({"name": "   "}, "name", "one line of text that is not blank"),
+        ({"name": " \n "}, "name", "one line of text that is not blank"),
+        ({"name": "Quay\nSubject: x"}, "name", "one line of text that is not blank"),
         ({"name": None}, "name", "text in quotes"),
         ({"seed": -1}, "seed", "a number ≥ 0"),
         ({"colour": "red"}, "colour", "one of accuracy_m, after, area"),
@@ -74,6 +83,59 @@ async def test_a_wrong_value_is_named_with_what_would_be_right(
     assert expected in errors[field]["expected"]
     assert errors[field]["location"] == "body"
     assert (await client.get("/missions")).json() == before
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "value", "expected"),
+    [
+        ({"cell_m": 100}, "cell_m", 100, "make cell_m at most 27"),
+        ({"cell_m": 1, "area": box(-8.7, 41.0, 0.6, 0.45)}, "cell_m", 1, "make cell_m at least 26, or the area"),
+        ({"area": box(-8.7, 41.0, 5.0, 0.01)}, "area", "{'type': 'Polygon'", "choose a smaller one"),
+        ({"area": box(-100.0, 41.0, 190.0, 0.01)}, "area", "{'type': 'Polygon'", "a mission of its own"),
+        ({"budget": {"steps": 4}}, "steps", 3, "give one of them"),
+        ({"recovery": {"point": [-8.7046, 41.5]}}, "recovery.point", "[-8.7046, 41.5]", "10000 m"),
+        ({"recovery": {"point": [41.1853, -8.7046]}}, "recovery.point", "[41.1853, -8.7046]", "[-8.7046, 41.1853]"),
+        ({"recovery": {"point": [-1.0, 51.0]}}, "recovery.point", "[-1.0, 51.0]", "of a place near it"),
+        (
+            {"recovery": {"point": [-8.7044, 41.18545]}, "keep_out": [box(-8.7045, 41.1854, 0.0002, 0.0001)]},
+            "recovery.point",
+            "[-8.7044, 41.18545]",
+            "vehicles may go to",
+        ),
+        ({"planner": {"name": "cao2"}}, "planner.name", "cao2", "use one of"),
+        ({"after": "nope"}, "after", "nope", "leave it out"),
+        ({"site": "nope"}, "site", "nope", "GET /api/v1/sites"),
+        ({"planner": {"name": "swath"}}, "vehicles.0.sensor", None, "give it sensor multibeam"),
+        ({"keep_out": [box(-8.706, 41.184, 0.01, 0.01)]}, "keep_out", "[{'type': 'Polygon'", "smaller"),
+    ],
+)
+async def test_what_contradicts_the_rest_is_named_with_its_value(
+    client: httpx.AsyncClient, changes: dict[str, Any], field: str, value: object, expected: str
+) -> None:
+    problem = assert_problem(await client.post("/missions", json=mission_spec(**changes)), 422, "invalid-request")
+    [error] = problem["errors"]
+    assert (error["location"], error["field"]) == ("body", field)
+    assert str(error["value"]).startswith(str(value))
+    assert expected in error["expected"], error
+
+
+async def test_what_an_import_lacks_is_told_of_its_query(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    path = f"/missions/{mission['id']}/imports"
+    for query, field in (({}, "crs"), ({"crs": "EPSG:4326"}, "sd_m")):
+        answer = await client.post(path, params={"filename": "a.xyz"} | query, content=b"-8.7049 41.1851 5\n")
+        assert [(e["location"], e["field"]) for e in answer.json()["errors"]] == [("query", field)], answer.text
+
+
+async def test_exchanged_coordinates_are_told(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
+    item = soundings(1)[0]
+    for lat, lon, words in (
+        (item["lon_deg"], item["lat_deg"], "latitude and longitude look exchanged"),
+        (51.0, -1.0, "give a position near the map"),
+    ):
+        sent = {"items": [item | {"lat_deg": lat, "lon_deg": lon}]}
+        answer = await client.post(f"/missions/{mission['id']}/measurements", json=sent)
+        assert words in answer.json()["items"][0]["reason"]
+        assert "smaller area" not in answer.text
 
 
 async def test_a_missing_field_is_named(client: httpx.AsyncClient) -> None:
@@ -201,6 +263,13 @@ async def test_an_unknown_planner_names_those_there_are(client: httpx.AsyncClien
     problem = assert_problem(answer, 422, "invalid-request")
     assert problem["errors"][0]["field"] == "planner.name"
     assert "cao" in problem["remedy"]
+
+
+async def test_an_option_that_there_is_none_of_names_those_of_its_planner(client: httpx.AsyncClient) -> None:
+    answer = await client.post("/missions", json=mission_spec(planner={"name": "lawnmower", "options": {"gap_m": 5}}))
+    [error] = assert_problem(answer, 422, "invalid-request")["errors"]
+    assert (error["field"], error["value"]) == ("planner.options.gap_m", 5)
+    assert error["expected"] == "its options are cruise_depth_m, turn_radius_m"
 
 
 async def test_a_move_that_is_not_allowed_says_what_to_do(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

@@ -40,6 +40,10 @@ REQUESTS: list[tuple[str, str, dict[str, Any]]] = [
     ("POST", "/missions/{id}/pause", {}),
     ("POST", "/missions/{id}/notes", {"json": {"text": " "}}),
     ("DELETE", "/missions/{id}/sound-speed", {}),
+    # What a route does not know is refused the same way.
+    ("GET", "/missions?all=1", {}),
+    ("POST", "/missions/{id}/start?dry_run=true", {}),
+    ("POST", "/missions/{id}/start", {"headers": {"Idempotency-Key": "a"}}),
 ]
 
 

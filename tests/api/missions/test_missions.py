@@ -9,6 +9,7 @@ import pytest
 from app.exploration.pcao.model import default_model
 from tests.support.api.rest import mission_spec, soundings
 from tests.support.missions.searches import search_json
+from tests.support.missions.specs import AREA
 
 
 async def test_a_new_mission_is_found_where_the_answer_says(client: httpx.AsyncClient) -> None:
@@ -108,6 +109,24 @@ async def test_vehicles_and_planners_are_listed(client: httpx.AsyncClient, missi
     planners = {p["name"]: p for p in (await client.get("/planners")).json()}
     assert {"cao", "random", "lawnmower"} <= set(planners)
     assert planners["cao"]["options"]["type"] == "object"
+    assert set(planners["lawnmower"]["options"]["properties"]) == {"cruise_depth_m", "turn_radius_m"}
+    assert "rollouts" in planners["rollout"]["options"]["properties"]
+    assert "rollouts" not in planners["cao"]["options"]["properties"]
+
+
+async def test_outlines_are_taken_as_programs_for_maps_write_them(client: httpx.AsyncClient) -> None:
+    [ring] = AREA["coordinates"]
+    high = {"type": "Polygon", "coordinates": [[[*place, 12.5] for place in ring]]}
+    parts = {"type": "MultiPolygon", "coordinates": [[ring]]}
+    feature = {"type": "Feature", "id": 1, "properties": {"name": "quay"}, "geometry": parts}
+    for area in (high, parts, feature):
+        answer = await client.post("/missions", json=mission_spec(area=area))
+        assert answer.status_code == 201, answer.text
+        assert answer.json()["spec"]["area"] == AREA
+    several = {"type": "MultiPolygon", "coordinates": [[ring], [ring]]}
+    answer = await client.post("/missions", json=mission_spec(area=several))
+    [error] = answer.json()["errors"]
+    assert (error["field"], error["expected"]) == ("area.coordinates", "give one polygon")
 
 
 async def test_a_mission_is_as_long_as_its_minutes_and_keeps_both_figures(client: httpx.AsyncClient) -> None:

@@ -177,7 +177,18 @@ def test_tracks_come_back_from_every_format(tmp_path: Path) -> None:
     text = tracks_kml(TRACKS, title=TITLE)
     document: Any = fastkml.KML.from_string(text, strict=True).features[0]  # type: ignore[arg-type]
     assert [mark.name for mark in document.features] == ["lauv-1"]
-    np.testing.assert_allclose([point[:2] for point in document.features[0].geometry.coords], expected, atol=1e-8)
+    track = document.features[0].kml_geometry
+    places = np.array([(item.coord.x, item.coord.y, item.coord.z) for item in track.track_items])
+    np.testing.assert_allclose(places[:, :2], expected, atol=1e-8)
+    assert places[:, 2].tolist() == [-2.0, -3.0, -4.0, -5.0, -6.0]
+    assert b"<altitudeMode>absolute</altitudeMode>" in text
+    assert [item.when.dt.timestamp() for item in track.track_items] == [p.time_s for p in TRACKS[0].points]
+
+
+def test_the_surface_is_at_zero_not_below() -> None:
+    track = Track("a", [TrackPoint(-8.7, 41.2, depth, 1.79e9 + i) for i, depth in enumerate((0.0, 0.0004, -0.0004))])
+    for file in (tracks_gpx([track], title=""), tracks_kml([track], title=""), tracks_geojson([track])):
+        assert b"-0.0" not in file
 
 
 def test_a_clock_gone_wild_does_not_keep_a_track_from_leaving() -> None:

@@ -445,6 +445,13 @@ def test_soundings_of_another_mission_come_in_without_the_rejected_ones(tmp_path
         ("lon,lat,depth,sd\n-8.7039,41.1851,5,5000", "uncertainty", "is above 1000 m"),
         ("", "file", "no sounding"),
         ("\x00\x01\x02", "line 1", "is not a number"),
+        ("lat,lon,depth_ft\n41.1,-8.7,5", "line 1", "column depth_ft is not known"),
+        ("Breite Laenge Tiefe\n41.1 -8.7 5", "line 1", "column Breite, Laenge, Tiefe is not known"),
+        ("lat,lon\n41.1,-8.7", "line 1", "no position, or no depth"),
+        ("lon,lat,depth\n-8,7039,41,1851,5,2", "line 2", "decimal commas"),
+        ("-8,7039,41,1851,5,2", "line 1", "decimal commas"),
+        ("-8,7039;41,1851;5,2", "line 1, column 1", "decimal commas"),
+        ("-8,7039 41,1851 5,2", "line 1", "decimal commas"),
     ],
 )
 def test_wrong_text_is_refused_by_line_and_column(text: str, field: str, message: str) -> None:

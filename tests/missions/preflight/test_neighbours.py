@@ -18,7 +18,7 @@ def rest_spec(vehicle: str, **changes: Any) -> MissionSpec:
 
 @pytest.mark.parametrize(
     ("east_m", "simulated", "told"),
-    [(0.0, False, True), (110.0, False, True), (200.0, False, False), (0.0, True, False)],
+    [(0.0, False, True), (110.0, False, True), (200.0, False, False), (0.0, True, True)],
     ids=["the same area", "turns reach over", "beside", "simulated ones"],
 )
 async def test_missions_at_sea_in_the_same_place_are_told_of(

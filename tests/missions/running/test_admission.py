@@ -6,6 +6,7 @@ import pytest
 from sqlalchemy import update
 
 from app.exploration.pcao.model import default_model
+from app.exploration.planner.options import PlannerOptions
 from app.missions.errors import InvalidRequestError
 from app.missions.service import MissionService
 from app.storage.models import MissionRow
@@ -53,6 +54,42 @@ async def test_a_trained_controller_is_refused_for_planners_that_do_not_fly_with
         await service.create(sim_spec("a", planner={"name": planner, "options": options}))
     assert (caught.value.field, "only pcao" in str(caught.value.remedy)) == ("planner.options.model", True)
     assert (await service.create(sim_spec("a", planner={"name": "pcao", "options": options}))).state == "ready"
+
+
+@pytest.mark.parametrize(
+    ("planner", "options", "refused"),
+    [
+        ("lawnmower", {"rollouts": 5, "candidates": 9}, "candidates"),
+        ("cao", {"rollouts": 5}, "rollouts"),
+        ("spsa", {"candidates": 9}, "candidates"),
+        ("random", {"accuracy_sd_m": 0.1}, "accuracy_sd_m"),
+    ],
+)
+async def test_options_that_a_planner_does_not_read_are_refused_with_those_that_it_does(
+    service: MissionService, planner: str, options: dict[str, Any], refused: str
+) -> None:
+    with pytest.raises(InvalidRequestError, match=f"planner '{planner}' has no option {refused}") as caught:
+        await service.create(sim_spec("a", planner={"name": planner, "options": options}))
+    assert caught.value.field == f"planner.options.{refused}"
+    assert "cruise_depth_m" in caught.value.remedy
+    assert refused not in caught.value.remedy
+    assert await service.rows() == []
+
+
+async def test_options_as_they_are_anyway_are_taken_for_any_planner(service: MissionService) -> None:
+    """A mission that is read and sent again has them all."""
+    options = PlannerOptions().model_dump(mode="json") | {"turn_radius_m": 6.0}
+    assert await service.create(sim_spec("a", planner={"name": "lawnmower", "options": options}))
+
+
+async def test_a_mission_that_was_stored_with_options_of_another_planner_opens(harbour: Harbour) -> None:
+    mission = await harbour.service.create(sim_spec("a", planner={"name": "lawnmower"}))
+    spec = (await harbour.service.get(mission.id)).spec.model_dump(mode="json")
+    spec["planner"]["options"]["rollouts"] = 5
+    async with harbour.database.writing() as session:
+        await session.execute(update(MissionRow).where(MissionRow.id == mission.id).values(spec=spec))
+    service = await harbour.reopen()
+    assert (await service.get(mission.id)).spec.planner.options.rollouts == 5
 
 
 async def test_a_mission_that_was_stored_with_a_controller_for_another_planner_opens(harbour: Harbour) -> None:

@@ -156,6 +156,10 @@ async def test_what_cannot_be_flown_is_refused_with_what_would_be_right(service:
         await vehicle_orders.go(live, "a", GoOrder(position=lon_lat(40.0, 40.0)), "Ana")
     with pytest.raises(InvalidRequestError, match="far from the mission"):
         await vehicle_orders.repeat_line(live, "a", RepeatOrder(near=(8.0, 50.0)), "Ana")
+    lon, lat = lon_lat(10.0, 10.0)
+    with pytest.raises(InvalidRequestError, match="far from the mission") as exchanged:
+        await vehicle_orders.go(live, "a", GoOrder(position=(lat, lon)), "Ana")
+    assert "latitude and longitude look exchanged" in exchanged.value.remedy
     with pytest.raises(VehicleNotFoundError, match="takes no part"):
         await vehicle_orders.go(live, "nobody", GoOrder(position=lon_lat(10.0, 10.0)), "Ana")
     large = DenserOrder.model_validate({"area": rectangle(5.0, 5.0, 75.0, 28.0), "line_spacing_m": 2.0})

@@ -43,12 +43,16 @@ async def soundings_page(
     after: int = 0,
     limit: int = 200,
 ) -> SoundingPage:
-    """Return up to ``limit`` soundings in any of the states with an id above ``after``, in the order they came."""
+    """Return up to ``limit`` soundings in any of the states with an id above ``after``, in the order they came.
+
+    Raises VehicleNotFoundError when ``vehicle`` never took part.
+    """
     await live.journal.flush()
     async with live.database.reading() as session:
         doubts = await _doubts(live, session)
         wanted = [SoundingRow.mission_id == live.id, or_(*(_condition(state, doubts) for state in states))]
         if vehicle is not None:
+            await _check_known(live, session, vehicle)
             wanted.append(SoundingRow.vehicle == vehicle)
         total = await session.scalar(select(func.count()).select_from(SoundingRow).where(*wanted))
         query = select(SoundingRow).where(*wanted, SoundingRow.id > after).order_by(SoundingRow.id).limit(limit + 1)
@@ -58,6 +62,15 @@ async def soundings_page(
         items=[_view(row, doubts) for row in rows[:limit]],
         next_after=rows[limit - 1].id if len(rows) > limit else None,
     )
+
+
+async def _check_known(live: LiveMission, session: AsyncSession, vehicle: str) -> None:
+    """Raise VehicleNotFoundError for a vehicle that neither takes part or did, nor has a sounding."""
+    if vehicle in live.team.departed:
+        return
+    sounded = select(SoundingRow.id).where(SoundingRow.mission_id == live.id, SoundingRow.vehicle == vehicle).limit(1)
+    if await session.scalar(sounded) is None:
+        live.team.named(vehicle)
 
 
 async def rule(live: LiveMission, sounding_id: int, ruling: Ruling, *, note: str = "", actor: str) -> SoundingView:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from app.compute.compute import Compute
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions.clock import now
-from app.missions.errors import MapNotReadyError, ProductUnavailableError
+from app.missions.errors import InvalidRequestError, MapNotReadyError, ProductUnavailableError
 from app.missions.live.mission import LiveMission
 from app.missions.live.sounding_store import accepted
 from app.missions.maps.builder import BuiltMap
@@ -62,7 +62,17 @@ async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True
 
 
 async def map_at_step(live: LiveMission, step: int) -> MapSnapshot:
-    """Return the map that soundings and pings until the end of a step make. Raises MapNotReadyError without any."""
+    """Return the map that soundings and pings until the end of a step make.
+
+    Raises
+    ------
+    InvalidRequestError, MapNotReadyError
+        For a step that the mission has not begun; where nothing was sounded until then.
+    """
+    if step > live.header.step:
+        raise InvalidRequestError(
+            "step", f"{step} is none of the mission's steps yet: its last is {live.header.step}", "give an earlier one"
+        )
     if live.builder.newest is None or live.builder.stale or live.builder.arrivals.at_rest:
         await live.build_map()
     found = await accepted(live.database, live.id, 0, until_step=step)

@@ -1238,7 +1238,7 @@ class PlannedVehicleView(Model):
 
 
 class PlannerOptions(Model):
-    """Settings of the planners. Every planner reads those that concern it."""
+    """Settings of the planners; each reads those that GET /api/v1/planners lists for it."""
 
     regressors: Literal["map", "polynomial"] = "map"
     """What CAO's estimator is linear in: predictions from the current map, or powers of raw positions."""
@@ -1286,7 +1286,7 @@ class PlannerSpec(Model):
     name: str = "cao"
     """One of the planners of GET /api/v1/planners"""
     options: PlannerOptions | None = None
-    """Its settings"""
+    """Its settings: those that GET /api/v1/planners lists for it"""
 
 
 class PlannerView(Model):
@@ -1310,7 +1310,9 @@ class PointView(Model):
 
 
 class PolygonGeometry(Model):
-    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes."""
+    """A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes. A Feature of one and a
+    MultiPolygon of one part are taken as that polygon; heights are left out.
+    """
 
     coordinates: list[list[tuple[float, float]]]
     """One ring of [longitude, latitude]; the last position repeats the first"""

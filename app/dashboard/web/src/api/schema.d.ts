@@ -4572,7 +4572,7 @@ export interface components {
         };
         /**
          * PlannerOptions
-         * @description Settings of the planners. Every planner reads those that concern it.
+         * @description Settings of the planners; each reads those that GET /api/v1/planners lists for it.
          */
         PlannerOptions: {
             /**
@@ -4680,7 +4680,7 @@ export interface components {
              * @default cao
              */
             name: string;
-            /** @description Its settings */
+            /** @description Its settings: those that GET /api/v1/planners lists for it */
             options?: components["schemas"]["PlannerOptions"];
         };
         /**
@@ -4730,6 +4730,8 @@ export interface components {
         /**
          * PolygonGeometry
          * @description A GeoJSON polygon: one closed outer ring of [longitude, latitude] positions, no holes.
+         *
+         *     A Feature of one and a MultiPolygon of one part are taken as that polygon; heights are left out.
          */
         PolygonGeometry: {
             /**
@@ -7790,6 +7792,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Too many requests */
             429: {
                 headers: {
@@ -7825,7 +7836,7 @@ export interface operations {
                     "application/json": components["schemas"]["MissionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8211,7 +8222,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8337,7 +8348,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8463,7 +8474,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8589,7 +8600,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8715,7 +8726,7 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9053,7 +9064,7 @@ export interface operations {
                     "application/json": components["schemas"]["EventView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9168,6 +9179,15 @@ export interface operations {
                     "application/json": components["schemas"]["ActionView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -9245,6 +9265,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -9326,6 +9355,15 @@ export interface operations {
                     "application/json": components["schemas"]["MissionView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -9403,6 +9441,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -9486,7 +9533,7 @@ export interface operations {
                     "application/json": components["schemas"]["MissionView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9608,6 +9655,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissionView"];
+                };
+            };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description An access token is needed */
@@ -9781,6 +9837,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Too many requests */
             429: {
                 headers: {
@@ -9816,7 +9881,7 @@ export interface operations {
                     "application/json": components["schemas"]["SiteView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10689,7 +10754,7 @@ export interface operations {
                     "application/json": components["schemas"]["ForecastView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10797,7 +10862,7 @@ export interface operations {
                     "application/json": components["schemas"]["ForecastView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10905,7 +10970,7 @@ export interface operations {
                     "application/json": components["schemas"]["PlanView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11942,7 +12007,7 @@ export interface operations {
                     "application/json": components["schemas"]["AdjustmentView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12238,7 +12303,7 @@ export interface operations {
                     "application/json": components["schemas"]["ImportView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12699,7 +12764,7 @@ export interface operations {
                     "application/json": components["schemas"]["ProposedZonesView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13936,7 +14001,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.geojson`: the vehicles' tracks with times and depths; `.kml`: the vehicles' tracks; `.gpx`: the vehicles' tracks with times and depths */
+            /** @description `.geojson`: the vehicles' tracks with times and depths; `.kml`: the vehicles' tracks with times and depths; `.gpx`: the vehicles' tracks with times and depths */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14111,6 +14176,15 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -14343,7 +14417,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description There is no such mission */
+            /** @description There is no such vehicle */
             404: {
                 headers: {
                     [name: string]: unknown;
@@ -14470,7 +14544,7 @@ export interface operations {
                     "application/json": components["schemas"]["RulingsView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14596,7 +14670,7 @@ export interface operations {
                     "application/json": components["schemas"]["RulingsView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14724,7 +14798,7 @@ export interface operations {
                     "application/json": components["schemas"]["SoundingView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14852,7 +14926,7 @@ export interface operations {
                     "application/json": components["schemas"]["SoundingView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15278,7 +15352,7 @@ export interface operations {
                     "application/json": components["schemas"]["BatchVerdict"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15665,6 +15739,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Too many requests */
             429: {
                 headers: {
@@ -15705,6 +15788,15 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15759,6 +15851,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Too many requests */
             429: {
                 headers: {
@@ -15799,6 +15900,15 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15912,7 +16022,7 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16036,6 +16146,15 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -16119,7 +16238,7 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16245,7 +16364,7 @@ export interface operations {
                     "application/json": components["schemas"]["OrderView"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16431,7 +16550,7 @@ export interface operations {
                     "application/json": components["schemas"]["AlarmReport"];
                 };
             };
-            /** @description The body cannot be read */
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16603,6 +16722,15 @@ export interface operations {
                     "application/json": components["schemas"]["AlarmReport"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -16762,6 +16890,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Too many requests */
             429: {
                 headers: {
@@ -16791,6 +16928,15 @@ export interface operations {
                     "application/json": components["schemas"]["SessionView"];
                 };
             };
+            /** @description A parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description An access token is needed */
             401: {
                 headers: {
@@ -16802,6 +16948,15 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16854,6 +17009,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description Too many requests */
             429: {
                 headers: {
@@ -16883,6 +17047,15 @@ export interface operations {
                     "application/json": components["schemas"]["ComponentHealth"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
         };
     };
     getLiveness: {
@@ -16903,6 +17076,15 @@ export interface operations {
                     "application/json": components["schemas"]["Liveness"];
                 };
             };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
         };
     };
     getReadiness: {
@@ -16921,6 +17103,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ComponentHealth"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description A component fails */
@@ -16963,6 +17154,15 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -47,6 +47,11 @@ function Algorithm() {
   const usable = planners.value.filter((p) => !p.problem);
   const broken = planners.value.filter((p) => p.problem);
   const chosen = usable.find((p) => p.name === draft.planner);
+  /** The settings that another planner has, too: others it would refuse. */
+  const kept = (next: PlannerView | undefined) => {
+    const known = (next?.options as { properties?: object } | undefined)?.properties ?? {};
+    return Object.fromEntries(Object.entries(draft.options).filter(([name]) => name in known));
+  };
   return (
     <>
       <h3>{say("compare.planner")}</h3>
@@ -56,7 +61,7 @@ function Algorithm() {
           value={draft.planner}
           options={same(usable.length > 0 ? usable.map((p) => p.name) : [draft.planner])}
           id="field-planner"
-          onChoose={(planner) => set({ planner })}
+          onChoose={(planner) => set({ planner, options: kept(usable.find((p) => p.name === planner)) })}
         />
         {chosen ? (
           <small>
