@@ -17,7 +17,6 @@ import structlog
 import uvicorn
 from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
-from sqlalchemy import make_url
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
@@ -59,7 +58,7 @@ from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.database import Database
 from app.storage.processes.membership import MembershipLostError
 from app.storage.queries.audit import Command
-from app.storage.upkeep.prepare import prepare_database
+from app.storage.upkeep.prepare import folder_of, prepare_database
 from app.supervision import Supervisor
 from imc_bridge import PortInUseError
 
@@ -409,10 +408,8 @@ async def serve(
 
 
 async def _first_token(edge: EdgeState) -> Path | None:
-    url = make_url(edge.settings.database_url)
-    file = url.database if url.get_backend_name() == "sqlite" else None
     try:
-        written = await edge.tokens.first_start(Path(file).parent if file else Path())
+        written = await edge.tokens.first_start(folder_of(edge.settings.database_url))
     except OSError as error:
         log.warning("no operator token could be written", reason=error.strerror)
         return None

@@ -109,10 +109,20 @@ def captures() -> Path:
 @pytest.fixture(scope="session")
 def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A certificate for localhost, signed by itself, and its key."""
+    return new_certificate(tmp_path_factory.mktemp("tls"))
+
+
+@pytest.fixture
+def other_certificate(tmp_path: Path) -> Path:
+    """Another one, of another key."""
+    return new_certificate(tmp_path)[0]
+
+
+def new_certificate(folder: Path) -> tuple[Path, Path]:
+    """Make a certificate for localhost, signed by itself, and its key."""
     openssl = shutil.which("openssl")
     if openssl is None:
         pytest.skip("openssl is not installed: no certificate can be made")
-    folder = tmp_path_factory.mktemp("tls")
     cert, key = folder / "cert.pem", folder / "key.pem"
     name = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
     new = [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2"]

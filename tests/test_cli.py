@@ -29,6 +29,7 @@ from tests.support.commands import serving
 from tests.support.imc import log_writer as writer
 from tests.support.mapping.multibeam import line, write_gsf, write_kmall
 from tests.support.paths import PROJECT
+from tests.support.ports import free_ports
 from tests.support.storage.rows import PING_FILE, PING_FILE_NAME, mission, ping_chunk
 
 COMMANDS = (
@@ -530,3 +531,28 @@ def test_missions_of_a_service_that_asks_for_a_token_are_reached_by_that_of_its_
         (tmp_path / "operator.token").unlink()
         assert bathyfleet("missions", "list", **here, BATHYFLEET_TOKEN=token).code == 0
         assert bathyfleet("missions", "list", "--url", url, "--token", "wrong").code == 1
+
+
+def test_missions_of_this_machine_are_reached_whatever_name_the_certificate_has_and_by_no_proxy(
+    bathyfleet: Run,
+    tmp_path: Path,
+    environment: dict[str, str],
+    certificate: tuple[Path, Path],
+    other_certificate: Path,
+) -> None:
+    cert, key = certificate  # for localhost
+    proxy = f"http://127.0.0.1:{free_ports(1)[0]}"
+    here = {
+        "BATHYFLEET_HOST": "::1",
+        "BATHYFLEET_TLS_CERTIFICATE": str(cert),
+        "BATHYFLEET_TLS_KEY": str(key),
+        "http_proxy": proxy,
+        "https_proxy": proxy,
+    }
+    with serving(tmp_path, environment | here) as (_, url):
+        port = str(httpx.URL(url).port)
+        listed = bathyfleet("missions", "list", **here, BATHYFLEET_PORT=port)
+        assert (listed.code, "there are no missions" in listed.stdout) == (0, True), listed.stderr
+        stranger = here | {"BATHYFLEET_TLS_CERTIFICATE": str(other_certificate)}
+        refused = bathyfleet("missions", "list", **stranger, BATHYFLEET_PORT=port)
+        assert (refused.code, "CERTIFICATE_VERIFY_FAILED" in refused.stderr) == (1, True)

@@ -83,9 +83,11 @@ def abort(mission: Mission = "", home: Home = None, note: Note = "", url: Url = 
 
 def _service(url: str | None, token: str | None) -> RunningService:
     settings = command_settings()
-    if url is None:
-        url, token = own_url(settings), token or own_token(settings)
-    return RunningService(url, token)
+    if url is not None:
+        return RunningService(url, token)
+    return RunningService(
+        own_url(settings), token or own_token(settings), settings.tls_certificate, on_this_machine=True
+    )
 
 
 def _left(mission: "MissionSummary") -> str:

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 from app.commands.command import CommandError
 
 if TYPE_CHECKING:
+    import ssl
+    from pathlib import Path
+
     import httpx
 
     from app.settings import Settings
@@ -21,15 +24,27 @@ class RunningService:
         Such as ``http://127.0.0.1:8080``.
     token : str or None
         Access token, where it asks for one.
+    certificate : Path or None
+        The certificate that it has, whatever name it is reached by; None: one that this machine trusts, of its name.
+    on_this_machine : bool
+        Whether it is reached without the proxy that the environment may name: it would be told the token.
     """
 
-    def __init__(self, url: str, token: str | None) -> None:
+    def __init__(
+        self, url: str, token: str | None, certificate: "Path | None" = None, *, on_this_machine: bool = False
+    ) -> None:
         import httpx
 
         self.url = url.rstrip("/")
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
         try:
-            self._client = httpx.Client(base_url=f"{self.url}/api/v1", headers=headers, timeout=300.0)
+            self._client = httpx.Client(
+                base_url=f"{self.url}/api/v1",
+                headers=headers,
+                timeout=300.0,
+                trust_env=not on_this_machine,
+                verify=True if certificate is None else trust(certificate),
+            )
         except httpx.InvalidURL as error:
             raise CommandError(f"{url!r} is no URL: {error}", "Such as http://127.0.0.1:8080") from None
 
@@ -86,16 +101,31 @@ def own_url(settings: "Settings") -> str:
     return f"{'http' if settings.tls_certificate is None else 'https'}://{host}:{settings.port}"
 
 
+def trust(certificate: "Path") -> "ssl.SSLContext":
+    """Return what trusts this certificate and no other, whatever name it is for.
+
+    Raises CommandError where it cannot be read.
+    """
+    import ssl
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    # The certificate itself is trusted, not only who signed it.
+    context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+    try:
+        context.load_verify_locations(certificate)
+    except OSError as error:
+        raise CommandError(f"{certificate} cannot be read: {error}", "Name the service with --url") from None
+    return context
+
+
 def own_token(settings: "Settings") -> str | None:
     """Return the token that the service's first start left in a file, where there is one that this user may read."""
-    from app.storage.upkeep.prepare import FIRST_TOKEN_FILE, file_of
+    from app.storage.upkeep.prepare import FIRST_TOKEN_FILE, folder_of
 
-    database = file_of(settings.database_url)
-    if database is None:
-        return None
     try:
-        return (database.parent / FIRST_TOKEN_FILE).read_text().strip()
-    except OSError:
+        return (folder_of(settings.database_url) / FIRST_TOKEN_FILE).read_text().strip()
+    except (OSError, UnicodeDecodeError):
         return None
 
 

@@ -106,9 +106,16 @@ def prune(
             found = await retention.ended_before(store, days)
             if not apply:
                 return found, len(await retention.unlisted_files(store, files)), ""
-            removed = [mission for mission in found if await retention.remove(store, mission.id, days, files)]
-            for mission in removed:
-                await noted(settings, "prune", f"{mission.name}, ended {mission.ended:%Y-%m-%d}", mission.id)
+            removed = []
+            for mission in found:
+                try:
+                    gone = await retention.remove(store, mission.id, days, files)
+                except PingPlaceError:  # it is gone, its files are not
+                    await noted(settings, "prune", f"{mission.name}, but its files of pings stay", mission.id)
+                    raise
+                if gone:
+                    removed.append(mission)
+                    await noted(settings, "prune", f"{mission.name}, ended {mission.ended:%Y-%m-%d}", mission.id)
             unlisted = len(await retention.unlisted_files(store, files))
             return removed, unlisted, await retention.give_space_back(settings.database_url)
         finally:
@@ -119,7 +126,9 @@ def prune(
     try:
         missions, unlisted, note = asyncio.run(run())
     except PingPlaceError as error:
-        raise CommandError(str(error), "Is pings_url right? Run it again when that place answers") from None
+        raise CommandError(
+            str(error), "Is pings_url right? Run it again when that place answers: it says which files no mission has"
+        ) from None
     for mission in missions:
         typer.echo(
             f"{mission.id}  ended {mission.ended:%Y-%m-%d}  {mission.soundings} soundings  {printable(mission.name)}"

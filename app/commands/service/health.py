@@ -34,6 +34,8 @@ def health(
         raise CommandError(f"{url} does not answer: {error}", "Is the service running with these settings?") from None
     except ValueError:
         raise CommandError(f"{url} answers, but not as bathyfleet does", "Is the port another program's?") from None
+    if not isinstance(said, dict) or "status" not in said:
+        raise CommandError(f"{url} answers, but not as bathyfleet does", "Is the port another program's?")
     components = ", ".join(f"{name} {state}" for name, state in said.get("components", {}).items())
     if not answer.is_success:
         raise CommandError(f"{url} is not well: {components or answer.status_code}")

@@ -101,6 +101,12 @@ def _look_for_restores(file: Path) -> None:
     )
 
 
+def folder_of(url: str) -> Path:
+    """Return the folder of an SQLite database, where the first start leaves its token; the working one for others."""
+    file = file_of(url)
+    return Path() if file is None else file.parent
+
+
 def file_of(url: str) -> Path | None:
     """Return the file of an SQLite database; None for other ones."""
     parsed = make_url(url)

@@ -12,7 +12,8 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.exploration.core.problem import Belief
 
 MOST = 3
-"""Steps in sight of where a landmark is estimated, with nothing learnt of it, after which it is set aside."""
+"""Steps in sight of where a landmark is estimated, with nothing learnt of it, after which it is set aside. A step in
+which a vehicle that headed for it is there counts twice."""
 
 WITHIN = 0.9
 """An estimate closer than this part of the distance of sight should have shown the landmark."""
@@ -47,7 +48,7 @@ class MissedLandmarks:
         self._sd_m = belief.sd_m.copy()
 
     def count(self, rows: IntArray) -> None:
-        """Count landmarks as missed once more, (k,): a vehicle came to where they are estimated."""
+        """Count landmarks as missed once more, (k,): a vehicle that headed for them is where they are estimated."""
         self._missed[rows] += 1
 
     def forget(self) -> None:

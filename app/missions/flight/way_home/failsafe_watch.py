@@ -272,7 +272,7 @@ class FailsafeWatch:
         before = self._told.get(name, frozenset())
         now = {one.failsafe: one for one in found}
         undecided = self._undecided(name, before, frozenset(now), now_s)
-        self._told[name] = stay = undecided | self._still_low(name, before | now.keys()) | now.keys()
+        self._told[name] = stay = undecided | self._still_low(name, before, frozenset(now)) | now.keys()
         who = f"{name}: " if name else ""
         for failsafe, one in now.items():
             if failsafe not in before:
@@ -292,12 +292,15 @@ class FailsafeWatch:
         if before != stay:
             self._live.publish_summary()
 
-    def _still_low(self, name: str, told: frozenset[Failsafe]) -> frozenset[Failsafe]:
+    def _still_low(self, name: str, before: frozenset[Failsafe], now: frozenset[Failsafe]) -> frozenset[Failsafe]:
         """Return which alarms of a vehicle's energy are so as long as it was not charged.
 
-        Nearer to home, or at home, less is needed, and no battery has more in it.
+        Nearer to home, or at home, less is needed, and no battery has more in it. Of an alarm of an earlier flight
+        nobody knows at which level it was: it is over unless it is so in this one, too.
         """
-        member, low = self._live.team.get(name), told & ENERGY
+        member, low = self._live.team.get(name), (before | now) & ENERGY
+        if name not in self._lowest and not now & ENERGY:
+            return frozenset()
         if member is None or not low:
             self._lowest.pop(name, None)
             return frozenset()

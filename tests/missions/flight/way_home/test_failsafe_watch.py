@@ -127,8 +127,10 @@ async def test_that_no_ship_is_heard_any_more_is_a_line_of_the_log(service: Miss
     assert "nothing for 60" in (await told(601.0, ""))[2][1]
 
 
-@pytest.mark.parametrize("at_home", [False, True])
-async def test_low_energy_is_not_over_while_the_battery_empties(service: MissionService, at_home: bool) -> None:
+@pytest.mark.parametrize(("at_home", "charged_between_flights"), [(False, False), (True, False), (True, True)])
+async def test_low_energy_is_over_once_the_battery_is_charged(
+    service: MissionService, at_home: bool, charged_between_flights: bool
+) -> None:
     spec = sim_spec("a", recovery={"point": lon_lat(2, 2)})
     vehicles = [vehicle.model_copy(update={"endurance_min": 60.0}) for vehicle in spec.vehicles]
     live = await service.get((await service.create(spec.model_copy(update={"vehicles": vehicles}))).id)
@@ -156,7 +158,10 @@ async def test_low_energy_is_not_over_while_the_battery_empties(service: Mission
         if at_home:
             assert a.withdrawal is not None
             a.withdrawal.over = True
-        assert await told(5.0, 11.9) == [low]
+        if charged_between_flights:
+            watch = watch_of(live, service)
+        else:
+            assert await told(5.0, 11.9) == [low]
         assert await told(5.0, 90.0) == [low, "a: low energy is over"]
     finally:
         watch_clock.undo()
