@@ -71,7 +71,10 @@ async def test_that_a_gauges_times_are_taken_for_utc_is_answered_and_logged(
     answer = await client.put(f"{path}/tide", json={"table": "\n".join(lines), "source": "gauge"})
     assert answer.status_code == 200, answer.text
     assert answer.json()["tide_table"]["utc_assumed"]
-    logged = [event["message"] for event in (await client.get(f"{path}/events")).json()["items"]]
+    logged = [
+        event["message"]
+        for event in (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+    ]
     assert any("whose times state no zone and are taken for UTC" in text for text in logged), logged
     stated = "\n".join(line.replace(";", "Z;") for line in lines)
     assert not (await client.put(f"{path}/tide", json={"table": stated})).json()["tide_table"]["utc_assumed"]

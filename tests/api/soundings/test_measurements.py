@@ -224,11 +224,14 @@ async def test_who_says_that_it_has_a_waypoint_of_a_step_to_come_is_refused(
     assert "it was given none yet" in answer.text
 
 
+@pytest.mark.parametrize(("started", "status", "words"), [(True, 409, "stop and hold"), (False, 503, "shutting down")])
 async def test_a_stopping_service_ends_the_wait(
-    server: Server, client: httpx.AsyncClient, mission: dict[str, Any]
+    server: Server, client: httpx.AsyncClient, mission: dict[str, Any], started: bool, status: int, words: str
 ) -> None:
+    """Whoever follows it is told to stop, all others to ask again."""
     path = f"/missions/{mission['id']}"
-    await client.post(f"{path}/start")
+    if started:
+        await client.post(f"{path}/start")
     waiting = asyncio.create_task(client.get(f"{path}/vehicles/rover/waypoint", params={"timeout_s": 60}))
     metrics = server.url + "/health"
     while True:  # until the wait has begun: the server answers a later request only after it accepted the earlier one
@@ -237,5 +240,5 @@ async def test_a_stopping_service_ends_the_wait(
             break
     server.stop()
     answer = await waiting
-    assert answer.status_code == 503
-    assert answer.headers["retry-after"]
+    assert (answer.status_code, words in answer.json()["detail"]) == (status, True), answer.text
+    assert ("retry-after" in answer.headers) is not started
