@@ -31,7 +31,7 @@ from app.mapping.readers.types import (
 )
 from app.mapping.s44 import NORMAL_95, Order, max_tvu_m
 from app.mapping.types import Grid, Soundings
-from app.mapping.water.vertical import datum_words, same_datum, vertical_part
+from app.mapping.water.vertical import datum_words, same_datum, vertical_part, vertical_unit
 
 SAME_UNIT = 1e-4
 """Files seldom tell which of the feet theirs are, whose lengths differ by less than this: their systems do."""
@@ -288,6 +288,13 @@ def _crs(found: "pyproj.CRS | str | None", options: ReadOptions, notes: list[str
         ) from None
     if not (crs.is_projected or crs.is_geographic or crs.is_compound):
         raise ReadError("crs", "it has no horizontal axes", "say for example EPSG:32629")
+    unit_m, unit = vertical_unit(crs)
+    if unit_m != 1.0:
+        raise ReadError(
+            "crs",
+            f"its vertical axis counts in {unit!r}, depths are taken in metres",
+            "send depths in metres and say a vertical system in metres, as in EPSG:32629+5715",
+        )
     return crs
 
 

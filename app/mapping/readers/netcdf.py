@@ -12,6 +12,7 @@ from app.arrays import FloatArray
 from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Positive, Raster, ReadError
 from app.mapping.readers.units import known_metres_in, metres_in
+from app.mapping.water.vertical import vertical_unit
 
 DEPTH_NAMES = ("depth", "elevation", "bathymetry", "z", "height", "topo", "band1")
 SD_NAMES = ("uncertainty", "sd", "depth_uncertainty", "standard_deviation")
@@ -56,17 +57,17 @@ def _read(file: Any) -> Raster:
     turned = _is_eastward(file, variable.dimensions[0]) and not _is_eastward(file, variable.dimensions[1])
     y_name, x_name = variable.dimensions[::-1] if turned else variable.dimensions
     y, x = _axis(file, y_name), _axis(file, x_name)
-    z = _metres(variable)
+    crs, unit_m = _crs(file, variable, x_name, y_name), _unit_m(file, x_name, y_name)
+    z = _metres(variable, crs)
     if not np.isfinite(z).any():
         raise ReadError(name, "no cell of it has a value", "check its _FillValue")
     sd = next((file.variables[n] for n in SD_NAMES if n in file.variables), None)
     same = sd is not None and sd.dimensions == variable.dimensions
-    sd_values = _metres(sd) if same else np.full(z.shape, np.nan)
+    sd_values = _metres(sd, crs) if same else np.full(z.shape, np.nan)
     if turned:
         z, sd_values = z.T, sd_values.T
     step_x, step_y = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
     transform = Affine(step_x, 0.0, x[0] - 0.5 * step_x, 0.0, step_y, y[0] - 0.5 * step_y)
-    crs, unit_m = _crs(file, variable, x_name, y_name), _unit_m(file, x_name, y_name)
     return Raster(z, sd_values, transform, crs, _direction(variable), unit_m)
 
 
@@ -125,8 +126,11 @@ def _is_eastward(file: Any, name: str) -> bool:
     )
 
 
-def _metres(variable: Any) -> FloatArray:
-    return metres_in(getattr(variable, "units", ""), _called(variable.name)) * _values(variable)
+def _metres(variable: Any, crs: pyproj.CRS | None) -> FloatArray:
+    """Return values in metres by their own unit, else by that of the vertical axis."""
+    said = str(getattr(variable, "units", "")).strip()
+    unit_m = metres_in(said, _called(variable.name)) if said else vertical_unit(crs)[0]
+    return unit_m * _values(variable)
 
 
 def _values(variable: Any) -> FloatArray:

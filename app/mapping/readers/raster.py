@@ -14,6 +14,7 @@ from app.mapping.readers.hdf5 import check_contained
 from app.mapping.readers.types import MAX_RASTER_CELLS, Points, Positive, Raster, ReadError
 from app.mapping.readers.units import metres_in
 from app.mapping.readers.vr_bag import read_refined
+from app.mapping.water.vertical import vertical_unit
 
 DEPTH_BANDS = ("depth", "elevation", "height", "z")
 SD_BANDS = ("uncertainty", "sd", "standard deviation", "standard_deviation")
@@ -152,8 +153,7 @@ def _metres(file: Any, number: int) -> float:
     crs = _crs(file)
     if said or crs is None or file.driver == "BAG":
         return metres_in(said, f"band {number}")
-    vertical = next((part for part in crs.sub_crs_list if part.is_vertical), None)
-    return 1.0 if vertical is None else float(vertical.axis_info[0].unit_conversion_factor)
+    return vertical_unit(crs)[0]
 
 
 def _direction(file: Any, name: str) -> Positive | None:

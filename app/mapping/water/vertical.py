@@ -1,5 +1,7 @@
 """What depths are counted from, as a coordinate reference system and in words."""
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
@@ -65,15 +67,37 @@ class VerticalDatum:
 def vertical_part(crs: pyproj.CRS | None) -> pyproj.CRS | None:
     """Return the vertical system in a coordinate reference system, of one in space that one itself.
 
-    None where it states none, an unknown one, or the water level of the moment, which is no datum.
+    None where it states none, an unknown one, or the water level of the moment, which is no datum. PROJ takes a
+    vertical unit alone for heights above the ellipsoid, in a system that it has no name for: that states no datum.
     """
-    if crs is None:
-        return None
-    found = next((part for part in (crs, *crs.sub_crs_list) if part.is_vertical and not part.sub_crs_list), None)
+    parts = [] if crs is None else list(_parts(crs))
+    found = next((part for part in parts if part.is_vertical), None)
     if found is None:
-        return crs if len(crs.axis_info) == 3 and not crs.is_compound else None
+        in_space = len(parts) == 1 and len(parts[0].axis_info) == 3 and parts[0].name.lower() != "unknown"
+        return parts[0] if in_space else None
     name = _datum_name(found)
-    return None if name.startswith(_NO_DATUM) or name == _datum_name(_INSTANTANEOUS) else found
+    none = name in _NO_DATUM_NAMES or name.startswith(_NO_DATUM)
+    return None if none or name == _datum_name(_INSTANTANEOUS) else found
+
+
+def vertical_unit(crs: pyproj.CRS | None) -> tuple[float, str]:
+    """Return how many metres the unit of the vertical axis has, and its name; metres where there is no such axis."""
+    for part in [] if crs is None else _parts(crs):
+        if part.is_vertical or len(part.axis_info) == 3:
+            axis = part.axis_info[-1]
+            return float(axis.unit_conversion_factor), str(axis.unit_name)
+    return 1.0, "metre"
+
+
+def _parts(crs: pyproj.CRS) -> Iterator[pyproj.CRS]:
+    """Yield the single systems that one is made of, without what leads from them to others."""
+    if crs.is_bound and crs.source_crs is not None:
+        yield from _parts(crs.source_crs)
+    elif crs.sub_crs_list:
+        for part in crs.sub_crs_list:
+            yield from _parts(part)
+    else:
+        yield crs
 
 
 def same_datum(one: pyproj.CRS, other: pyproj.CRS) -> bool:
@@ -108,11 +132,38 @@ def _s100_by_name() -> dict[str, int]:
 def _datum_name(crs: pyproj.CRS) -> str:
     described = crs.to_json_dict()
     name = (described.get("datum") or described.get("datum_ensemble") or {}).get("name", "unknown")
+    name = name.removeprefix("D_")  # as Esri begins them
+    plain, short = _letters(name), re.fullmatch(r"(.*)\((.*)\)\s*", name)
+    if short is not None and _ALIASES.get(_letters(short[2])) == _letters(short[1]):
+        plain = _letters(short[1])
+    return _ALIASES.get(plain, plain)
+
+
+def _letters(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())
 
 
+_ALIASES = {
+    "msl": "meansealevel",
+    "lat": "lowestastronomicaltide",
+    "mllw": "meanlowerlowwater",
+    "mlw": "meanlowwater",
+    "mlws": "meanlowwaterspringtides",
+    "meanlowwatersprings": "meanlowwaterspringtides",
+    "mllws": "meanlowerlowwaterspringtides",
+    "meanlowerlowwatersprings": "meanlowerlowwaterspringtides",
+    "islw": "indianspringlowwater",
+    "llwlt": "lowerlowwaterlargetide",
+    "bscd2000": "balticseachartdatum2000",
+}
+"""Names that programs give to datums for those of EPSG's register, as letters and digits."""
+
 _INSTANTANEOUS = pyproj.CRS.from_epsg(INSTANTANEOUS_WATER_LEVEL)
-_NO_DATUM = ("unknown", "unnamed", "undefined", "notspecified")
+_NO_DATUM = ("unknown", "unnamed", "undefined", "notspecified", "unspecified")
+_NO_DATUM_NAMES = frozenset(
+    {"", "none", "null", "na", "local", "localdatum", "chartdatum", "localchartdatum", "userdefined"}
+)
+"""A chart's datum is that of no place in particular."""
 
 
 def check_depth_datum(epsg: int) -> str:

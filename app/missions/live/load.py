@@ -62,7 +62,7 @@ async def take_up(
     spec = await loop.run_in_executor(threads.planning, stored_spec, row)
     table = None
     if tide is not None:
-        table = await loop.run_in_executor(threads.planning, partial(parse_tid, tide.text, name=tide.name))
+        table = await loop.run_in_executor(threads.planning, partial(parse_tid, tide.text, name=tide.name, stored=True))
     adjustment = None
     if drift is not None:
         adjustment = await loop.run_in_executor(threads.planning, TrackAdjustment.unpack, drift.content)

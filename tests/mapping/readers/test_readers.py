@@ -276,8 +276,9 @@ def test_netcdf_with_latitude_and_longitude_and_heights(tmp_path: Path) -> None:
         ("int16", "m", None, 0.01, 2.0),
         ("float64", "ft", None, 1.0, 0.0),
         ("float64", "", 6360, 1.0, 0.0),
+        ("float64", "", 8053, 1.0, 0.0),
     ],
-    ids=["whole centimetres", "whole centimetres from 2 m", "feet", "a vertical system in US survey feet"],
+    ids=["whole centimetres", "whole centimetres from 2 m", "feet", "a vertical system in US survey feet", "depths"],
 )
 def test_what_a_raster_says_of_its_numbers_is_heeded(
     dtype: str, unit: str, vertical: int | None, scale: float, offset: float, tmp_path: Path
@@ -549,6 +550,63 @@ def test_a_vertical_system_of_heights_is_held_against_the_missions_depths(vertic
         assert found.soundings.depth_m == pytest.approx(5.0 + offset_m)
     if "MSL" in words:
         assert place_soundings(local, ReadOptions(), replace(PLACE, datum_epsg=5715)).notes == []
+
+
+def with_vertical(words: str) -> pyproj.CRS:
+    """WKT 1 of the mission's frame and a vertical system."""
+    horizontal = pyproj.CRS.from_epsg(32629).to_wkt("WKT1_GDAL")
+    return pyproj.CRS.from_wkt(f'COMPD_CS["x",{horizontal},VERT_CS["h",{words},UNIT["metre",1],AXIS["Up",UP]]]')
+
+
+def in_utm(crs: pyproj.CRS) -> Raster:
+    west, north = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True).transform(-10.0, 70.0)
+    values = np.full((40, 40), -5.0)
+    return Raster(values, np.full((40, 40), 0.1), Affine(2, 0, west, 0, -2, north), crs, "up")
+
+
+def test_a_grid_of_a_geoid_beside_a_datum_does_not_hide_it() -> None:
+    crs = with_vertical(
+        'VERT_DATUM["EGM96 geoid",2005,EXTENSION["PROJ4_GRIDS","egm96_15.gtx"],AUTHORITY["EPSG","5171"]]'
+    )
+    with pytest.raises(ReadError, match="count from"):
+        place_soundings(in_utm(crs), ReadOptions(), replace(PLACE, datum_epsg=5861))
+
+
+@pytest.mark.parametrize(
+    ("name", "epsg"),
+    [("MLLW", 5866), ("MSL", 5715), ("LAT", 5861), ("D_Mean_Sea_Level", 5715), ("Mean Lower Low Water (MLLW)", 5866)],
+)
+def test_datums_are_known_by_their_usual_names(name: str, epsg: int) -> None:
+    grid = in_utm(with_vertical(f'VERT_DATUM["{name}",2005]'))
+    assert place_soundings(grid, ReadOptions(), replace(PLACE, datum_epsg=epsg)).notes == []
+    with pytest.raises(ReadError, match=r"count from (?!a vertical datum that)"):
+        place_soundings(grid, ReadOptions(), replace(PLACE, datum_epsg=5862))
+
+
+@pytest.mark.parametrize("name", ["none", "Local", "unknown", "Chart Datum"])
+def test_what_names_no_datum_states_none(name: str) -> None:
+    grid = in_utm(with_vertical(f'VERT_DATUM["{name}",2005]'))
+    (note,) = place_soundings(grid, ReadOptions(), replace(PLACE, datum_epsg=5861)).notes
+    assert "the file none" in note
+
+
+def test_a_vertical_unit_alone_states_no_datum() -> None:
+    grid = in_utm(pyproj.CRS.from_user_input("+proj=utm +zone=29 +datum=WGS84 +vunits=m +type=crs"))
+    (note,) = place_soundings(grid, ReadOptions(), replace(PLACE, datum_epsg=5861)).notes
+    assert "the file none" in note
+
+
+def test_depths_without_a_unit_are_not_taken_for_those_of_a_system_in_feet(tmp_path: Path) -> None:
+    x, y = pyproj.Transformer.from_crs(FRAME.crs, UTM, always_xy=True).transform(0.0, 0.0)
+    points = read_words(f"{x} {y} 30.0\n")
+    with pytest.raises(ReadError, match="US survey foot"):
+        place_soundings(points, ReadOptions(crs="EPSG:32629+8053", sd_m=0.1), replace(PLACE, datum_epsg=5715))
+    write_netcdf(path := tmp_path / "a.nc", "depth", "", 1200 / 3937)
+    with netCDF4.Dataset(path, "a") as file:
+        file.createVariable("crs", "i4").crs_wkt = pyproj.CRS.from_user_input("EPSG:32629+8053").to_wkt()
+        file["depth"].grid_mapping = "crs"
+    content = read_path(path)
+    np.testing.assert_allclose(content.z, depth_at(*np.meshgrid(GRID.east_m, GRID.north_m)))
 
 
 def test_heights_above_the_ellipsoid_are_no_depths_below_a_datum() -> None:

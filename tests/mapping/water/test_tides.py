@@ -1,16 +1,18 @@
 """Levels from a table of high and low waters."""
 
 import math
+import re
 from contextlib import suppress
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta
+from datetime import time as clock_time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from app.mapping.water.tides import MAX_GAP_S, TideTableError, parse_tid
+from app.mapping.water.tides import MAX_GAP_S, MAX_LEVEL_M, TideTableError, parse_tid
 
 TABLE = """# Tides Data
 # Time zone: UTC
@@ -144,9 +146,20 @@ def test_levels_too_far_apart_to_tell_the_tide_are_not_taken_for_extremes(every_
         ("30/11/2026 11:00 1.0\n30/11/2026 11:06 1.1", "line 1: '30/11/2026 11:00 1.0' .* write the year first"),
         ("2026-11-30T11:00:00+25:00 1.0", "line 1: .* is no date and time"),
         ("2026-11-30 11:00,1,0\n", "line 1: '2026-11-30 11:00,1,0' is not of the form"),
-        ("time (UTC+1);level\n", "line 1: the header states the time zone 'UTC\\+1'; times must be UTC"),
-        ("# of a gauge\nlocal time;level\n", "line 2: the header states the time zone 'local'"),
-        ("time,level (cm)\n", "line 1: the header states levels in 'cm'; they must be in metres"),
+        ("time (UTC+1);level\n", "line 1: the table states the time zone 'UTC\\+1'; times must be UTC"),
+        ("# of a gauge\nlocal time;level\n", "line 2: the table states the time zone 'local'"),
+        ("time,level (cm)\n", "line 1: the table states levels in 'cm'; they must be in metres"),
+        ("Time (JST),level\n", "line 1: the table states the time zone 'JST'"),
+        ("Time (+09:00),level\n", "line 1: the table states the time zone"),
+        ("time_local,level_m\n", "line 1: the table states the time zone 'local'"),
+        ("Date Time,LST,Level\n", "line 1: the table states the time zone 'LST'"),
+        ("# units: ft\n", "line 1: the table states levels in 'ft'"),
+        ("# time [LST], level [ft]\n", "line 1: the table states the time zone 'LST'"),
+        ("# times are local\n", "line 1: the table states the time zone 'local'"),
+        ("2026-11-30T11:00:00+0190 1.0", "line 1: .* is no date and time .*is no offset"),
+        ("2026-11-30 11:00:00 +0190 1.0", "line 1: .* is no date and time .*is no offset"),
+        ("2026-11-30 11:00:00 +01,5\n", "line 1: .* is not of the form"),
+        ("2021/01/31 05:20" + 1_000_000 * " " + "x", "line 1: .* is not of the form"),
         ("time,level\ntime,level\n", "line 2: 'time,level' is not of the form"),
         ("\x00\x01", "line 1"),
     ],
@@ -167,6 +180,11 @@ ELEVEN_S, NOON_S = 1_796_036_400.0, 1_796_040_000.0
         "2026-11-30T06:30:00.000-0430\t1.0\n2026-11-30T07:30:00.000-0430\t1.25\n",
         "2026-11-30 11:00Z,1.0\n2026-11-30 12:00Z, 1.25\n",
         "# of a gauge\ntime (UTC);level (m)\n2026-11-30 11:00;1,0\n2026-11-30 12:00;1,25\n",
+        "2026-11-30 12:00:00 +01:00 1.0\n2026-11-30 13:00:00 +01:00 1.25\n",
+        "2026-11-30 12:00:00 +0100,1.0\n2026-11-30 13:00:00 +0100,1.25\n",
+        "Key West, time UTC, level m\n2026-11-30 11:00,1.0\n2026-11-30 12:00,1.25\n",
+        "Station BST 12, UTC\n2026-11-30 11:00,1.0\n2026-11-30 12:00,1.25\n",
+        "# time [UTC], level [m]\n2026-11-30 11:00,1.0\n2026-11-30 12:00,1.25\n",
         "\ufeffdate;time;level\r\n2026-11-30;11:00 UTC;1.0\r\n2026-11-30;12:00 UTC;1.25\r\n",
     ],
 )
@@ -184,6 +202,63 @@ def test_times_without_a_zone_are_utc_and_the_table_says_so(separator: str, seco
     assert (table.times_s.tolist(), table.levels_m.tolist()) == ([ELEVEN_S, NOON_S], [1.0, 1.25])
     assert table.utc_assumed
     assert not parse_tid("\n".join(["# Time zone: UTC", *lines])).utc_assumed
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "# Harbor: Key West",
+        "# Key West",
+        "Key West, time, level",
+        "# 3 ft above the pier",
+        "# Local datum",
+        "time,z",
+        "# Made 2026-12-01 09:30 UTC+1",
+        "# Foot of the mole, BST 12",
+        "time (hh:mm),level (m)",
+    ],
+)
+def test_names_are_no_zones_and_no_units(words: str) -> None:
+    assert parse_tid(f"{words}\n2026-11-30 11:00,1.0\n2026-11-30 12:00,1.25\n").utc_assumed
+
+
+FORMER = re.compile(
+    r"(\d{4})/(\d{2})/(\d{2})\s+(\d{2}):(\d{2})(?::(\d{2})(?:\.(\d{1,6}))?)?\s+([-+]?\d+(?:\.\d*)?)\s*\Z"
+)
+"""Lines that were taken until other forms were, too: missions are stored with them."""
+
+BLANKS = st.text("\t \x1f\xa0\u1680\u2003\u202f\u205f\u3000", min_size=1, max_size=4)
+
+
+@given(
+    st.dates(max_value=date(9999, 12, 30)),
+    st.times(),
+    st.lists(BLANKS, min_size=2, max_size=2),
+    st.sampled_from(["{:%H:%M}", "{:%H:%M:%S}", "{:%H:%M:%S.%f}", "{:%H:%M:%S}.5"]),
+    st.from_regex(r"[-+]?\d+(?:\.\d*)?", fullmatch=True),
+    st.sampled_from(["0123456789", "\u0660\u0661\u0662\u0663\u0664\u0665\u0666\u0667\u0668\u0669"]),
+)
+@example(date(2021, 1, 31), clock_time(5, 20), ["\xa0", " "], "{:%H:%M}", "1.1", "0123456789")
+def test_every_line_that_ever_was_taken_is(
+    day: date, hour: clock_time, blanks: list[str], form: str, level: str, digits: str
+) -> None:
+    entry = f"{day.year:04}/{day:%m/%d}{blanks[0]}{form.format(hour)}{blanks[1]}{level}".translate(
+        str.maketrans("0123456789", digits)
+    )
+    match = FORMER.match(entry)
+    assert match is not None
+    assume(abs(float(level)) <= MAX_LEVEL_M)
+    *parts, second, fraction, told = match.groups()
+    time = datetime(*map(int, parts), int(second or 0), tzinfo=UTC)  # type: ignore[arg-type, misc]
+    time += timedelta(microseconds=int((fraction or "0").ljust(6, "0")))
+    table = parse_tid(f"{entry}\n9999/12/31 23:59 1.0", stored=True)
+    assert table.times_s[0] == pytest.approx(time.timestamp(), abs=1e-4)
+    assert table.levels_m[0] == float(told)
+
+
+@pytest.mark.parametrize("words", ["# units: ft", "# time [LST], level [ft]", "# local time", "# UTC+1"])
+def test_a_stored_table_is_not_refused_for_its_comments(words: str) -> None:
+    assert parse_tid(f"{words}\n{TABLE}", stored=True).times_s.tolist() == parse_tid(TABLE).times_s.tolist()
 
 
 @given(st.text())
