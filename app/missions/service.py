@@ -228,6 +228,11 @@ class MissionService:
                 tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
         self.vehicles_stopped.set()
 
+    @property
+    def all_stopped(self) -> bool:
+        """Whether the service ends and nothing is left that leads vehicles, or has to stop them once more."""
+        return self.vehicles_stopped.is_set() and not self._runs and self._supervisor.all_ended
+
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down.
 

@@ -104,6 +104,11 @@ class MissionSupervisor:
         """Whether the service ends, so that no flight begins any more."""
         return self._no_more
 
+    @property
+    def all_ended(self) -> bool:
+        """Whether every flight that was broken off has ended."""
+        return not self._ending
+
     def refuse_to_begin(self) -> None:
         """Raise ConflictError once no flight begins any more."""
         if self._no_more:
