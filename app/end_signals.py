@@ -1,10 +1,12 @@
 """Signals that end the service: none of them keeps vehicles from being stopped."""
 
 import asyncio
+import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import structlog
 
@@ -14,13 +16,20 @@ log = structlog.get_logger(__name__)
 
 
 class EndSignals:
-    """SIGINT and SIGTERM from before the start until every vehicle is stopped.
+    """SIGINT and SIGTERM from before the start to the end.
 
     The first one ends the service: while it starts by a cancellation, then by what :meth:`ended_by` names. Later ones
-    end no process whose vehicles are being stopped.
+    end no process that still stops vehicles or writes down what it accepted; after that the next one ends it without
+    waiting for anything else.
+
+    Parameters
+    ----------
+    written
+        Whether the service ends, has stopped all vehicles and written everything down.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, written: Callable[[], bool]) -> None:
+        self._written = written
         self._received = False
         self._end: Callable[[int], None] = self._cancel
         self._starting: asyncio.Task[object] | None = None
@@ -53,8 +62,18 @@ class EndSignals:
                 loop.remove_signal_handler(number)
 
     def _receive(self, number: int) -> None:
-        words = "the vehicles are being stopped, then it ends" if self._received else "stopping the vehicles"
-        log.warning(f"asked to end: {words}", signal=signal.Signals(number).name)
+        name, written = signal.Signals(number).name, self._written()
+        if self._received and written:
+            log.warning("asked to end again: everything is written, it ends at once", signal=name)
+            _end_at_once()
+            return
+        if written:
+            words = "everything is written and it ends; another signal ends it at once"
+        elif self._received:
+            words = "the vehicles are being stopped and everything is written down, then it ends"
+        else:
+            words = "stopping the vehicles"
+        log.warning(f"asked to end: {words}", signal=name)
         self._received = True
         self._end(number)
 
@@ -62,3 +81,11 @@ class EndSignals:
         if self._starting is not None and not self._cancelled:
             self._cancelled = True
             self._starting.cancel()
+
+
+def _end_at_once() -> None:
+    """End the process: a thread that hangs would hold up every other way to end."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(0)

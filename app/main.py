@@ -385,7 +385,10 @@ async def serve(
     allow_descriptors(settings.max_connections)
     listening = listen(settings)
     supervisor = Supervisor.of(os.environ)
-    signals = EndSignals()
+
+    def written() -> bool:
+        edge: EdgeState | None = getattr(app.state, "edge", None)
+        return edge is not None and edge.service.all_written
 
     def begun(server: Server) -> None:
         supervisor.tell(READY="1", STATUS=f"answers at {server.url}")
@@ -394,7 +397,8 @@ async def serve(
 
     try:
         app = create_app(settings, port=listening.getsockname()[1])
-        # Signals from before the first mission is taken up to the very end, when all vehicles are stopped.
+        signals = EndSignals(written)
+        # Signals from before the first mission is taken up to the very end.
         with signals.caught():
             async with supervisor.watching(), app.router.lifespan_context(app):
                 first_token = await _first_token(app.state.edge) if with_first_token else None

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.compute.compute import Compute
 from app.exploration.planners import INSTALLED
@@ -19,7 +20,7 @@ from app.missions import states
 from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import ConflictError, MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
+from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
@@ -59,7 +60,7 @@ from app.missions.traffic.watch import Traffic
 from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
 from app.missions.views.mission import ActionView, Level, MissionSummary, MissionView, VehicleView
 from app.missions.views.traffic import TrafficView, traffic_findings
-from app.storage.database import Database
+from app.storage.database import Database, Guard
 from app.storage.fast_read import AtOnce
 from app.storage.models import MissionRow
 from app.storage.ping_files import PingFiles
@@ -157,8 +158,7 @@ class MissionService:
         self._succession = Succession(database, self.get, self._start_following)
         self._supervisor.ended = self._succession.ended
         self._removing: asyncio.Task[None] | None = None
-        self._started = False
-        self._ending = False
+        self._started = self._written = False
         self.vehicles_stopped = asyncio.Event()
         """Set when the service ends and has stopped the vehicles: until then they may poll, and are told so."""
 
@@ -208,8 +208,9 @@ class MissionService:
             log.warning("files of pings of removed missions stay: they could not be looked for", error=str(error))
 
     def begin_no_more(self) -> None:
-        """Refuse to start and resume missions from now on: the vehicles are about to be stopped."""
-        self._started, self._ending = False, True
+        """Begin no flight from now on, whoever asks: the vehicles are about to be stopped."""
+        self._started = False
+        self._supervisor.begin_no_more()
 
     async def stop_vehicles(self) -> None:
         """Stop every vehicle, before anything else is waited for, and begin no flight any more."""
@@ -226,6 +227,11 @@ class MissionService:
                 words = "acknowledged the stop" if stop.acknowledged else "has NOT acknowledged the stop"
                 tell(f"the service ends: {stop.vehicle} {words}", mission=live.id, detail=stop.detail)
         self.vehicles_stopped.set()
+
+    @property
+    def all_written(self) -> bool:
+        """Whether the service ends, has stopped all vehicles, and has written down everything that was accepted."""
+        return self._written
 
     async def shutdown(self) -> None:
         """Stop every vehicle and write everything down.
@@ -248,6 +254,7 @@ class MissionService:
         await self._supervisor.close()
         await self._registry.close()
         await self.process.leave()
+        self._written = True
         self._compilation.end()
         self._compiling.shutdown(wait=True, cancel_futures=True)
         self._threads.close()
@@ -366,11 +373,11 @@ class MissionService:
         Raises
         ------
         MoveRefusedError, ConflictError
-            The latter when a vehicle is not ready or takes part in another mission, or none has a recovery point to go
-            to.
+            The latter when a vehicle is not ready or takes part in another mission, none has a recovery point to go
+            to, or the service ends and a flight would begin.
         """
-        if self._ending and action in (Action.START, Action.RESUME):
-            raise ConflictError("the service ends: it begins no flight", "ask again when it runs")
+        if action in (Action.START, Action.RESUME):
+            self._supervisor.refuse_to_begin()
         stops_all = action in (Action.PAUSE, Action.ABORT) and not return_home
         if stops_all and live.header.state is MissionState.RUNNING and await self._supervisor.held_up(live):
             await self._supervisor.halt(live)
@@ -391,7 +398,7 @@ class MissionService:
                     nearby = [check.message for check in neighbour_checks(live, await self.at_sea())]
                 self._claims.claim_team(live)
                 try:
-                    await self._supervisor.set_state(live, target, note, actor, check=free_elsewhere(live))
+                    await self._supervisor.set_state(live, target, note, actor, check=self._may_set_off(live))
                 except BaseException:
                     if action == Action.START:
                         self._claims.release_team(live)
@@ -405,6 +412,17 @@ class MissionService:
                     self._supervisor.dismiss(live)
                 live.publish_summary()
         return action_view(live, stops)
+
+    def _may_set_off(self, live: LiveMission) -> Guard:
+        """Return what refuses a transaction by which a mission goes to sea that must not."""
+        free = free_elsewhere(live)
+
+        async def check(session: AsyncSession) -> None:
+            await free(session)
+            # It may have begun to end since the mission was asked to start.
+            self._supervisor.refuse_to_begin()
+
+        return check
 
     async def _start_following(self, live: LiveMission, why: str) -> None:
         await self.act(live, Action.START, actor="service", note=why)

@@ -76,3 +76,22 @@ async def test_a_mission_is_taken_up_while_the_place_of_its_pings_does_not_answe
         finally:
             if again.process is not None and again.process.returncode is None:
                 await again.kill()
+
+
+async def test_a_service_ends_while_the_place_of_its_pings_never_answers(tmp_path: Path, silent: SilentServer) -> None:
+    async with service_in(tmp_path) as (service, api):
+        mission_id = await mission_with_pings(api)
+        await service.kill()
+        elsewhere = {"PINGS_URL": f"ftp://127.0.0.1:{silent.port}/pings"}
+        forever = {"FTP_TIMEOUT_S": "100000"}
+        again = Service(tmp_path, settings=elsewhere, world=forever, port=service.port)
+        await again.start()
+        try:
+            await again.await_ready(api)
+            await until(lambda: silent.writers, "the files are asked for")
+            assert await again.end() == 0
+            assert "acknowledged the stop" in again.said
+            assert again.rows("select state from missions where id = ?", mission_id) == [("running",)]
+        finally:
+            if again.process is not None and again.process.returncode is None:
+                await again.kill()

@@ -568,12 +568,12 @@ class LiveMission:
         self.pings.abandon()
         self.broadcaster.end(why)
 
-    async def close(self) -> None:
-        """Write what is left."""
+    async def close(self, until_s: float | None = None) -> None:
+        """Write what is left; ``until_s``: as for ``PingStore.close``."""
         await self.feed.close()
         await self.ranges.close()
         await self.journal.close()
-        await self.pings.close()
+        await self.pings.close(until_s)
         await self.stored_soundings.close(self.header.step)
 
 

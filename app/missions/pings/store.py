@@ -23,6 +23,7 @@ from app.missions.pings.chunk_file import Block, read_chunk, write_chunk
 from app.missions.pings.codec import JudgedPings, columns_of, joined, pack, unpack
 from app.missions.pings.gate import PingGate, storable
 from app.missions.views.measurements.soundings import ItemVerdict, Verdict
+from app.storage.concurrency.own_thread import on_own_thread
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
 from app.storage.models import PingBlockRow, PingChunkRow
@@ -38,6 +39,8 @@ CHUNK_PINGS = 4096
 """So many pings of a vehicle are moved to a file."""
 BLOCKS_AT_ONCE = 256
 """Blocks that are read together."""
+CLOSE_S = 5.0
+"""How long a mission, or all of them when the service ends, may take to move their last pings."""
 WAIT_S = 60.0
 """How long a file that could not be written is left alone."""
 
@@ -127,11 +130,11 @@ class PingStore:
             return  # a file is made of what is stored
         async with self._moving:
             # In this order: what another process writes once it has the mission was not found before.
-            left = await asyncio.to_thread(self._files.unfinished, self._mission_id)
+            left = await on_own_thread(self._files.unfinished, self._mission_id)
             if left:
                 async with self._database.writing():
                     pass  # it is refused where the mission is another process's
-                await asyncio.to_thread(self._files.remove_unfinished, left)
+                await on_own_thread(self._files.remove_unfinished, left)
         if left:
             log.warning("files of pings that were not written to the end are removed", files=left)
 
@@ -142,6 +145,8 @@ class PingStore:
     async def _try_to_tidy(self) -> None:
         try:
             await self.tidy()
+            # What an earlier process could not move any more is moved when this one closes, if not before.
+            self._took = self._took or any(self._waiting.values())
         except MissionElsewhereError:
             pass  # nothing of it is ours to remove
         except Exception as error:
@@ -271,7 +276,7 @@ class PingStore:
             self._waiting[vehicle] = 0
             return
         chunk, content = await asyncio.to_thread(_chunk_of, rows)
-        await asyncio.to_thread(self._files.write, chunk.name, content)
+        await on_own_thread(self._files.write, chunk.name, content)
         # The file stays whatever becomes of the transaction: that a commit failed cannot always be told for sure.
         await to_the_end(self._replace(len(rows), chunk))
         self._waiting[vehicle] -= chunk.pings + chunk.rejected
@@ -331,7 +336,7 @@ class PingStore:
             return chunk.judged.pings if wanted.all() else chunk.judged.pings.take(wanted)
 
         try:
-            return await asyncio.to_thread(read)
+            return await on_own_thread(read)
         except PingFileError as error:
             raise _unreadable(error) from None
 
@@ -350,7 +355,7 @@ class PingStore:
         if row is None:
             return None
         try:
-            return row, await asyncio.to_thread(self._files.read, row.name, row.digest)
+            return row, await on_own_thread(self._files.read, row.name, row.digest)
         except PingFileError as error:
             raise _unreadable(error) from None
 
@@ -361,14 +366,32 @@ class PingStore:
                 task.cancel()
         self._took = False
 
-    async def close(self) -> None:
-        """Move what is left to files, if anything came; not while those there are being looked through."""
+    async def close(self, until_s: float | None = None) -> None:
+        """Move what is left to files, if anything came; not while those there are being looked through.
+
+        What is not moved until then, by the loop's time, stays in the database: where the files are may not answer.
+        None: for some seconds.
+        """
+        now_s = asyncio.get_running_loop().time()
+        closing = asyncio.create_task(self._finish(), name=f"last pings of {self._mission_id}")
+        try:
+            await asyncio.wait([closing], timeout=CLOSE_S if until_s is None else max(0.0, until_s - now_s))
+        finally:
+            given_up = [task for task in (closing, self._mover, self._tidying) if task is not None and not task.done()]
+            for task in given_up:
+                task.cancel()
+            # A transaction is still brought to its end; nothing else is waited for.
+            await asyncio.gather(*given_up, return_exceptions=True)
+        if closing in given_up:
+            log.warning("pings stay in the database: moving them to files took too long", mission=self._mission_id)
+        else:
+            closing.result()
+
+    async def _finish(self) -> None:
         if self._tidying is not None and not self._tidying.done():
-            self._tidying.cancel()
-            await asyncio.gather(self._tidying, return_exceptions=True)
             return  # it stays in the database, and nobody waits for a machine that does not answer
         if self._mover is not None:
-            await asyncio.gather(self._mover, return_exceptions=True)
+            await asyncio.wait([self._mover])
         if self._took:
             await self.move()
 

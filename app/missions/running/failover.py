@@ -109,25 +109,31 @@ class Failover:
         self._begin_watch()
 
     async def may_take_up(self, row: MissionRow) -> bool:
-        """Tell whether a mission is left to others, because this process cannot reach its vehicles."""
+        """Tell whether this process may have a mission; else it is left to others.
+
+        It is left to them where this process ends, or cannot reach the mission's vehicles.
+        """
         if row.state not in AT_SEA or not self._ownership.peers:
             return True
+        if self._supervisor.begins_no_more:
+            return False
         async with self._database.reading() as session:
             vehicles = await mission_queries.vehicles_of(session, row.id)
         return {str(vehicle.spec["kind"]) for vehicle in vehicles if vehicle.left_at is None} <= set(self._hub.kinds)
 
     async def resume(self, live: LiveMission) -> None:
-        """Go on with a mission that was at sea when it was taken up."""
+        """Go on with a mission that was at sea when it was taken up, unless the service ends."""
         if live.header.state not in AT_SEA:
             return
         try:
             self._claims.claim_team(live)
         except ConflictError as error:
+            if self._supervisor.begins_no_more:
+                return  # it stays as it is stored
             # The settings changed while nobody had it: one mission's trouble is not the others'.
             await self._supervisor.set_state(live, MissionState.FAILED, str(error), "service", AlarmKind.MISSION_FAILED)
             return
-        if live.header.state is MissionState.RUNNING:
-            self._supervisor.run(live)
+        if live.header.state is MissionState.RUNNING and self._supervisor.run(live):
             # Vehicles wait for no line of the log.
             words = "the service was started anew: the mission goes on with what was committed"
             facts = {"failsafe": Failsafe.SERVICE_RESTARTED, "response": Response.WARN}

@@ -24,6 +24,7 @@ from app.missions.fleet.hub import FleetHub
 from app.missions.live.load import stored_spec, take_up
 from app.missions.live.mission import LiveMission
 from app.missions.live.threads import Threads
+from app.missions.pings.store import CLOSE_S
 from app.missions.running.ended_missions import EndedMissions, store_summary
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.ownership import Ownership
@@ -288,9 +289,10 @@ class MissionRegistry:
 
     async def close(self) -> None:
         """Write down what is left."""
+        until_s = asyncio.get_running_loop().time() + CLOSE_S
         for live in self:
             try:
-                await live.close()
+                await live.close(until_s)
                 if self._ownership is not None and live.header.state in ENDED:
                     await store_summary(live, live.summary())
             except MissionElsewhereError as error:

@@ -7,11 +7,12 @@ from functools import partial
 from typing import Any
 
 import structlog
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.alarm_kinds import OF_A_MISSION, AlarmKind
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import MissionElsewhereError
+from app.missions.errors import ConflictError, MissionElsewhereError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import LinkState, StopReceipt
 from app.missions.flight.legs.other_vehicles import OtherVehicles
@@ -71,6 +72,7 @@ class MissionSupervisor:
         """Step loops that were cancelled and have not ended yet."""
         self._unwritten: dict[str, asyncio.Task[None]] = {}
         """States that are in force and will be written down when that is possible again."""
+        self._no_more = False
         self.ended: Callable[[LiveMission, str], None] = _nobody_follows
         """Called when a mission has ended: with it, and with the reason if it was flown to its end, else ''."""
 
@@ -93,8 +95,25 @@ class MissionSupervisor:
         except TimeoutError:
             return True
 
-    def run(self, live: LiveMission) -> None:
-        """Begin the flight."""
+    def begin_no_more(self) -> None:
+        """Begin no flight from now on: the service ends."""
+        self._no_more = True
+
+    @property
+    def begins_no_more(self) -> bool:
+        """Whether the service ends, so that no flight begins any more."""
+        return self._no_more
+
+    def refuse_to_begin(self) -> None:
+        """Raise ConflictError once no flight begins any more."""
+        if self._no_more:
+            raise ConflictError("the service ends: it begins no flight", "ask again when it runs")
+
+    def run(self, live: LiveMission) -> bool:
+        """Begin the flight; False where the service ends: whoever has the mission next begins it."""
+        if self._no_more:
+            log.warning("the service ends: a flight is left to the next start", mission=live.id)
+            return False
         live.set_off()
 
         def fly() -> Awaitable[str]:
@@ -104,6 +123,7 @@ class MissionSupervisor:
             return Runner(live, *shared, scale, pause_s, self._compilation.maps).run()
 
         self.runs[live.id] = asyncio.create_task(self._supervise(live, fly), name=f"mission {live.id}")
+        return True
 
     async def _until_compiled(self, live: LiveMission) -> None:
         """Wait until what planning needs is compiled: on a new machine that takes a while."""
@@ -210,16 +230,33 @@ class MissionSupervisor:
         return stops
 
     async def bring_home(self, live: LiveMission, ending: Ending) -> None:
-        """Call all vehicles home; the mission ends when they are there. Those without a recovery point stop."""
-        # What a killed service forgets, nobody would bring home.
-        async with live.database.writing() as session:
+        """Call all vehicles home; the mission ends when they are there. Those without a recovery point stop.
+
+        Raises
+        ------
+        ConflictError
+            When the service ends and the mission is paused: then it stays so.
+        """
+
+        async def keep(session: AsyncSession) -> None:
+            # What a killed service forgets, nobody would bring home.
             await mission_queries.keep_ending(session, live.id, ending.remember())
-        live.end_as(ending)
+
+        async def keep_if_it_flies(session: AsyncSession) -> None:
+            self.refuse_to_begin()
+            await keep(session)
+
         words = f"everybody returns; {ending.state} then"
-        await live.journal.log(Level.INFO, "recovery", words, actor=ending.actor, state=ending.state)
         if live.header.state is MissionState.PAUSED:
-            await self.set_state(live, MissionState.RUNNING, "everybody returns", ending.actor)
+            # Together: a mission whose vehicles do not set off stays as it was.
+            await self.set_state(live, MissionState.RUNNING, "everybody returns", ending.actor, check=keep_if_it_flies)
+            live.end_as(ending)
             self.run(live)
+        else:
+            async with live.database.writing() as session:
+                await keep(session)
+            live.end_as(ending)
+        await live.journal.log(Level.INFO, "recovery", words, actor=ending.actor, state=ending.state)
         live.changed.set()
         live.publish_summary()
 

@@ -1,12 +1,12 @@
 """Room in the database: missions that ended long ago go, and the disk gets its space back."""
 
-import asyncio
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy import delete, func, select, text
 from sqlalchemy.exc import OperationalError
 
+from app.storage.concurrency.own_thread import on_own_thread
 from app.storage.database import Database, make_engine
 from app.storage.models import MissionRow, SoundingRow
 from app.storage.ping_files import PingFiles
@@ -50,21 +50,21 @@ async def remove(database: Database, mission_id: str, days: float, files: PingFi
         names = await file_names(session, mission_id)
         removed = (await session.scalars(delete(MissionRow).where(*condition).returning(MissionRow.id))).first()
     if removed is not None and names:
-        await asyncio.to_thread(files.remove, mission_id, names)
+        await on_own_thread(files.remove, mission_id, names)
     return removed is not None
 
 
 async def finish_removing(database: Database, files: PingFiles) -> None:
     """Remove the files of missions that were removed when a process was killed; never those of one that is there."""
-    for mission_id in await asyncio.to_thread(files.condemned):
+    for mission_id in await on_own_thread(files.condemned):
         async with database.reading() as session:
             there = await session.scalar(select(MissionRow.id).where(MissionRow.id == mission_id))
-        await asyncio.to_thread(files.finish_removing if there is None else files.spare, mission_id)
+        await on_own_thread(files.finish_removing if there is None else files.spare, mission_id)
 
 
 async def unlisted_files(database: Database, files: PingFiles) -> list[str]:
     """Return the files of pings that no mission of this database has: another database's, or left by a kill."""
-    found = await asyncio.to_thread(files.names)
+    found = await on_own_thread(files.names)
     async with database.reading() as session:
         listed = set(await file_names(session))
     return [name for name in found if name not in listed]

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -270,3 +271,31 @@ async def test_a_full_disk_leaves_pings_in_the_database_until_there_is_room(
     await store.close()
     assert len(files.names("m1")) == 2
     assert await times_of(store) == {"a": times(*range(CHUNK + 1))}
+
+
+async def test_a_place_that_hangs_is_not_waited_for_at_the_end_and_later_gets_what_is_left(
+    store: PingStore, database: Database, files: PingFiles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers, asked = threading.Event(), threading.Event()
+
+    def hang(_name: str, _content: bytes) -> None:
+        asked.set()
+        answers.wait()
+        raise OSError("it never answered")
+
+    with monkeypatch.context() as silent:
+        silent.setattr(files, "write", hang)
+        await take(store, database, [ping(number) for number in range(CHUNK)])
+        await until(asked.is_set, "the file is being written")
+        try:
+            await store.close(asyncio.get_running_loop().time())
+            assert [thread for thread in threading.enumerate() if thread.name == "own hang" and thread.daemon]
+        finally:
+            answers.set()
+    assert (await store.contents())[1]["a"].pings == CHUNK, "they stay in the database"
+    opened, _ = await open_store(database, files)
+    opened.begin_to_tidy()
+    await until(lambda: opened._tidying is not None and opened._tidying.done(), "it was looked for halves")
+    await opened.close()
+    assert len(files.names("m1")) == 1
+    assert await times_of(opened) == {"a": times(*range(CHUNK))}

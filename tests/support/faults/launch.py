@@ -2,12 +2,13 @@
 
 Environment: ``FAULTS_CLOCK`` names a file with the seconds that the wall clock is off, read at every look at it;
 ``FAULTS_BUSY_MS`` is how long a writer waits for another process; ``FAULTS_HUNG_LOOKS``: after so many looks in vain
-another process is taken for dead.
+another process is taken for dead; ``FAULTS_FTP_TIMEOUT_S``: how long a silent FTP server is waited for.
 """
 
 import os
 import time
 from datetime import datetime, tzinfo
+from functools import partialmethod
 from pathlib import Path
 from typing import Self
 
@@ -44,6 +45,11 @@ if __name__ == "__main__":
         from app.storage import database
 
         database.BUSY_TIMEOUT_MS = int(os.environ["FAULTS_BUSY_MS"])
+    if "FAULTS_FTP_TIMEOUT_S" in os.environ:
+        from fsspec.implementations import ftp
+
+        patience_s = float(os.environ["FAULTS_FTP_TIMEOUT_S"])
+        setattr(ftp.FTPFileSystem, "__init__", partialmethod(ftp.FTPFileSystem.__init__, timeout=patience_s))  # noqa: B010
     from app.cli import main
 
     main()
