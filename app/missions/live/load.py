@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import replace
 from functools import partial
 
-from app.mapping.water.tides import parse_tid
+from app.mapping.water.tide_files import parse_tid
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import Position, VehicleReport

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from app.mapping.water.tides import MAX_GAP_S, MAX_LEVEL_M, TideTableError, parse_tid
+from app.mapping.water.tide_files import MAX_LEVEL_M, TideTableError, parse_tid
+from app.mapping.water.tides import MAX_GAP_S
 
 TABLE = """# Tides Data
 # Time zone: UTC

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from sqlalchemy import select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.mapping.water.tides import TideTable, TideTableError, parse_tid
+from app.mapping.water.tide_files import TideTableError, parse_tid
+from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import VerticalDatum
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError

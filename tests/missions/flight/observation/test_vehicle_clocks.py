@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from app.mapping.water.tides import parse_tid
+from app.mapping.water.tide_files import parse_tid
 from app.missions.fleet.interface import LinkCapabilities, Position, VehicleReport
 from app.missions.flight.observation.vehicle_clocks import VehicleClocks
 from app.missions.operations.history import events_after
