@@ -44,7 +44,9 @@ async def test_no_file_brings_another_one_back(
             f"{path}/imports", content=b"-8.7049 41.1851 5\n", params=GRID | {"filename": "a.xyz", "crs": crs}
         )
         assert answer.status_code == 422
-        assert not told(answer.text)
+        (problem,) = answer.json()["errors"]
+        assert problem.pop("value") == crs, "that is what was sent"
+        assert not told(str(problem))
         assert (await client.get(f"{path}/imports")).json() == []
         assert (await client.get(f"{path}/reference")).status_code == 404
         events = await client.get(f"{path}/events", headers={"Accept": "application/json"})
