@@ -115,7 +115,7 @@ def trust(certificate: "Path") -> "ssl.SSLContext":
     try:
         context.load_verify_locations(certificate)
     except OSError as error:
-        raise CommandError(f"{certificate} cannot be read: {error}", "Name the service with --url") from None
+        raise CommandError(f"{certificate} cannot be read: {error}", "tls_certificate names it") from None
     return context
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from app.arrays import BoolArray, FloatArray, IntArray
-from app.mapping.quality.sessions import FASTEST_MPS, UNCERTAIN_M, sessions
+from app.mapping.quality.clock_sessions import FASTEST_MPS, UNCERTAIN_M, sessions
 
 GAP_S, GAP_M, GAP_OF_USUAL = 30.0, 25.0, 5.0
 """Nothing is known between two soundings that lie farther apart than one of the first two and than so many times what

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from app.mapping.quality.clock_sessions import set_back_s
 from app.mapping.quality.crossovers import crossings
-from app.mapping.quality.sessions import set_back_s
 from app.mapping.quality.tracks import Lines, Tracks, crosslines, cut, dominant_rad
 from tests.support.mapping.tracks import flown, lawnmower
 

@@ -11,7 +11,7 @@ from sqlalchemy.ext.asyncio import AsyncSession
 from app.arrays import FloatArray
 from app.estimation.adjustment import AdjustedTracks, DriftModel, Fixes, TrackSoundings, adjusted, thinned
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.quality.sessions import set_back_s
+from app.mapping.quality.clock_sessions import set_back_s
 from app.missions.clock import now
 from app.missions.errors import ConflictError
 from app.missions.live.mission import LiveMission

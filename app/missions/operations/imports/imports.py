@@ -17,7 +17,7 @@ from sqlalchemy.orm import defer
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.kriging.supersoundings import merge_soundings
-from app.mapping.offset import offset_between
+from app.mapping.quality.depth_offset import offset_between
 from app.mapping.readers.file_extensions import ending
 from app.mapping.readers.types import DATUM_NOTE, MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid, SoundingRows, Soundings

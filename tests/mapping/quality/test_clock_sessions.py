@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.arrays import FloatArray, IntArray
-from app.mapping.quality import sessions as module
-from app.mapping.quality.sessions import sessions
+from app.mapping.quality import clock_sessions
+from app.mapping.quality.clock_sessions import sessions
 from tests.support.mapping.tracks import flown, lawnmower
 
 WAY = flown(lawnmower(100, 200, 10))[:, :3]
@@ -18,9 +18,9 @@ WAY = flown(lawnmower(100, 200, 10))[:, :3]
 def in_whole_arrays(time_s: FloatArray, place_m: FloatArray) -> list[IntArray]:
     """Return sessions as they were found when each late run sorted all rows after it."""
     found: list[IntArray] = []
-    for run in np.split(np.arange(len(time_s)), module._set_back(time_s)):
+    for run in np.split(np.arange(len(time_s)), clock_sessions._set_back(time_s)):
         run = run[np.argsort(time_s[run], kind="stable")]
-        for number in range(len(found) - 1, max(len(found) - module.MOST, 0) - 1, -1):
+        for number in range(len(found) - 1, max(len(found) - clock_sessions.MOST, 0) - 1, -1):
             if continues(found[number], run, time_s, place_m, newest=number == len(found) - 1):
                 rows = np.concatenate([found[number], run])
                 found[number] = rows[np.argsort(time_s[rows], kind="stable")]
@@ -33,9 +33,9 @@ def in_whole_arrays(time_s: FloatArray, place_m: FloatArray) -> list[IntArray]:
 def continues(rows: IntArray, run: IntArray, time_s: FloatArray, place_m: FloatArray, *, newest: bool) -> bool:
     times, of_run = time_s[rows], time_s[run]
     if of_run[0] >= times[-1]:
-        return newest or follows(rows[-module.MOST :], run[: module.MOST], time_s, place_m)
+        return newest or follows(rows[-clock_sessions.MOST :], run[: clock_sessions.MOST], time_s, place_m)
     if of_run[-1] <= times[0]:
-        return follows(run[-module.MOST :], rows[: module.MOST], time_s, place_m)
+        return follows(run[-clock_sessions.MOST :], rows[: clock_sessions.MOST], time_s, place_m)
     known = rows[
         max(int(np.searchsorted(times, of_run[0])) - 1, 0) : int(np.searchsorted(times, of_run[-1], "right")) + 1
     ]
@@ -43,11 +43,11 @@ def continues(rows: IntArray, run: IntArray, time_s: FloatArray, place_m: FloatA
     new = run[max(low - 1, 0) : high + 1]
     _, one, other = np.intersect1d(time_s[known], time_s[new], return_indices=True)
     if 2 * len(one) >= len(new):
-        return bool(np.median(np.hypot(*(place_m[known[one]] - place_m[new[other]]).T)) <= module.SAME_MOMENT_M)
+        return bool(np.median(np.hypot(*(place_m[known[one]] - place_m[new[other]]).T)) <= clock_sessions.SAME_MOMENT_M)
     both = np.concatenate([known, new])
     both = both[np.argsort(time_s[both], kind="stable")]
     apart = length_m(place_m[known]) + length_m(place_m[new])
-    return length_m(place_m[both]) <= module.ZIGZAG * apart + module.TOLERANCE_M
+    return length_m(place_m[both]) <= clock_sessions.ZIGZAG * apart + clock_sessions.TOLERANCE_M
 
 
 def follows(before: IntArray, after: IntArray, time_s: FloatArray, place_m: FloatArray) -> bool:
@@ -55,8 +55,8 @@ def follows(before: IntArray, after: IntArray, time_s: FloatArray, place_m: Floa
     usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
     gap_s = time_s[after[0]] - time_s[before[-1]]
     gap_m = np.hypot(*(place_m[after[0]] - place_m[before[-1]]))
-    usual = gap_s <= module.NEXT_OF_USUAL * usual_s
-    return bool(usual and gap_m <= module.FASTEST_MPS * gap_s + module.UNCERTAIN_M)
+    usual = gap_s <= clock_sessions.NEXT_OF_USUAL * usual_s
+    return bool(usual and gap_m <= clock_sessions.FASTEST_MPS * gap_s + clock_sessions.UNCERTAIN_M)
 
 
 def length_m(places_m: FloatArray) -> float:
@@ -80,7 +80,7 @@ def test_parts_change_no_session(seed: int, streams: int, batch: int, set_back_s
         np.concatenate([np.arange(len(s) // batch + 1)[: -(-len(s) // batch)] for s in sent]), kind="stable"
     )
     time_s, *place = np.concatenate([batches[i] for i in order]).T
-    with patch.object(module, "PART", part):
+    with patch.object(clock_sessions, "PART", part):
         found = sessions(time_s, *place)
     expected = in_whole_arrays(time_s, np.column_stack(place))
     assert [rows.tolist() for rows in found] == [rows.tolist() for rows in expected]
@@ -89,7 +89,7 @@ def test_parts_change_no_session(seed: int, streams: int, batch: int, set_back_s
 def test_what_arrives_beside_a_backlog_is_not_measured_against_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of many late soundings was compared with every sounding after it."""
     measured = 0
-    real = module._length_m
+    real = clock_sessions._length_m
 
     def counted(places_m: FloatArray) -> float:
         nonlocal measured
@@ -105,8 +105,8 @@ def test_what_arrives_beside_a_backlog_is_not_measured_against_all_of_it(monkeyp
         np.testing.assert_array_equal(time_s[found], np.sort(time_s))
         return measured
 
-    monkeypatch.setattr(module, "_length_m", counted)
-    monkeypatch.setattr(module, "PART", 32, raising=False)
+    monkeypatch.setattr(clock_sessions, "_length_m", counted)
+    monkeypatch.setattr(clock_sessions, "PART", 32, raising=False)
     assert cost(2000) < 3 * cost(1000)
 
 
