@@ -36,6 +36,21 @@ def test_a_service_that_is_well_is_found_at_any_address(database_url: str, tmp_p
         assert "database ok" in said
 
 
+def test_a_service_with_https_is_found_whatever_name_its_certificate_is_for(
+    database_url: str, tmp_path: Path, certificate: tuple[Path, Path]
+) -> None:
+    cert, key = certificate  # for localhost and 127.0.0.1
+    imc = ImcSettings(enabled=False)
+    settings = Settings(
+        host="::1", port=0, database_url=database_url, imc=imc, insecure=True, tls_certificate=cert, tls_key=key
+    )
+    with running_in_thread(settings) as server:
+        port = server.url.rpartition(":")[2]
+        tls = {"BATHYFLEET_TLS_CERTIFICATE": str(cert), "BATHYFLEET_TLS_KEY": str(key)}
+        code, said = asked(tmp_path, "--host", "::1", "--port", port, **tls)
+        assert (code, said) == (0, f"https://[::1]:{port} is well\n")
+
+
 def test_where_no_service_answers_is_said(tmp_path: Path) -> None:
     code, said = asked(tmp_path, "--port", "9")
     assert code == 1
