@@ -7,8 +7,8 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray
+from app.mapping.cell_index import count_per_cell
 from app.mapping.gaussian_process.gp import GaussianProcessMap
-from app.mapping.kriging.cell_index import count_per_cell
 from app.mapping.types import BathymetricMap, Grid, Soundings
 
 

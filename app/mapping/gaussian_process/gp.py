@@ -9,6 +9,7 @@ from typing import Literal, Self
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.mapping.cell_index import count_per_cell
 from app.mapping.gaussian import GaussianInterpolator
 from app.mapping.gaussian_process.calibration import (
     APART_UNITS,
@@ -41,7 +42,6 @@ from app.mapping.gaussian_process.reach import (
 from app.mapping.gaussian_process.roughness import hole_errors, local_ratio
 from app.mapping.gaussian_process.support import support
 from app.mapping.gross_errors.outliers import OutlierReport, flag_outliers
-from app.mapping.kriging.cell_index import count_per_cell
 from app.mapping.kriging.fields import Field, coarse_grid
 from app.mapping.kriging.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging.kriging import Conditioned

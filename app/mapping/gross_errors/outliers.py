@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.mapping.cell_index import cell_by_cell
 from app.mapping.gross_errors.planes import LEAST_COMPANY, SUSPICION, judge_squares, plane_residuals
-from app.mapping.kriging.cell_index import cell_by_cell
 from app.mapping.kriging.kernels import KERNEL_CODES, KernelName
 from app.mapping.kriging.kriging import krige_holes
 from app.mapping.kriging.likelihood import Hyperparameters, RestrictedLikelihood, Trend, spread_subset

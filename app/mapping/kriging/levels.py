@@ -8,7 +8,7 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from app.arrays import FloatArray, IntArray
-from app.mapping.kriging.cell_index import cell_by_cell
+from app.mapping.cell_index import cell_by_cell
 from app.mapping.kriging.neighbours import nearest
 from app.mapping.kriging.supersoundings import merge_soundings
 from app.mapping.types import Soundings

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import FloatArray
-from app.mapping.kriging.cell_index import cell_numbers
+from app.mapping.cell_index import cell_numbers
 from app.mapping.types import Grid, Soundings
 
 FEWEST_CELLS = 10

@@ -13,7 +13,7 @@ from rasterio.errors import RasterioError
 from rasterio.warp import Resampling, reproject
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.kriging.cell_index import cell_numbers
+from app.mapping.cell_index import cell_numbers
 from app.mapping.readers.types import (
     DATUM_NOTE,
     LOCAL,

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import BoolArray, FloatArray, IntArray
+from app.mapping.cell_index import cell_numbers
 from app.mapping.gaussian import MODEL, GaussianInterpolator, choose_width
-from app.mapping.kriging.cell_index import cell_numbers
 from app.mapping.types import BathymetricMap, Grid, SoundingRows, Soundings
 
 SHOWN_CELLS = 1.5

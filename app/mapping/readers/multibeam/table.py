@@ -7,7 +7,7 @@ import pyproj
 from numpy.typing import NDArray
 
 from app.arrays import BoolArray, FloatArray
-from app.mapping.kriging.cell_index import cell_numbers
+from app.mapping.cell_index import cell_numbers
 from app.mapping.readers.georeferencing import with_margin
 from app.mapping.readers.multibeam.types import FilePing, damaged
 from app.mapping.readers.types import MAX_DEPTH_M, MAX_SOUNDINGS, MapExtent, Points, ReadError
