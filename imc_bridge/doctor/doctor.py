@@ -389,7 +389,7 @@ def _sounding_findings(node: NodeView, *, live: bool) -> list[Finding]:
         else problem(
             Cause.NO_SOUNDINGS,
             "no Distance from a bottom-looking sensor, and no SonarData of a multibeam",
-            "Switch on the altimeter or DVL (entities Altimeter, DVL Filtered, DVL Beam 0..3)",
+            "Switch on the altimeter or DVL (entities Altimeter, DVL Filtered, DVL Beam 0..3, DVL - Beam 0..3)",
         )
     ]
     findings += [

@@ -11,7 +11,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import imcpy
@@ -30,6 +30,9 @@ MAX_STATE_GAP_S = 2.0
 MAX_EDGE_S = 0.6
 """A Distance this close to the last state before a gap, or to the first after it, is placed by carrying on."""
 MAX_IGNORED = 256
+LEAST_DIP_RAD = math.radians(10.0)
+"""What points less than this below the horizon is not taken for a direction in which the bottom is measured."""
+UNTOLD_DIRECTION = "its vehicle does not tell where the beam points"
 MAX_WAIT_S = 3.0
 """How far the vehicle's clock may run on before a Distance without a following state is given up."""
 LONGEST_LEVER_M = 20.0
@@ -49,6 +52,8 @@ class Beam:
     off_nadir_rad: float = 0.0
     body_fixed: bool = True
     """False when the reported range is already the height above the bottom."""
+    known: bool = True
+    """False where the direction has to be told with each Distance, because makes differ."""
 
 
 def beam_table(altimeter: AltimeterGeometry) -> dict[str, Beam]:
@@ -63,7 +68,27 @@ def beam_table(altimeter: AltimeterGeometry) -> dict[str, Beam]:
     }
     for index in range(4):
         table[f"DVL Beam {index}"] = Beam(index, math.radians(90.0 * index), JANUS_ANGLE_RAD)
+        # So does DUNE name the beams of WaterLinked and SonTek; these have four or three, at different angles.
+        table[f"DVL - Beam {index}"] = Beam(index, known=False)
     return table
+
+
+def told_direction(device: imcpy.DeviceState) -> tuple[float, float] | None:
+    """Return azimuth and angle off nadir (radians) of a beam by its device's orientation; None where it tells none.
+
+    DUNE turns a device from where its x axis is the vehicle's: an altimeter that looks down has a ``theta`` of -90
+    degrees, and the beams of a DVL lie at ``theta`` + their angle, ``psi`` apart. Where the orientation of a DVL was
+    left at zero its ``theta`` is the beams' angle alone, from straight down. All angles zero are an orientation that
+    nobody entered.
+    """
+    theta, psi = float(device.theta), float(device.psi)
+    if not (math.isfinite(theta) and math.isfinite(psi)):
+        return None
+    theta = math.remainder(theta, math.tau)
+    off_nadir = theta if theta > 0.0 else theta + math.pi / 2
+    if theta == 0.0 or abs(off_nadir) > math.pi / 2 - LEAST_DIP_RAD:
+        return None
+    return math.remainder(psi if off_nadir >= 0.0 else psi + math.pi, math.tau), abs(off_nadir)
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,10 +343,12 @@ class SoundingIntake:
         valid: bool,
         range_m: float,
         lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        direction: tuple[float, float] | None = None,
     ) -> SoundingRefused | None:
         """Take a Distance in; a refusal comes back at once, a sounding later from :meth:`resolve`.
 
-        ``source`` is the name of the entity that measured, None while names are unknown.
+        ``source`` is the name of the entity that measured, None while names are unknown. ``direction`` is told of the
+        beam, see :func:`told_direction`; None: it is as its name says.
         """
         if source is None:
             return self._refuse(time_s, "?", range_m, "entity names not known yet")
@@ -341,6 +368,10 @@ class SoundingIntake:
             return self._refuse(time_s, source, range_m, "zero or negative range")
         if range_m > self._max_range_m:
             return self._refuse(time_s, source, range_m, f"beyond {self._max_range_m:g} m")
+        if beam.body_fixed and direction is not None:
+            beam = replace(beam, azimuth_rad=direction[0], off_nadir_rad=direction[1], known=True)
+        if not beam.known:
+            return self._refuse(time_s, source, range_m, UNTOLD_DIRECTION)
         if not all(abs(offset_m) <= LONGEST_LEVER_M for offset_m in lever_arm_m):
             lever_arm_m = (0.0, 0.0, 0.0)
         lost = self._pending.add(Ping(time_s, source, beam, range_m, lever_arm_m))
@@ -388,11 +419,12 @@ class SoundingIntake:
 
 def offer_distance(intake: SoundingIntake, source: str | None, message: Message) -> SoundingRefused | None:
     """Hand a Distance of the entity named ``source`` to its vehicle's intake."""
-    lever_arm = (0.0, 0.0, 0.0)
+    lever_arm, direction = (0.0, 0.0, 0.0), None
     for device in message.location:
         # The wire lets any message stand where a DeviceState belongs.
         if isinstance(device, imcpy.DeviceState):
             lever_arm = (float(device.x), float(device.y), float(device.z))
+            direction = told_direction(device)
         break
     valid = message.validity == imcpy.Distance.ValidityEnum.VALID
-    return intake.offer(message.timestamp, source, valid, float(message.value), lever_arm)
+    return intake.offer(message.timestamp, source, valid, float(message.value), lever_arm, direction)

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import imcpy
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +12,7 @@ from imcpy.coordinates import WGS84
 
 from app.arrays import FloatArray
 from imc_bridge.events import Sounding, SoundingRefused
+from imc_bridge.settings import AltimeterGeometry
 from imc_bridge.telemetry.soundings import (
     Beam,
     SoundingIntake,
@@ -19,7 +21,9 @@ from imc_bridge.telemetry.soundings import (
     beam_table,
     footprint,
     interpolate,
+    offer_distance,
     rotate_to_local,
+    told_direction,
 )
 
 LAT, LON = math.radians(41.185), math.radians(-8.705)
@@ -87,6 +91,80 @@ def test_dvl_beams_point_all_around_at_22_and_a_half_degrees(beam: int, directio
     assert depth == pytest.approx(2.0 + 20.0 * math.cos(math.radians(22.5)))
 
 
+@pytest.mark.parametrize(
+    ("theta_deg", "psi_deg", "direction"),
+    [
+        (-90.0, 0.0, (0.0, 0.0)),
+        (-67.5, 90.0, (90.0, 22.5)),
+        (-60.0, -90.0, (-90.0, 30.0)),
+        (-100.0, 0.0, (180.0, 10.0)),
+        (-450.0, 0.0, (0.0, 0.0)),
+        (22.5, 180.0, (180.0, 22.5)),
+    ],
+    ids=["straight down", "starboard beam", "port beam", "astern", "a turn too many", "device left at zero"],
+)
+def test_a_device_tells_where_its_beam_points(theta_deg: float, psi_deg: float, direction: tuple[float, float]) -> None:
+    told = told_direction(device(theta_deg, psi_deg))
+    assert told is not None
+    azimuth, off_nadir = np.radians(direction)
+    expected = math.sin(off_nadir) * np.array([math.cos(azimuth), math.sin(azimuth)])
+    assert math.sin(told[1]) * math.cos(told[0]) == pytest.approx(expected[0], abs=1e-5)
+    assert math.sin(told[1]) * math.sin(told[0]) == pytest.approx(expected[1], abs=1e-5)
+    assert told[1] == pytest.approx(off_nadir, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("theta_deg", "psi_deg"),
+    [(0.0, 0.0), (0.0, 45.0), (-5.0, 0.0), (90.0, 0.0), (math.nan, 0.0), (-90.0, math.inf)],
+    ids=["nothing entered", "heading alone", "to the horizon", "sideways", "no number", "no heading"],
+)
+def test_an_orientation_in_which_no_bottom_is_measured_tells_nothing(theta_deg: float, psi_deg: float) -> None:
+    assert told_direction(device(theta_deg, psi_deg)) is None
+
+
+def test_a_beam_is_placed_where_its_vehicle_says_that_it_points() -> None:
+    g = Gate("body")
+    offer_distance(g.intake, "DVL Beam 1", distance(1.0, 20.0, device(-67.5, 180.0)))
+    offer_distance(g.intake, "DVL - Beam 3", distance(1.0, 20.0, device(-60.0, 90.0)))
+    offer_distance(g.intake, "Altimeter", distance(1.0, 30.0, device(-60.0, 0.0)))
+    offer_distance(g.intake, "DVL Beam 2", distance(1.0, 20.0, device(0.0, 0.0)))
+    astern, starboard, tilted, by_name = g.resolve()
+    reach = 20.0 * math.sin(math.radians(22.5))
+    assert np.allclose(offset_of(astern.lat_deg, astern.lon_deg), (1.0 - reach, 0.0), atol=1e-3)
+    assert np.allclose(offset_of(starboard.lat_deg, starboard.lon_deg), (1.0, 10.0), atol=1e-3)
+    assert starboard.beam == 3
+    assert tilted.bottom_depth_m == pytest.approx(1.0 + 30.0 * math.cos(math.radians(30.0)))
+    assert np.allclose(offset_of(by_name.lat_deg, by_name.lon_deg), (1.0 - reach, 0.0), atol=1e-3)
+
+
+def test_a_range_that_is_the_height_above_the_bottom_has_no_direction() -> None:
+    g = Gate("vertical")
+    offer_distance(g.intake, "Altimeter", distance(1.0, 30.0, device(-60.0, 0.0)))
+    (sounding,) = g.resolve()
+    assert sounding.bottom_depth_m == pytest.approx(31.0)
+
+
+def test_beams_whose_makes_differ_are_refused_while_nobody_tells_where_they_point() -> None:
+    g = Gate()
+    refused = offer_distance(g.intake, "DVL - Beam 1", distance(1.0, 20.0, device(0.0, 0.0)))
+    assert refused is not None
+    assert refused.reason == "its vehicle does not tell where the beam points"
+
+
+def device(theta_deg: float, psi_deg: float) -> imcpy.DeviceState:
+    told = imcpy.DeviceState()
+    told.theta, told.psi = math.radians(theta_deg), math.radians(psi_deg)
+    return told
+
+
+def distance(time_s: float, range_m: float, location: imcpy.DeviceState) -> imcpy.Distance:
+    message = imcpy.Distance()
+    message.timestamp, message.value = time_s, range_m
+    message.validity = imcpy.Distance.ValidityEnum.VALID
+    message.location.append(location)
+    return message
+
+
 def test_lever_arm_turns_with_the_vehicle() -> None:
     lat, lon, depth = footprint(state(yaw=math.pi / 2), Beam(body_fixed=False), 5.0, (1.0, 0.0, 0.5))
     assert np.allclose(offset_of(lat, lon), (0.0, 1.0), atol=1e-3)
@@ -116,8 +194,8 @@ def test_history_puts_late_states_in_their_place_and_drops_repeats() -> None:
 class Gate:
     """A gate with states at whole seconds, sinking 1 m/s while going north at 1 m/s."""
 
-    def __init__(self) -> None:
-        self.intake = SoundingIntake("v", beam_table("vertical"), 200.0)
+    def __init__(self, altimeter: AltimeterGeometry = "vertical") -> None:
+        self.intake = SoundingIntake("v", beam_table(altimeter), 200.0)
         self.history = StateHistory()
         for t in range(4):
             self.add_state(float(t))
