@@ -2,14 +2,16 @@
 
 import difflib
 import ipaddress
+import json
 import os
 import tomllib
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import urlsplit
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -311,9 +313,29 @@ def overridden() -> dict[str, str]:
         value: Any = written
         for part in path:
             value = value.get(part) if isinstance(value, dict) else None
-        if value is not None and str(value).lower() != os.environ[variable].lower():
+        if value is not None and not _are_the_same(path, value, os.environ[variable]):
             found[".".join(path)] = variable
     return found
+
+
+def _are_the_same(path: Sequence[str], written: object, variable: str) -> bool:
+    """Whether what the file has of a setting and what a variable has are one value, as in 16385 and 0x4001."""
+    model: type[BaseModel] = Settings
+    for part in path[:-1]:
+        below = model.model_fields[part].annotation
+        if not (isinstance(below, type) and issubclass(below, BaseModel)):
+            return False
+        model = below
+    field = model.model_fields[path[-1]]
+    kind: Any = Annotated[field.annotation, field]
+    adapter: TypeAdapter[object] = TypeAdapter(kind)
+    given: object = variable
+    with suppress(ValueError):
+        given = json.loads(variable) if variable[:1] in "[{" else variable
+    try:
+        return adapter.validate_python(written) == adapter.validate_python(given)
+    except ValidationError:
+        return False
 
 
 def _variable_names(model: type[BaseModel], prefix: str) -> set[str]:

@@ -63,6 +63,16 @@ def test_what_the_environment_overrules_in_the_file_is_told(tmp_path: Path, monk
     assert overridden() == {"port": "BATHYFLEET_PORT", "imc.port": "BATHYFLEET_IMC__PORT"}
 
 
+def test_one_value_written_in_two_ways_is_not_overruled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = 'time_scale = 2.0\nlog_level = "INFO"\n[imc]\nid = 16385\nallowed_ids = [21, 22]\n'
+    (tmp_path / "bathyfleet.toml").write_text(written)
+    for name, value in {"TIME_SCALE": "2", "IMC__ID": "0x4001", "IMC__ALLOWED_IDS": '["0x15", 22]'}.items():
+        monkeypatch.setenv(f"BATHYFLEET_{name}", value)
+    assert overridden() == {}
+    monkeypatch.setenv("BATHYFLEET_IMC__ID", "0x4002")
+    assert overridden() == {"imc.id": "BATHYFLEET_IMC__ID"}
+
+
 def test_imc_ids_are_taken_as_the_doctor_tells_them(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the file they always were, in which 0x4001 is a number."""
     monkeypatch.setenv("BATHYFLEET_IMC__ID", "0x4001")
