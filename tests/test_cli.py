@@ -9,7 +9,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +18,10 @@ from typing import Any
 import httpx
 import pytest
 import rasterio
+import typer.main
 
-from app.cli import main
+from app.cli import app as command_line
+from app.cli import evaluations, main
 from app.mapping.coordinates.georeference import LocalFrame
 from app.storage.database import Database
 from app.storage.ping_files import PingFiles
@@ -112,6 +114,28 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
     shown = bathyfleet(*command.split(), "--help")
     assert shown.code == 0
     assert "Options" in shown.stdout
+
+
+def every_command(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Every command and group of commands, with the words that it is called by."""
+    if words == ("evaluate",):
+        command = typer.main.get_command(evaluations())
+    yield words, command
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from every_command(inner, (*words, name))
+
+
+def test_the_help_shows_all_that_is_said_of_an_option_and_its_default(
+    bathyfleet: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 300)
+    for words, command in every_command(typer.main.get_command(command_line)):
+        shown = bathyfleet(*words, "--help")
+        assert (shown.code, shown.stderr) == (0, ""), words
+        for option in command.params:
+            assert (option.help or "") in shown.stdout, (words, option.name)
+            if isinstance(option.show_default, str):
+                assert f"[default: ({option.show_default})]" in shown.stdout, (words, option.name)
 
 
 @pytest.mark.parametrize(

@@ -15,26 +15,25 @@ missions_app = typer.Typer(
     help="List the missions of a running service, pause them and end them.", no_args_is_help=True
 )
 
-Url = Annotated[str | None, typer.Option(help="A running service [default: the one of this machine's settings]")]
+Url = Annotated[str | None, typer.Option(help="A running service.", show_default="the one of this machine's settings")]
 Token = Annotated[
     str | None,
     typer.Option(
         envvar="BATHYFLEET_TOKEN",
-        help="Access token [default: that of its first start, where this user may read it]",
-        show_default=False,
+        help="Access token.",
+        show_default="that of its first start, where this user may read it",
     ),
 ]
 Mission = Annotated[
-    str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it [default: the only one under way]")
+    str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.", show_default="the only one under way")
 ]
 Note = Annotated[str, typer.Option(help="Kept in the mission's log beside the action.")]
 Home = Annotated[
     bool | None,
     typer.Option(
         "--return/--stop",
-        help="Send the vehicles home first, or stop them where they are "
-        "[default: abort stops them, finish does as the mission says]",
-        show_default=False,
+        help="Send the vehicles home first, or stop them where they are.",
+        show_default="abort stops them, finish does as the mission says",
     ),
 ]
 

@@ -19,11 +19,13 @@ PAGE = 1000
 
 def audit(
     days: Annotated[
-        float | None, typer.Option(min=0, max=36_500, help="Only the last so many days [default: all]")
+        float | None, typer.Option(min=0, max=36_500, help="Only the last so many days.", show_default="all")
     ] = None,
     actor: Annotated[str | None, typer.Option(help="Only commands of the token of this name.")] = None,
     mission: Annotated[str | None, typer.Option(help="Only commands to the mission of this id.")] = None,
-    limit: Annotated[int | None, typer.Option(min=1, help="Most entries [default: 50; all with --format]")] = None,
+    limit: Annotated[
+        int | None, typer.Option(min=1, help="Most entries.", show_default="50; all with --format")
+    ] = None,
     form: Annotated[
         str, typer.Option("--format", "-f", help="table, csv, or json: an object per line, to keep or to search.")
     ] = "table",
