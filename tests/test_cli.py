@@ -130,7 +130,7 @@ def test_the_help_shows_all_that_is_said_of_an_option_and_its_default(
 ) -> None:
     monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 300)
     for words, command in every_command(typer.main.get_command(command_line)):
-        shown = bathyfleet(*words, "--help")
+        shown = bathyfleet(*words, "-h")
         assert (shown.code, shown.stderr) == (0, ""), words
         for option in command.params:
             assert (option.help or "") in shown.stdout, (words, option.name)

@@ -25,6 +25,9 @@ from simulator.floors.terrain_files import load_terrain
 evaluate_app = typer.Typer(
     help="Compare planners in closed loop, without a network.",
     no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 TerrainFile = Annotated[Path, typer.Option("--terrain", help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv.")]
