@@ -223,8 +223,9 @@ class Client(Operations):
         return super().post_measurements(mission_id, body, idempotency_key=idempotency_key or new_key())
 
     def send_measurements(self, mission_id: str, items: Iterable[Item], *, batch: int = BATCH) -> BatchVerdict:
-        """Post any number of measurements in batches; returns the verdicts on all, in order.
+        """Post any number of measurements, also pings of many beams, in batches; returns all verdicts, in order.
 
+        Numbers and arrays may be NumPy's. ``batch`` is how many go at once at most; long ones go fewer at a time.
         Where it raises, the batches before are stored: sent again, their items are duplicates.
         """
         return together(self.post_measurements(mission_id, {"items": some}) for some in batches(items, batch))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import ssl
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
 from typing import Any
 
 import httpx
 
+from bathyfleet.client.call import as_json
 from bathyfleet.client.models import BatchVerdict, ItemVerdict, Measurement
 
 ADDRESS = "http://127.0.0.1:8080"
@@ -17,6 +17,8 @@ PATIENCE_S = 30.0
 TIMEOUT_S = 75.0
 """A little more than the longest that the service lets a vehicle wait for its waypoint."""
 BATCH = 1000
+BATCH_BYTES = 1 << 20
+"""Whatever is in so much JSON: since a value takes two bytes, it is within the service's limits of values and beams."""
 
 Item = Measurement | Mapping[str, Any]
 
@@ -46,11 +48,22 @@ def new_key() -> str:
 
 
 def batches(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
-    """Yield the items in lists of at most ``size``. Raises ValueError unless that is 1 to 10 000."""
+    """Yield the items in lists of at most ``size`` and ``BATCH_BYTES`` of JSON, one that is longer by itself.
+
+    Raises ValueError unless the size is 1 to 10 000, TypeError for an item that cannot be sent.
+    """
     if not 1 <= size <= 10_000:
         raise ValueError(f"batch: {size} is not from 1 to 10000")
-    rest = iter(items)
-    while batch := list(islice(rest, size)):
+    batch: list[Item] = []
+    held = 0
+    for index, item in enumerate(items):
+        length = len(as_json(item, f"items.{index}"))
+        if len(batch) == size or (batch and held + length > BATCH_BYTES):
+            yield batch
+            batch, held = [], 0
+        batch.append(item)
+        held += length
+    if batch:
         yield batch
 
 
