@@ -11,6 +11,8 @@ import pytest
 import rasterio
 
 from app.main import Server
+from app.missions.settings import ImcSettings
+from app.settings import Settings
 from bathyfleet.client import (
     Client,
     ConflictError,
@@ -22,8 +24,9 @@ from bathyfleet.client import (
     models,
 )
 from tests.support.api.relay import Relay, relay_to
-from tests.support.api.rest import mission_spec, soundings
+from tests.support.api.rest import mission_spec, running_in_thread, soundings
 from tests.support.ports import free_ports
+from tests.support.storage.databases import Databases
 
 SIMULATED = [{"name": "a", "kind": "sim"}]
 
@@ -171,6 +174,16 @@ def test_batches_have_a_size_that_is_taken(client: Client) -> None:
 def test_an_address_that_is_none_is_refused(address: str) -> None:
     with pytest.raises(ValueError, match="address"):
         Client(address)
+
+
+def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(databases: Databases) -> None:
+    settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False), max_requests_per_s=10.0)
+    with running_in_thread(settings) as server, Client(server.url) as client:
+        mission = client.create_mission(mission_spec())
+        for number in range(25):
+            client.write_note(mission.id, {"text": f"buoy {number}"})
+        told = [entry.message for entry in client.get_events(mission.id) if "buoy" in entry.message]
+    assert [message.rpartition(" ")[2] for message in told] == [str(number) for number in range(25)]
 
 
 def test_the_map_is_an_array_with_places(client: Client, survey: str) -> None:
