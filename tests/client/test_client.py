@@ -14,6 +14,7 @@ from app.main import Server
 from app.missions.settings import ImcSettings
 from app.settings import Settings
 from bathyfleet.client import (
+    AsyncClient,
     Client,
     ConflictError,
     EndedError,
@@ -174,6 +175,14 @@ def test_batches_have_a_size_that_is_taken(client: Client) -> None:
 def test_an_address_that_is_none_is_refused(address: str) -> None:
     with pytest.raises(ValueError, match="address"):
         Client(address)
+
+
+@pytest.mark.parametrize("token", ["secret\n", "", "two secrets", "secreté"])
+def test_a_token_that_no_header_can_show_is_refused_without_telling_it(token: str) -> None:
+    for kind in (Client, AsyncClient):
+        with pytest.raises(ValueError, match=r"^token: ") as refused:
+            kind(token=token)
+        assert "secret" not in str(refused.value)
 
 
 def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(databases: Databases) -> None:

@@ -83,6 +83,11 @@ def test_what_the_service_says_was_not_done_is_asked_for_again(clock: Clock, kin
     assert refused.value.kind == kind
 
 
+def test_what_cannot_be_sent_is_not_tried_again(clock: Clock) -> None:
+    with pytest.raises(ValueError, match="it cannot be sent"):
+        Attempts("x", 60.0, repeatable=True, now=clock).after_error(httpx.LocalProtocolError("illegal"))
+
+
 def test_the_service_says_how_long_to_wait(clock: Clock) -> None:
     attempts = Attempts("x", 60.0, repeatable=True, now=clock)
     assert attempts.after_answer(answer(503, **{"retry-after": "5"})) == 5.0

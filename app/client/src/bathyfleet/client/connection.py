@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import ssl
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
@@ -19,6 +20,8 @@ TIMEOUT_S = 75.0
 BATCH = 1000
 BATCH_BYTES = 1 << 20
 """Whatever is in so much JSON: since a value takes two bytes, it is within the service's limits of values and beams."""
+
+TOKEN = re.compile(r"[!-~]+")
 
 Item = Measurement | Mapping[str, Any]
 
@@ -38,7 +41,11 @@ def settings(address: str, token: str | None, timeout_s: float, verify: bool | s
 
 
 def authorization(token: str | None) -> dict[str, str]:
-    """Return the header that shows a token."""
+    """Return the header that shows a token. Raises ValueError, which does not tell it, for what no token can be."""
+    if token is not None and not TOKEN.fullmatch(token):
+        raise ValueError(
+            "token: it is empty or has a blank, a line end or a letter that none has; strip what is read from a file"
+        )
     return {} if token is None else {"Authorization": f"Bearer {token}"}
 
 

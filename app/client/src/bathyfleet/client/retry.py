@@ -78,7 +78,12 @@ class Attempts:
         self._next_s = FIRST_S
 
     def after_error(self, error: Exception) -> float:
-        """Return seconds to wait before it is tried again. Raises UnreachableError when it is not."""
+        """Return seconds to wait before it is tried again.
+
+        Raises UnreachableError when it is not, ValueError where no request can be made of what was given.
+        """
+        if isinstance(error, httpx.LocalProtocolError):
+            raise ValueError(f"{self._what}: it cannot be sent: {error}") from error
         if not self._repeatable and not isinstance(error, NEVER_SENT):
             raise UnreachableError(
                 f"{self._what}: no answer came ({_told(error)}); whether it was done has to be looked up"
