@@ -186,13 +186,13 @@ def test_a_token_that_no_header_can_show_is_refused_without_telling_it(token: st
 
 
 def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(databases: Databases) -> None:
-    settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False), max_requests_per_s=10.0)
+    settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False), max_requests_per_s=0.5)
     with running_in_thread(settings) as server, Client(server.url) as client:
         mission = client.create_mission(mission_spec())
-        for number in range(25):
+        for number in range(2):
             client.write_note(mission.id, {"text": f"buoy {number}"})
         told = [entry.message for entry in client.get_events(mission.id) if "buoy" in entry.message]
-    assert [message.rpartition(" ")[2] for message in told] == [str(number) for number in range(25)]
+    assert [message.rpartition(" ")[2] for message in told] == ["0", "1"]
 
 
 def test_the_map_is_an_array_with_places(client: Client, survey: str) -> None:
