@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.command import CommandError, Database, check_database, command_settings
+from app.commands.command import Database, check_database, command_settings
 
 if TYPE_CHECKING:
     from app.storage.models import AuditRow
@@ -65,20 +65,17 @@ def audit(
         return rows
 
     entries = [_plain(row) for row in asyncio.run(run())]
-    try:
-        if form == "json":
-            for entry in entries:
-                typer.echo(json.dumps(entry))
-        elif form == "csv":
-            from app.csv_cells import text_cell
+    if form == "json":
+        for entry in entries:
+            typer.echo(json.dumps(entry))
+    elif form == "csv":
+        from app.csv_cells import text_cell
 
-            writer = csv.DictWriter(sys.stdout, FIELDS)
-            writer.writeheader()
-            writer.writerows({name: text_cell(value) for name, value in entry.items()} for entry in entries)
-        else:
-            _show(entries)
-    except BrokenPipeError:
-        raise CommandError("whoever reads the list has gone") from None
+        writer = csv.DictWriter(sys.stdout, FIELDS)
+        writer.writeheader()
+        writer.writerows({name: text_cell(value) for name, value in entry.items()} for entry in entries)
+    else:
+        _show(entries)
 
 
 def _plain(row: "AuditRow") -> dict[str, Any]:
