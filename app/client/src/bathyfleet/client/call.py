@@ -88,7 +88,9 @@ class Call(Generic[T]):
 
 
 def part(value: str | int) -> str:
-    """Return a part of a path, escaped."""
+    """Return a part of a path, escaped. Raises ValueError for one that would make it another path."""
+    if str(value) in ("", ".", ".."):
+        raise ValueError(f"{value!r} is no id and no name: an address cannot be made of it")
     return quote(str(value), safe="")
 
 
