@@ -195,6 +195,22 @@ def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(datab
     assert [message.rpartition(" ")[2] for message in told] == ["0", "1"]
 
 
+def test_pages_of_a_listing_come_one_after_the_other(client: Client) -> None:
+    mission = client.create_mission(mission_spec())
+    client.send_measurements(mission.id, soundings(5))
+    client.write_note(mission.id, {"text": "buoy in sight"})
+    entries = client.get_events(mission.id)
+    by_one = [entry for page in client.pages(client.get_events, mission.id, limit=1) for entry in page]
+    assert (len(entries) > 1, by_one) == (True, entries)
+    pages = list(client.pages(client.list_soundings, mission.id, state=["used"], limit=2))
+    assert [len(page.items) for page in pages] == [2, 2, 1]
+    assert [len(page.id) for page in client.pages(client.list_sounding_points, mission.id, limit=3)] == [3, 2]
+    audit = [entry.id for page in client.pages(client.list_audit, mission=mission.id, limit=1) for entry in page]
+    assert audit == [entry.id for entry in client.list_audit(mission=mission.id)]
+    assert list(client.pages(client.list_steps, mission.id)) == [[]]
+    client.abort_mission(mission.id)
+
+
 def test_the_map_is_an_array_with_places(client: Client, survey: str) -> None:
     answer = client.get_map(survey)
     with client.map(survey, order="special") as found:

@@ -33,6 +33,13 @@ def test_every_operation_is_a_method_of_both_clients() -> None:
         assert inspect.iscoroutinefunction(getattr(AsyncClient, name))
 
 
+def test_what_can_be_asked_for_is_told_with_bounds_and_defaults() -> None:
+    for kind in (Client, AsyncClient):
+        about = inspect.getdoc(kind.get_events) or ""
+        assert "limit : int, 1 to 1000, default 1000\n    Most entries in a list" in about
+        assert "interval_m : float, at most 1000\n    Between contours" in (inspect.getdoc(kind.get_map_file) or "")
+
+
 def test_no_operation_takes_an_empty_id() -> None:
     with Client() as client:
         for operation in CONTRACT.values():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import ssl
-from collections.abc import AsyncGenerator, Iterable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping
+from contextlib import aclosing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypeVar
 
 import httpx
 from httpx_sse import EventSource
@@ -28,8 +29,16 @@ from bathyfleet.client.connection import (
 )
 from bathyfleet.client.files import Arriving
 from bathyfleet.client.maps import dataset
-from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, MeasurementBatch, MissionView, Order
+from bathyfleet.client.models import (
+    BatchVerdict,
+    EventView,
+    LiveMessage,
+    MeasurementBatch,
+    MissionView,
+    Order,
+)
 from bathyfleet.client.operations import AsyncOperations
+from bathyfleet.client.pages import next_page
 from bathyfleet.client.retry import Attempts
 from bathyfleet.client.streams import (
     ENDED,
@@ -47,6 +56,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 T = TypeVar("T")
+Listing: TypeAlias = Callable[..., Awaitable[T]]
 
 
 class AsyncClient(AsyncOperations):
@@ -144,6 +154,24 @@ class AsyncClient(AsyncOperations):
                 return mission
             await asyncio.sleep(pause_s)
 
+    async def pages(self, listing: Listing[T], *arguments: Any, **query: Any) -> AsyncGenerator[T, None]:
+        """Yield all pages of a listing, one after the other: what an operation with ``after`` or ``before`` answers.
+
+        Parameters
+        ----------
+        listing : callable
+            The operation, for example :meth:`list_soundings` or :meth:`get_events`.
+        arguments, query
+            Its arguments; ``limit`` is how long a page is.
+        """
+        while True:
+            page = await listing(*arguments, **query)
+            yield page
+            following = next_page(page)
+            if following is None:
+                return
+            query |= following
+
     async def events(
         self, mission_id: str, *, after: int = 0, until_ended: bool = False
     ) -> AsyncGenerator[EventView, None]:
@@ -160,12 +188,12 @@ class AsyncClient(AsyncOperations):
             those with a larger id any more, after the last one.
         """
         if until_ended and after and (await self.get_mission(mission_id)).state in ENDED:
-            while entries := await self.get_events(mission_id, after=after):
-                for stored in entries:
-                    yield stored
-                    if ends(stored):
-                        return
-                after = entries[-1].id
+            async with aclosing(self.pages(self.get_events, mission_id, after=after)) as pages:
+                async for entries in pages:
+                    for stored in entries:
+                        yield stored
+                        if ends(stored):
+                            return
             return
         place = LogPlace(mission_id, after)
         attempts = self._attempts(place.name)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ssl
 import time
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypeVar
 
 import httpx
 from httpx_sse import EventSource
@@ -28,8 +28,16 @@ from bathyfleet.client.connection import (
 )
 from bathyfleet.client.files import Arriving
 from bathyfleet.client.maps import dataset
-from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, MeasurementBatch, MissionView, Order
+from bathyfleet.client.models import (
+    BatchVerdict,
+    EventView,
+    LiveMessage,
+    MeasurementBatch,
+    MissionView,
+    Order,
+)
 from bathyfleet.client.operations import Operations
+from bathyfleet.client.pages import next_page
 from bathyfleet.client.retry import Attempts
 from bathyfleet.client.streams import (
     ENDED,
@@ -47,6 +55,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 T = TypeVar("T")
+Listing: TypeAlias = Callable[..., T]
 
 
 class Client(Operations):
@@ -142,6 +151,24 @@ class Client(Operations):
                 return mission
             time.sleep(pause_s)
 
+    def pages(self, listing: Listing[T], *arguments: Any, **query: Any) -> Generator[T, None, None]:
+        """Yield all pages of a listing, one after the other: what an operation with ``after`` or ``before`` answers.
+
+        Parameters
+        ----------
+        listing : callable
+            The operation, for example :meth:`list_soundings` or :meth:`get_events`.
+        arguments, query
+            Its arguments; ``limit`` is how long a page is.
+        """
+        while True:
+            page = listing(*arguments, **query)
+            yield page
+            following = next_page(page)
+            if following is None:
+                return
+            query |= following
+
     def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> Generator[EventView, None, None]:
         """Yield the entries of a mission's log, first those that there are, then each as it is made.
 
@@ -156,12 +183,11 @@ class Client(Operations):
             those with a larger id any more, after the last one.
         """
         if until_ended and after and self.get_mission(mission_id).state in ENDED:
-            while entries := self.get_events(mission_id, after=after):
+            for entries in self.pages(self.get_events, mission_id, after=after):
                 for stored in entries:
                     yield stored
                     if ends(stored):
                         return
-                after = entries[-1].id
             return
         place = LogPlace(mission_id, after)
         attempts = self._attempts(place.name)
