@@ -34,6 +34,7 @@ from bathyfleet.client.models import (
     EventView,
     LiveMessage,
     MeasurementBatch,
+    MissionState,
     MissionView,
     Order,
 )
@@ -126,13 +127,13 @@ class AsyncClient(AsyncOperations):
         return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable, within_s=within_s)
 
     async def wait_for(
-        self, mission_id: str, *states: str, timeout_s: float | None = None, every_s: float = 1.0
+        self, mission_id: str, *states: MissionState, timeout_s: float | None = None, every_s: float = 1.0
     ) -> MissionView:
         """Return a mission as soon as it is in one of the states; without any named: when it has ended.
 
         Parameters
         ----------
-        states : str
+        states : MissionState
             For example ``"running"``, ``"paused"``.
         timeout_s : float, optional
             The longest wait.
@@ -145,6 +146,8 @@ class AsyncClient(AsyncOperations):
             When it has ended in another state: none of those can come any more.
         TimeoutError
             When the time is over.
+        ValueError
+            For a word that is no state.
         """
         wait = Wait(mission_id, states, timeout_s, every_s)
         while True:
