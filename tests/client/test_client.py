@@ -195,6 +195,14 @@ def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(datab
     assert [message.rpartition(" ")[2] for message in told] == ["0", "1"]
 
 
+def test_an_address_is_taken_with_the_interface_s_path_too(server: Server) -> None:
+    for path in ("/", "/api/v1", "/api/v1/"):
+        with Client(f"{server.url}{path}") as client:
+            assert client.get_health().status
+            with pytest.raises(NotFoundError, match="mission"):
+                next(iter(client.live("nowhere")))
+
+
 def test_pages_of_a_listing_come_one_after_the_other(client: Client) -> None:
     mission = client.create_mission(mission_spec())
     client.send_measurements(mission.id, soundings(5))

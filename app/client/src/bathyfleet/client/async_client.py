@@ -24,6 +24,7 @@ from bathyfleet.client.connection import (
     authorization,
     batches,
     new_key,
+    root,
     settings,
     together,
 )
@@ -68,7 +69,7 @@ class AsyncClient(AsyncOperations):
     Parameters
     ----------
     address : str
-        Where it answers, without ``/api/v1``.
+        Where it answers, with or without ``/api/v1``.
     token : str, optional
         An access token, where the service has any.
     patience_s : float
@@ -95,8 +96,8 @@ class AsyncClient(AsyncOperations):
         timeout_s: float = TIMEOUT_S,
         verify: bool | ssl.SSLContext = True,
     ) -> None:
-        self._http = httpx.AsyncClient(**settings(address, token, timeout_s, verify))
-        self._address = address.rstrip("/")
+        self._address = root(address)
+        self._http = httpx.AsyncClient(**settings(self._address, token, timeout_s, verify))
         self._token = token
         self._verify = verify
         self._patience_s = patience_s

@@ -23,6 +23,7 @@ from bathyfleet.client.connection import (
     authorization,
     batches,
     new_key,
+    root,
     settings,
     together,
 )
@@ -65,7 +66,7 @@ class Client(Operations):
     Parameters
     ----------
     address : str
-        Where it answers, without ``/api/v1``.
+        Where it answers, with or without ``/api/v1``.
     token : str, optional
         An access token, where the service has any.
     patience_s : float
@@ -92,8 +93,8 @@ class Client(Operations):
         timeout_s: float = TIMEOUT_S,
         verify: bool | ssl.SSLContext = True,
     ) -> None:
-        self._http = httpx.Client(**settings(address, token, timeout_s, verify))
-        self._address = address.rstrip("/")
+        self._address = root(address)
+        self._http = httpx.Client(**settings(self._address, token, timeout_s, verify))
         self._token = token
         self._verify = verify
         self._patience_s = patience_s

@@ -26,17 +26,22 @@ TOKEN = re.compile(r"[!-~]+")
 Item = Measurement | Mapping[str, Any]
 
 
-def settings(address: str, token: str | None, timeout_s: float, verify: bool | ssl.SSLContext) -> dict[str, Any]:
-    """Return the settings of an HTTP connection. Raises ValueError for an address that is none."""
+def root(address: str) -> str:
+    """Return where a service answers, without ``/api/v1``. Raises ValueError for an address that is none."""
     url = httpx.URL(address)
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"address: {address!r} is not like {ADDRESS} or https://host:port")
+    return address.rstrip("/").removesuffix("/api/v1")
+
+
+def settings(address: str, token: str | None, timeout_s: float, verify: bool | ssl.SSLContext) -> dict[str, Any]:
+    """Return the settings of an HTTP connection to the service at an address that :func:`root` returned."""
     return {
-        "base_url": address.rstrip("/"),
+        "base_url": address,
         "headers": authorization(token) | {"Accept": "*/*"},
         "timeout": httpx.Timeout(timeout_s, connect=10.0),
         # Loading certificates takes longer than most requests; plain HTTP has no use for them.
-        "verify": verify if url.scheme == "https" else False,
+        "verify": verify if address.startswith("https:") else False,
     }
 
 
