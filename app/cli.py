@@ -7,7 +7,7 @@ import typer
 
 from app import __version__
 from app.commands.alarms import alarms_app
-from app.commands.command import FAILURE, USAGE, CommandError
+from app.commands.command import FAILURE, INTERRUPTED, USAGE, CommandError
 from app.commands.data import adjust, export, import_file, report, tide
 from app.commands.demo import demo
 from app.commands.failsafes import failsafes
@@ -56,8 +56,11 @@ app.command()(demo)
 
 @app.callback(invoke_without_command=True)
 def _root(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
 ) -> None:
+    # What is still kept back is written before typer ends the command: it says nothing where nobody reads any more.
+    context.call_on_close(sys.stdout.flush)
     if version:
         typer.echo(f"bathyfleet {__version__}")
         raise typer.Exit
@@ -84,7 +87,10 @@ def evaluate(context: typer.Context) -> None:
 
 
 def main() -> None:
-    """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure."""
+    """Run the command line; expected errors are one line and an exit code: 2 for wrong usage, 1 for failure.
+
+    It is 130 after an interrupt, and 1 without a word when whoever reads the output has gone.
+    """
     from app.compiled.cache import VARIABLE, keep_compiled
     from app.storage.private import for_owner_only
 
@@ -99,6 +105,8 @@ def main() -> None:
         with for_owner_only():
             app()
     except Exception as error:
+        if _is_interrupt(error):
+            sys.exit(INTERRUPTED)
         code = _exit_code(error)
         if code is None:
             raise
@@ -111,6 +119,13 @@ def main() -> None:
             said = f"error: {line}" + (f". {remedy}" if remedy else "")
             typer.echo(printable(said, keep="\n"), err=True)
         sys.exit(code)
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Tell whether an error came of an interrupt, which compiled code turns into others."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _exit_code(error: Exception) -> int | None:

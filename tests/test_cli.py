@@ -9,7 +9,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +18,10 @@ from typing import Any
 import httpx
 import pytest
 import rasterio
+import typer.main
 
-from app.cli import main
+from app.cli import app as command_line
+from app.cli import evaluations, main
 from app.mapping.coordinates.georeference import LocalFrame
 from app.storage.database import Database
 from app.storage.ping_files import PingFiles
@@ -114,6 +116,28 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
     assert "Options" in shown.stdout
 
 
+def every_command(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Every command and group of commands, with the words that it is called by."""
+    if words == ("evaluate",):
+        command = typer.main.get_command(evaluations())
+    yield words, command
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from every_command(inner, (*words, name))
+
+
+def test_the_help_shows_all_that_is_said_of_an_option_and_its_default(
+    bathyfleet: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 300)
+    for words, command in every_command(typer.main.get_command(command_line)):
+        shown = bathyfleet(*words, "-h")
+        assert (shown.code, shown.stderr) == (0, ""), words
+        for option in command.params:
+            assert (option.help or "") in shown.stdout, (words, option.name)
+            if isinstance(option.show_default, str):
+                assert f"[default: ({option.show_default})]" in shown.stdout, (words, option.name)
+
+
 @pytest.mark.parametrize(
     ("arguments", "variables", "code", "message"),
     [
@@ -164,6 +188,7 @@ def test_every_command_explains_its_options(bathyfleet: Run, command: str) -> No
         (["tide", "nowhere", "--url", "http://127.0.0.1:9"], {}, 1, "does not answer"),
         (["tide", "nowhere", __file__, "--level", "1"], {}, 2, "the table's levels would count: give one of them"),
         (["adjust", "nowhere", "--undo", "--fixes", __file__], {}, 2, "positions as they came have no fixes"),
+        (["missions", "list", "--state", "runing"], {}, 2, "'runing' is not one of draft, ready, running"),
         (["fly"], {}, 2, "No such command 'fly'"),
     ],
 )
@@ -175,6 +200,50 @@ def test_expected_errors_are_said_without_a_traceback(
     assert message in ended.stderr
     assert "Traceback" not in ended.stderr
     assert ended.stdout == ""
+
+
+def test_an_interrupt_that_compiled_code_turned_into_an_error_ends_as_any_other(
+    bathyfleet: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unpickle() -> None:
+        raise SystemError("_numba_unpickle returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("app.cli.evaluations", unpickle)
+    ended = bathyfleet("evaluate", "survey")
+    assert (ended.code, ended.stdout, ended.stderr) == (130, "", "")
+
+
+def test_whatever_is_listed_ends_alike_when_nobody_reads_it(
+    bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    with serving(tmp_path, environment) as (_, url), httpx.Client(base_url=f"{url}/api/v1") as client:
+        mission = client.post("/missions", json=mission_spec()).json()["id"]
+        client.post(f"/missions/{mission}/measurements", json={"items": soundings(12)})
+        reader, writer = os.pipe()
+        os.close(reader)
+        begun = {
+            words: subprocess.Popen(
+                [*commands.COMMAND, *words.split()],
+                cwd=tmp_path,
+                env=environment,
+                stdout=writer,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            for words in (
+                f"missions list --url {url}",
+                f"export {mission} --format csv --out -",
+                "export --formats",
+                "audit",
+                "audit --format csv",
+                "audit --format json",
+                "token list --json",
+                "--help",
+            )
+        }
+        os.close(writer)
+        ended = {words: (process.communicate()[1], process.returncode) for words, process in begun.items()}
+    assert ended == dict.fromkeys(begun, ("", 1))
 
 
 def test_a_port_that_is_taken_is_said(bathyfleet: Run) -> None:
@@ -508,6 +577,10 @@ def test_missions_are_listed_paused_and_aborted_where_there_is_no_browser(
         listed = bathyfleet("missions", "list", **here).stdout.splitlines()
         assert listed[0] == f"{two}  B: ready"
         assert listed[1].startswith(f"{one}  A: running")
+        asked = ("missions", "list", "--json", "--state", "running", "--state", "paused")
+        (running,) = json.loads(bathyfleet(*asked, "--url", f"{url}/api/v1/").stdout)
+        assert (running["id"], running["state"], running["progress"]["step"]) == (one, "running", 0)
+        assert "no missions that are failed" in bathyfleet("missions", "list", "--state", "failed", **here).stdout
         for action, state in (("pause", "paused"), ("resume", "running"), ("abort", "aborted")):
             done = bathyfleet("missions", action, "--note", "a ferry", **here)
             assert (done.code, done.stdout.splitlines()[0]) == (0, f"{one}  A: {state}")

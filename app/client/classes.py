@@ -113,14 +113,22 @@ def attribute(name: str) -> str:
     return f"{name}_" if keyword.iskeyword(name) else name
 
 
-def docstring(text: str, indent: str) -> list[str]:
-    """Return a text as the lines of a docstring."""
-    clean = " ".join(text.split()).replace("\\", "\\\\").replace('"""', "'''")
-    lines = textwrap.wrap(clean, WIDTH - len(indent) - 6) or [""]
-    quotes = 'r"""' if "\\" in clean else '"""'
+def docstring(text: str, indent: str, parameters: Mapping[str, str] | None = None) -> list[str]:
+    """Return a text as the lines of a docstring, with what parameters mean by how each is declared."""
+    lines = _wrapped(text, indent)
+    if parameters:
+        lines += ["", "Parameters", "----------"]
+        for declared, meaning in parameters.items():
+            lines += [declared, *(f"    {line}" for line in _wrapped(meaning, indent + "    "))]
+    quotes = 'r"""' if "\\" in "".join(lines) else '"""'
     if len(lines) == 1:
         return [f'{indent}{quotes}{lines[0]}"""']
-    return [f"{indent}{quotes}{lines[0]}", *(f"{indent}{line}" for line in lines[1:]), f'{indent}"""']
+    return [f"{indent}{quotes}{lines[0]}", *(f"{indent}{line}".rstrip() for line in lines[1:]), f'{indent}"""']
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    clean = " ".join(text.split()).replace("\\", "\\\\").replace('"""', "'''")
+    return textwrap.wrap(clean, WIDTH - len(indent) - 6) or [""]
 
 
 def _alias(name: str, source: str, schema: Schema) -> str:

@@ -90,12 +90,13 @@ def _method(path: str, method: str, operation: Schema, types: TypeNames, *, asyn
         passed.append(argument)
     query = {name: p for name, p in described.items() if p["in"] == "query"}
     headers = {name: p for name, p in described.items() if p["in"] == "header" and name in SENT_HEADERS}
-    if query or headers:
+    named = {attribute(name.replace("-", "_")): parameter for name, parameter in (query | headers).items()}
+    if named:
         given.append("*")
-    for name, parameter in (query | headers).items():
+    for name, parameter in named.items():
         kind = types.of(parameter["schema"])
         optional = "" if parameter.get("required") else " | None = None"
-        given.append(f"{attribute(name.replace('-', '_'))}: {kind}{optional}")
+        given.append(f"{name}: {kind}{optional}")
     if query:
         passed.append("query={" + ", ".join(f'"{name}": {attribute(name)}' for name in query) + "}")
     if headers:
@@ -105,7 +106,8 @@ def _method(path: str, method: str, operation: Schema, types: TypeNames, *, asyn
     yield from _wrapped(f"    {start} {python_name(operation['operationId'])}(", given, f") -> {answer.kind}:")
     note = operation["summary"].rstrip(".")
     about = f"{note}: ``{method.upper()} {path}``."
-    yield from docstring(about, "        ")
+    meanings = {_declared(name, parameter, types): parameter["description"] for name, parameter in named.items()}
+    yield from docstring(about, "        ", meanings)
     filled = re.sub(r"{(\w+)}", r"{part(\1)}", path)
     address = f'{"f" if in_path else ""}"{filled}"'
     call = f"Call[{answer.kind}]"
@@ -113,6 +115,18 @@ def _method(path: str, method: str, operation: Schema, types: TypeNames, *, asyn
     yield from _wrapped(
         f"        {returned} self._call({call}(", [f'"{method.upper()}"', address, answer.reading, *passed], "))"
     )
+
+
+def _declared(name: str, parameter: Schema, types: TypeNames) -> str:
+    """Return how a parameter is declared in a docstring: its type, bounds, and what is taken where it is left out."""
+    schema = parameter["schema"]
+    told = [types.of(schema)]
+    if "maximum" in schema:
+        least = f"{schema['minimum']} to " if "minimum" in schema else "at most "
+        told.append(f"{least}{schema['maximum']}")
+    if schema.get("default") not in (None, ""):
+        told.append(f"default {schema['default']}")
+    return f"{name} : {', '.join(told)}"
 
 
 def _path_type(schema: Schema) -> str:

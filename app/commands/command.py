@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 FAILURE = 1
 USAGE = 2
-"""Exit codes: something failed, or the command cannot be understood."""
+INTERRUPTED = 130
+"""Exit codes: something failed, the command cannot be understood, or it was interrupted."""
 
 Database = Annotated[
     str | None,

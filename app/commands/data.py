@@ -28,25 +28,26 @@ def _list_formats(wanted: bool) -> None:
 def export(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
     format: Annotated[  # noqa: A002 - the option's name
-        str | None, typer.Option("--format", "-f", help="Kind of file; --formats lists them [default: tif]")
+        str | None, typer.Option("--format", "-f", help="Kind of file; --formats lists them.", show_default="tif")
     ] = None,
     formats: Annotated[
         bool, typer.Option("--formats", help="List the kinds of files.", callback=_list_formats, is_eager=True)
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
+        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout.", show_default="in output_dir")
     ] = None,
     order: Annotated[
         str | None,
         typer.Option(
-            help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2 [default: 1a]"
+            help="IHO S-44 order that the TVU is compared with: exclusive, special, 1a, 1b or 2.", show_default="1a"
         ),
     ] = None,
     interval: Annotated[
-        float | None, typer.Option(min=0.01, max=1000, help="Metres between contours [default: about ten contours]")
+        float | None,
+        typer.Option(min=0.01, max=1000, help="Metres between contours.", show_default="about ten contours"),
     ] = None,
     vehicle: Annotated[
-        str | None, typer.Option(help="Whose soundings, for soundings.geojson [default: the only vehicle's]")
+        str | None, typer.Option(help="Whose soundings, for soundings.geojson.", show_default="the only vehicle's")
     ] = None,
     database: Database = None,
 ) -> None:
@@ -91,7 +92,7 @@ def report(
     mission: Annotated[str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="File to write, .pdf or .html [default: a .pdf in output_dir]"),
+        typer.Option("--out", "-o", help="File to write, .pdf or .html.", show_default="a .pdf in output_dir"),
     ] = None,
     lang: Annotated[str, typer.Option(help="Language that it is written in: en or pt.")] = "en",
     order: Annotated[
@@ -137,7 +138,9 @@ def write_product(product: "Product", out: Path | None, folder: Path) -> None:
 
 Url = Annotated[
     str | None,
-    typer.Option(help="A running service to send it to, for example http://127.0.0.1:8080 [default: the database]"),
+    typer.Option(
+        help="A running service to send it to, for example http://127.0.0.1:8080.", show_default="the database"
+    ),
 ]
 Token = Annotated[str | None, typer.Option(envvar="BATHYFLEET_TOKEN", help="Access token for the service at --url.")]
 
@@ -166,10 +169,11 @@ def import_file(
         str | None, typer.Option(help="What positions are in where the file does not say: EPSG:32629, …, or local.")
     ] = None,
     positive: Annotated[
-        str | None, typer.Option(help="Which way values grow: down or up [default: what the file says]")
+        str | None, typer.Option(help="Which way values grow: down or up.", show_default="what the file says")
     ] = None,
     datum_offset: Annotated[
-        float | None, typer.Option(help="Metres added to every depth to bring it to the mission's datum [default: 0]")
+        float | None,
+        typer.Option(help="Metres added to every depth to bring it to the mission's datum.", show_default="0"),
     ] = None,
     url: Url = None,
     token: Token = None,
@@ -242,7 +246,7 @@ def tide(
         ),
     ] = None,
     level: Annotated[
-        float | None, typer.Option(help="Constant water level, metres, where there is no table [default: 0]")
+        float | None, typer.Option(help="Constant water level, metres, where there is no table.", show_default="0")
     ] = None,
     source: Annotated[str | None, typer.Option(help="Where it comes from, kept with the product.")] = None,
     sd: Annotated[float, typer.Option(help="Standard deviation of the level, metres.")] = 0.0,

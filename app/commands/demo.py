@@ -16,8 +16,8 @@ def demo(
         typer.Option(
             min=0.1,
             max=200,
-            help="How much faster than real time [default: 5, less on a slow or busy machine]",
-            show_default=False,
+            help="How much faster than real time.",
+            show_default="5, less on a slow or busy machine",
         ),
     ] = None,
     terrain: Annotated[
@@ -26,12 +26,13 @@ def demo(
             exists=True,
             dir_okay=False,
             readable=True,
-            help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv [default: generated]",
+            help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv.",
+            show_default="generated",
         ),
     ] = None,
     vehicles: Annotated[int, typer.Option(min=1, max=20, help="Number of simulated AUVs.")] = 2,
     steps: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Steps of the mission [default: 60]", show_default=False)
+        int | None, typer.Option(min=1, max=100_000, help="Steps of the mission.", show_default="60")
     ] = None,
     minutes: Annotated[
         float | None, typer.Option(min=0.1, max=10_080, help="Instead of steps: minutes under way, of vehicle time.")

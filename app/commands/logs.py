@@ -24,7 +24,7 @@ def import_logs(
         ),
     ],
     vehicle: Annotated[
-        str | None, typer.Option(help="Name of the vehicle [default: the one that the log announces]")
+        str | None, typer.Option(help="Name of the vehicle.", show_default="the one that the log announces")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     database: Database = None,

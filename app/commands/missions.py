@@ -1,5 +1,6 @@
 """``bathyfleet missions``: what an operator needs of a running service where there is no browser."""
 
+import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,43 +16,58 @@ missions_app = typer.Typer(
     help="List the missions of a running service, pause them and end them.", no_args_is_help=True
 )
 
-Url = Annotated[str | None, typer.Option(help="A running service [default: the one of this machine's settings]")]
+Url = Annotated[str | None, typer.Option(help="A running service.", show_default="the one of this machine's settings")]
 Token = Annotated[
     str | None,
     typer.Option(
         envvar="BATHYFLEET_TOKEN",
-        help="Access token [default: that of its first start, where this user may read it]",
-        show_default=False,
+        help="Access token.",
+        show_default="that of its first start, where this user may read it",
     ),
 ]
 Mission = Annotated[
-    str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it [default: the only one under way]")
+    str, typer.Argument(metavar="MISSION", help="Its id, or the begin of it.", show_default="the only one under way")
 ]
 Note = Annotated[str, typer.Option(help="Kept in the mission's log beside the action.")]
 Home = Annotated[
     bool | None,
     typer.Option(
         "--return/--stop",
-        help="Send the vehicles home first, or stop them where they are "
-        "[default: abort stops them, finish does as the mission says]",
-        show_default=False,
+        help="Send the vehicles home first, or stop them where they are.",
+        show_default="abort stops them, finish does as the mission says",
     ),
 ]
 
 
 @missions_app.command("list")
-def list_missions(url: Url = None, token: Token = None) -> None:
+def list_missions(
+    states: Annotated[
+        list[str] | None, typer.Option("--state", help="Only missions in this state, as often as needed.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, as GET /api/v1/missions answers.")] = False,
+    url: Url = None,
+    token: Token = None,
+) -> None:
     """List the missions, newest first, with their state and what is left of them."""
+    from app.missions.states import MissionState
     from app.missions.views.mission import MissionSummary
     from imc_bridge.printable import printable
 
+    wanted = states or list(MissionState)
+    for state in wanted:
+        if state not in list(MissionState):
+            raise typer.BadParameter(f"{state!r} is not one of {', '.join(MissionState)}", param_hint="--state")
     with _service(url, token) as service:
-        found = [MissionSummary.model_validate(one) for one in service.missions()]
+        found = [one for one in service.missions() if one["state"] in wanted]
+    if as_json:
+        typer.echo(json.dumps(found, indent=2))
+        return
     if not found:
-        typer.echo("there are no missions; POST /api/v1/missions describes one")
-    for one in found:
-        state = f"{one.state}, {one.reason}" if one.reason else str(one.state)
-        typer.echo(f"{one.id}  {printable(one.name)}: {printable(state)}{_left(one)}")
+        where = f" that are {' or '.join(states)}" if states else "; POST /api/v1/missions describes one"
+        typer.echo(f"there are no missions{where}")
+    for one in map(MissionSummary.model_validate, found):
+        told = f"{one.state}, {one.reason}" if one.reason else str(one.state)
+        typer.echo(f"{one.id}  {printable(one.name)}: {printable(told)}{_left(one)}")
 
 
 @missions_app.command()

@@ -21,7 +21,7 @@ class RunningService:
     Parameters
     ----------
     url : str
-        Such as ``http://127.0.0.1:8080``.
+        Such as ``http://127.0.0.1:8080``, with or without ``/api/v1``.
     token : str or None
         Access token, where it asks for one.
     certificate : Path or None
@@ -35,7 +35,7 @@ class RunningService:
     ) -> None:
         import httpx
 
-        self.url = url.rstrip("/")
+        self.url = url.rstrip("/").removesuffix("/api/v1")
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
         try:
             self._client = httpx.Client(

@@ -60,14 +60,17 @@ def export_site(
         typer.Option("--format", "-f", help="tif, png or xyz: its map; changes.tif, changes.csv or changes.png."),
     ] = "tif",
     earlier: Annotated[
-        str | None, typer.Option("--from", help="Mission of the earlier survey [default: the one before the other]")
+        str | None,
+        typer.Option("--from", help="Mission of the earlier survey.", show_default="the one before the other"),
     ] = None,
-    later: Annotated[str | None, typer.Option("--to", help="Mission of the later survey [default: the newest]")] = None,
+    later: Annotated[
+        str | None, typer.Option("--to", help="Mission of the later survey.", show_default="the newest")
+    ] = None,
     confidence: Annotated[
         float, typer.Option(min=0.5, max=0.9999, help="Of unchanged ground this share is not called changed.")
     ] = 0.95,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout [default: in output_dir]")
+        Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout.", show_default="in output_dir")
     ] = None,
     database: Database = None,
 ) -> None:

@@ -26,7 +26,7 @@ def train(
     landmarks: Annotated[int, typer.Option(min=10, max=100_000)] = 1100,
     steps: Annotated[int, typer.Option(min=1, max=100_000)] = 500,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Runs at a time [default: all cores]")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Runs at a time.", show_default="all cores")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Train on a Dask cluster: tcp://HOST:PORT.")
     ] = None,

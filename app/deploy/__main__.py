@@ -18,10 +18,11 @@ ROOT = Path(__file__).resolve().parents[2]
 def main(
     machines: Annotated[
         list[str] | None,
-        typer.Option("--machine", help=f"{' or '.join(MACHINES)}, as often as needed [default: this one]"),
+        typer.Option("--machine", help=f"{' or '.join(MACHINES)}, as often as needed.", show_default="this one"),
     ] = None,
     wheel: Annotated[
-        Path | None, typer.Option(exists=True, dir_okay=False, help="bathyfleet's wheel [default: built from here]")
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="bathyfleet's wheel.", show_default="built from here"),
     ] = None,
     extras: Annotated[
         list[str] | None, typer.Option("--extra", help="An extra that is put in, such as cluster, as often as needed")

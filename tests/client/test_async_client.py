@@ -58,6 +58,8 @@ async def test_a_survey_from_description_to_map(client: AsyncClient, tmp_path: P
     entries = [entry async for entry in client.events(mission.id, until_ended=True)]
     assert [entry.id for entry in entries] == sorted({entry.id for entry in entries})
     assert entries[-1].data["state"] == "finished"
+    steps = [step.number async for page in client.pages(client.list_steps, mission.id, limit=1) for step in page]
+    assert steps == [step.number for step in await client.list_steps(mission.id)] != []
     assert (await client.wait_for(mission.id, "finished")).progress.step == 2
     await asyncio.wait_for(watching, 240)
     assert kinds >= {"vehicles", "mission", "event"}

@@ -11,7 +11,10 @@ import pytest
 import rasterio
 
 from app.main import Server
+from app.missions.settings import ImcSettings
+from app.settings import Settings
 from bathyfleet.client import (
+    AsyncClient,
     Client,
     ConflictError,
     EndedError,
@@ -22,8 +25,9 @@ from bathyfleet.client import (
     models,
 )
 from tests.support.api.relay import Relay, relay_to
-from tests.support.api.rest import mission_spec, soundings
+from tests.support.api.rest import mission_spec, running_in_thread, soundings
 from tests.support.ports import free_ports
+from tests.support.storage.databases import Databases
 
 SIMULATED = [{"name": "a", "kind": "sim"}]
 
@@ -171,6 +175,48 @@ def test_batches_have_a_size_that_is_taken(client: Client) -> None:
 def test_an_address_that_is_none_is_refused(address: str) -> None:
     with pytest.raises(ValueError, match="address"):
         Client(address)
+
+
+@pytest.mark.parametrize("token", ["secret\n", "", "two secrets", "secreté"])
+def test_a_token_that_no_header_can_show_is_refused_without_telling_it(token: str) -> None:
+    for kind in (Client, AsyncClient):
+        with pytest.raises(ValueError, match=r"^token: ") as refused:
+            kind(token=token)
+        assert "secret" not in str(refused.value)
+
+
+def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(databases: Databases) -> None:
+    settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False), max_requests_per_s=0.5)
+    with running_in_thread(settings) as server, Client(server.url) as client:
+        mission = client.create_mission(mission_spec())
+        for number in range(2):
+            client.write_note(mission.id, {"text": f"buoy {number}"})
+        told = [entry.message for entry in client.get_events(mission.id) if "buoy" in entry.message]
+    assert [message.rpartition(" ")[2] for message in told] == ["0", "1"]
+
+
+def test_an_address_is_taken_with_the_interface_s_path_too(server: Server) -> None:
+    for path in ("/", "/api/v1", "/api/v1/"):
+        with Client(f"{server.url}{path}") as client:
+            assert client.get_health().status
+            with pytest.raises(NotFoundError, match="mission"):
+                next(iter(client.live("nowhere")))
+
+
+def test_pages_of_a_listing_come_one_after_the_other(client: Client) -> None:
+    mission = client.create_mission(mission_spec())
+    client.send_measurements(mission.id, soundings(5))
+    client.write_note(mission.id, {"text": "buoy in sight"})
+    entries = client.get_events(mission.id)
+    by_one = [entry for page in client.pages(client.get_events, mission.id, limit=1) for entry in page]
+    assert (len(entries) > 1, by_one) == (True, entries)
+    pages = list(client.pages(client.list_soundings, mission.id, state=["used"], limit=2))
+    assert [len(page.items) for page in pages] == [2, 2, 1]
+    assert [len(page.id) for page in client.pages(client.list_sounding_points, mission.id, limit=3)] == [3, 2]
+    audit = [entry.id for page in client.pages(client.list_audit, mission=mission.id, limit=1) for entry in page]
+    assert audit == [entry.id for entry in client.list_audit(mission=mission.id)]
+    assert list(client.pages(client.list_steps, mission.id)) == [[]]
+    client.abort_mission(mission.id)
 
 
 def test_the_map_is_an_array_with_places(client: Client, survey: str) -> None:

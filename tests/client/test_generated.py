@@ -8,6 +8,7 @@ import pytest
 
 from app.client.__main__ import TARGET, main, sources
 from app.client.classes import TypeNames
+from app.client.operations import python_name
 from bathyfleet.client import AsyncClient, Client, models
 from tests.support.api.contract import CONTRACT
 
@@ -27,9 +28,30 @@ def test_what_is_out_of_date_is_named(capsys: pytest.CaptureFixture[str], monkey
 
 def test_every_operation_is_a_method_of_both_clients() -> None:
     for operation in CONTRACT.values():
-        name = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in operation)
+        name = python_name(operation)
         assert inspect.isfunction(getattr(Client, name))
         assert inspect.iscoroutinefunction(getattr(AsyncClient, name))
+
+
+def test_what_can_be_asked_for_is_told_with_bounds_and_defaults() -> None:
+    for kind in (Client, AsyncClient):
+        about = inspect.getdoc(kind.get_events) or ""
+        assert "limit : int, 1 to 1000, default 1000\n    Most entries in a list" in about
+        assert "interval_m : float, at most 1000\n    Between contours" in (inspect.getdoc(kind.get_map_file) or "")
+
+
+def test_no_operation_takes_an_empty_id() -> None:
+    with Client() as client:
+        for operation in CONTRACT.values():
+            method = getattr(client, python_name(operation))
+            parameters = [
+                p for p in inspect.signature(method).parameters.values() if p.default is p.empty and p.name != "query"
+            ]
+            ids = [p for p in parameters if p.name.endswith("_id")]
+            if ids:
+                given = {p.name: "" if p in ids else "x" for p in parameters}
+                with pytest.raises(ValueError, match="'' is no id and no name"):
+                    method(**given)
 
 
 def test_both_clients_take_the_same_arguments() -> None:

@@ -1,9 +1,10 @@
 import httpx
 import pytest
 
+from app.api.http.problems import make_problem
 from bathyfleet.client.call import Call
-from bathyfleet.client.problems import BusyError, ConflictError, UnreachableError
-from bathyfleet.client.retry import LONGEST_S, Attempts
+from bathyfleet.client.problems import MEDIA_TYPE, BusyError, ConflictError, UnreachableError
+from bathyfleet.client.retry import LONGEST_S, NEVER_DONE, Attempts
 
 LOST = httpx.ReadError("lost")
 
@@ -23,6 +24,17 @@ def clock() -> Clock:
 
 def answer(status: int, **headers: str) -> httpx.Response:
     return httpx.Response(status, headers=headers, request=httpx.Request("GET", "http://service/x"))
+
+
+def refusal(kind: str, wait_s: float = 1.0) -> httpx.Response:
+    """An answer with the service's own problem document."""
+    document = make_problem(kind, "", instance="/x")
+    return httpx.Response(
+        document.status,
+        content=document.model_dump_json(),
+        headers={"content-type": MEDIA_TYPE, "retry-after": f"{wait_s:g}"},
+        request=httpx.Request("POST", "http://service/x"),
+    )
 
 
 def test_waits_grow_up_to_a_limit_and_end_with_patience(clock: Clock) -> None:
@@ -56,6 +68,24 @@ def test_what_may_have_been_done_is_not_repeated(clock: Clock) -> None:
     with pytest.raises(UnreachableError, match="whether it was done has to be looked up"):
         attempts.after_error(LOST)
     assert attempts.after_answer(answer(503)) is None
+    for kind in ("mission-elsewhere", "product-unavailable"):
+        with pytest.raises(BusyError):
+            attempts.after_refusal(refusal(kind))
+
+
+@pytest.mark.parametrize("kind", sorted(NEVER_DONE))
+def test_what_the_service_says_was_not_done_is_asked_for_again(clock: Clock, kind: str) -> None:
+    attempts = Attempts("POST /missions", 60.0, repeatable=False, now=clock)
+    assert attempts.after_refusal(refusal(kind, 5.0)) == 5.0
+    clock.s += 5.0
+    with pytest.raises(BusyError) as refused:
+        attempts.after_refusal(refusal(kind, 56.0))
+    assert refused.value.kind == kind
+
+
+def test_what_cannot_be_sent_is_not_tried_again(clock: Clock) -> None:
+    with pytest.raises(ValueError, match="it cannot be sent"):
+        Attempts("x", 60.0, repeatable=True, now=clock).after_error(httpx.LocalProtocolError("illegal"))
 
 
 def test_the_service_says_how_long_to_wait(clock: Clock) -> None:

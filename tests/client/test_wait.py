@@ -26,3 +26,8 @@ def test_a_wait_ends_in_time_while_nobody_answers() -> None:
     (port,) = free_ports(1)
     with Client(f"http://127.0.0.1:{port}") as client, pytest.raises(TimeoutError, match="no answer came"):
         client.wait_for("m", timeout_s=0.1)
+
+
+def test_a_word_that_is_no_state_is_refused_before_anything_is_asked() -> None:
+    with Client() as client, pytest.raises(ValueError, match="states: 'runing' is not one of draft, ready, running"):
+        client.wait_for("m", "runing")  # type: ignore[arg-type]

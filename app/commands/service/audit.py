@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.command import CommandError, Database, check_database, command_settings
+from app.commands.command import Database, check_database, command_settings
 
 if TYPE_CHECKING:
     from app.storage.models import AuditRow
@@ -19,11 +19,13 @@ PAGE = 1000
 
 def audit(
     days: Annotated[
-        float | None, typer.Option(min=0, max=36_500, help="Only the last so many days [default: all]")
+        float | None, typer.Option(min=0, max=36_500, help="Only the last so many days.", show_default="all")
     ] = None,
     actor: Annotated[str | None, typer.Option(help="Only commands of the token of this name.")] = None,
     mission: Annotated[str | None, typer.Option(help="Only commands to the mission of this id.")] = None,
-    limit: Annotated[int | None, typer.Option(min=1, help="Most entries [default: 50; all with --format]")] = None,
+    limit: Annotated[
+        int | None, typer.Option(min=1, help="Most entries.", show_default="50; all with --format")
+    ] = None,
     form: Annotated[
         str, typer.Option("--format", "-f", help="table, csv, or json: an object per line, to keep or to search.")
     ] = "table",
@@ -63,20 +65,17 @@ def audit(
         return rows
 
     entries = [_plain(row) for row in asyncio.run(run())]
-    try:
-        if form == "json":
-            for entry in entries:
-                typer.echo(json.dumps(entry))
-        elif form == "csv":
-            from app.csv_cells import text_cell
+    if form == "json":
+        for entry in entries:
+            typer.echo(json.dumps(entry))
+    elif form == "csv":
+        from app.csv_cells import text_cell
 
-            writer = csv.DictWriter(sys.stdout, FIELDS)
-            writer.writeheader()
-            writer.writerows({name: text_cell(value) for name, value in entry.items()} for entry in entries)
-        else:
-            _show(entries)
-    except BrokenPipeError:
-        raise CommandError("whoever reads the list has gone") from None
+        writer = csv.DictWriter(sys.stdout, FIELDS)
+        writer.writeheader()
+        writer.writerows({name: text_cell(value) for name, value in entry.items()} for entry in entries)
+    else:
+        _show(entries)
 
 
 def _plain(row: "AuditRow") -> dict[str, Any]:

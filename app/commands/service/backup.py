@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def backup(
     file: Annotated[
         Path | None,
-        typer.Argument(help="File to write, or a folder to write one with date and time into [default: backups]"),
+        typer.Argument(help="File to write, or a folder to write one with date and time into.", show_default="backups"),
     ] = None,
     verify: Annotated[
         Path | None,

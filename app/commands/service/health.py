@@ -14,8 +14,10 @@ def health(
     ready: Annotated[
         bool, typer.Option("--ready", help="Ask whether it can do its work, not only whether it lives.")
     ] = False,
-    host: Annotated[str | None, typer.Option(help="Address that it listens on [default: as for serve]")] = None,
-    port: Annotated[int | None, typer.Option(min=0, max=65535, help="Its TCP port [default: as for serve]")] = None,
+    host: Annotated[str | None, typer.Option(help="Address that it listens on.", show_default="as for serve")] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Its TCP port.", show_default="as for serve")
+    ] = None,
 ) -> None:
     """Ask the service that runs here with these settings how it is.
 

@@ -14,19 +14,19 @@ log = structlog.get_logger(__name__)
 
 
 def serve(
-    host: Annotated[str | None, typer.Option(help="Address to listen on [default: 127.0.0.1]")] = None,
+    host: Annotated[str | None, typer.Option(help="Address to listen on.", show_default="127.0.0.1")] = None,
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="TCP port; 0: any free one [default: 8080]")
+        int | None, typer.Option(min=0, max=65535, help="TCP port; 0: any free one.", show_default="8080")
     ] = None,
     database: Database = None,
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Serve other machines without access tokens: anyone may command.")
     ] = False,
     time_scale: Annotated[
-        float | None, typer.Option(help="How much faster than wall time simulated vehicles live [default: 1]")
+        float | None, typer.Option(help="How much faster than wall time simulated vehicles live.", show_default="1")
     ] = None,
-    log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged [default: info]")] = None,
-    log_format: Annotated[LogFormat | None, typer.Option(help="How it is written [default: console]")] = None,
+    log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged.", show_default="info")] = None,
+    log_format: Annotated[LogFormat | None, typer.Option(help="How it is written.", show_default="console")] = None,
     check: Annotated[bool, typer.Option("--check", help="Only read the settings, and say what is wrong.")] = False,
 ) -> None:
     """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""

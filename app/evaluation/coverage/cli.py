@@ -44,7 +44,8 @@ def coverage(
     rate: Annotated[float, typer.Option(min=0.1, max=50.0, help="Pings a second.")] = 5.0,
     sonar_range: Annotated[float, typer.Option("--range", min=1.0, help="Largest slant range, metres.")] = 100.0,
     cell: Annotated[
-        float | None, typer.Option(min=0.05, help="Side of a node, metres [default: a twentieth of the median depth]")
+        float | None,
+        typer.Option(min=0.05, help="Side of a node, metres.", show_default="a twentieth of the median depth"),
     ] = None,
     seed: Seed = None,
     seeds: Seeds = None,

@@ -22,13 +22,13 @@ def pcao(
     terrains: Annotated[
         Path | None, typer.Option(help="Folder of real terrain files; generated ones are added.")
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="Model file [default: the one that ships]")] = None,
+    model: Annotated[Path | None, typer.Option(help="Model file.", show_default="the one that ships")] = None,
     steps: Annotated[int, typer.Option(min=1)] = 500,
     landmarks: Annotated[int, typer.Option(min=10)] = 1100,
     iterations: Annotated[int, typer.Option(min=1, help="Controllers tried per search of figure 2.")] = 250,
     searches: Annotated[int, typer.Option(min=1, help="Searches per method of figure 2.")] = 2,
     team_runs: Annotated[int, typer.Option(min=1, help="Runs per team size and sea floor.")] = 5,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Runs at a time [default: all cores]")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Runs at a time.", show_default="all cores")] = None,
     scheduler: Scheduler = None,
     only: Annotated[
         str | None, typer.Option(help="One or more of curves, tables, others, teams, se500, separated by commas.")

@@ -22,10 +22,16 @@ from app.exploration.planners import missing
 from simulator.floors.terrain import Terrain, TerrainError
 from simulator.floors.terrain_files import load_terrain
 
-evaluate_app = typer.Typer(help="Compare planners in closed loop, without a network.", no_args_is_help=True)
+evaluate_app = typer.Typer(
+    help="Compare planners in closed loop, without a network.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 
 TerrainFile = Annotated[Path, typer.Option("--terrain", help="Sea floor: .npz, .asc, GeoTIFF, .xyz or .csv.")]
-Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random [default: 0]", show_default=False)]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random.", show_default="0")]
 Seeds = Annotated[str | None, typer.Option(help="Several runs: FIRST:END (END excluded), or a list 1,5,9.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else, to standard output.")]
 Regressors = Annotated[str, typer.Option(help="What CAO's estimator is linear in: map or polynomial.")]
@@ -36,7 +42,8 @@ Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster instead: tcp://HOST:PORT.")
 ]
 ModelFile = Annotated[
-    Path | None, typer.Option(help="What pcao flies with, a file of bathyfleet train [default: the one that ships]")
+    Path | None,
+    typer.Option(help="What pcao flies with, a file of bathyfleet train.", show_default="the one that ships"),
 ]
 
 

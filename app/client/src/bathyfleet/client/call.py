@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Generic, TypeVar
@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 import httpx
 from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic_core import PydanticSerializationError
 
 T = TypeVar("T")
 
@@ -57,7 +58,7 @@ class Call(Generic[T]):
             headers["Accept"] = f"{JSON}, application/geo+json"
         content = self.content
         if self.body is not None:
-            content = _as_json(self.body)
+            content = as_json(self.body)
             headers["Content-Type"] = JSON
         elif content is not None:
             headers["Content-Type"] = "application/octet-stream"
@@ -87,17 +88,47 @@ class Call(Generic[T]):
 
 
 def part(value: str | int) -> str:
-    """Return a part of a path, escaped."""
+    """Return a part of a path, escaped. Raises ValueError for one that would make it another path."""
+    if str(value) in ("", ".", ".."):
+        raise ValueError(f"{value!r} is no id and no name: an address cannot be made of it")
     return quote(str(value), safe="")
 
 
-def _as_json(body: BaseModel | Mapping[str, Any]) -> bytes:
-    if isinstance(body, BaseModel):
-        return body.model_dump_json(exclude_unset=True).encode()
-    return _MAPPING.dump_json(dict(body), exclude_unset=True)
+def as_json(value: BaseModel | Mapping[str, Any], place: str = "") -> bytes:
+    """Return what is sent of a value; NumPy's numbers and arrays are taken as Python's.
+
+    Raises TypeError for what cannot be sent, with where it is: ``place`` is the value's own in the whole.
+    """
+    try:
+        if isinstance(value, BaseModel):
+            return value.model_dump_json(exclude_unset=True, fallback=_plain).encode()
+        return _MAPPING.dump_json(dict(value), exclude_unset=True, fallback=_plain)
+    except PydanticSerializationError as error:
+        raise TypeError(_unfit(value, place) or str(error)) from None
+
+
+def _plain(value: Any) -> Any:
+    """Return an array or a number of NumPy as Python's own, without loading NumPy."""
+    return value.tolist()
+
+
+def _unfit(value: Any, place: str) -> str:
+    """Say which value inside another one cannot be sent; nothing where each can."""
+    if isinstance(value, Mapping | BaseModel):
+        inner: Iterable[tuple[Any, Any]] = dict(value).items()
+    elif isinstance(value, list | tuple):
+        inner = enumerate(value)
+    else:
+        try:
+            _ANY.dump_json(value, fallback=_plain)
+        except PydanticSerializationError:
+            return f"{place}: {value!r} cannot be sent; numbers, texts, times, lists and dicts can"
+        return ""
+    return next(filter(None, (_unfit(part, f"{place}.{name}".lstrip(".")) for name, part in inner)), "")
 
 
 _MAPPING = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
+_ANY = TypeAdapter(Any)
 
 
 @cache

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ssl
 import time
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, TypeVar
 
 import httpx
 from httpx_sse import EventSource
@@ -23,13 +23,23 @@ from bathyfleet.client.connection import (
     authorization,
     batches,
     new_key,
+    root,
     settings,
     together,
 )
 from bathyfleet.client.files import Arriving
 from bathyfleet.client.maps import dataset
-from bathyfleet.client.models import BatchVerdict, EventView, LiveMessage, MeasurementBatch, MissionView, Order
+from bathyfleet.client.models import (
+    BatchVerdict,
+    EventView,
+    LiveMessage,
+    MeasurementBatch,
+    MissionState,
+    MissionView,
+    Order,
+)
 from bathyfleet.client.operations import Operations
+from bathyfleet.client.pages import next_page
 from bathyfleet.client.retry import Attempts
 from bathyfleet.client.streams import (
     ENDED,
@@ -47,6 +57,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 T = TypeVar("T")
+Listing: TypeAlias = Callable[..., T]
 
 
 class Client(Operations):
@@ -55,7 +66,7 @@ class Client(Operations):
     Parameters
     ----------
     address : str
-        Where it answers, without ``/api/v1``.
+        Where it answers, with or without ``/api/v1``.
     token : str, optional
         An access token, where the service has any.
     patience_s : float
@@ -82,8 +93,8 @@ class Client(Operations):
         timeout_s: float = TIMEOUT_S,
         verify: bool | ssl.SSLContext = True,
     ) -> None:
-        self._http = httpx.Client(**settings(address, token, timeout_s, verify))
-        self._address = address.rstrip("/")
+        self._address = root(address)
+        self._http = httpx.Client(**settings(self._address, token, timeout_s, verify))
         self._token = token
         self._verify = verify
         self._patience_s = patience_s
@@ -114,13 +125,13 @@ class Client(Operations):
         return Attempts(f"{what} at {self._address}", self._patience_s, repeatable=repeatable, within_s=within_s)
 
     def wait_for(
-        self, mission_id: str, *states: str, timeout_s: float | None = None, every_s: float = 1.0
+        self, mission_id: str, *states: MissionState, timeout_s: float | None = None, every_s: float = 1.0
     ) -> MissionView:
         """Return a mission as soon as it is in one of the states; without any named: when it has ended.
 
         Parameters
         ----------
-        states : str
+        states : MissionState
             For example ``"running"``, ``"paused"``.
         timeout_s : float, optional
             The longest wait.
@@ -133,6 +144,8 @@ class Client(Operations):
             When it has ended in another state: none of those can come any more.
         TimeoutError
             When the time is over.
+        ValueError
+            For a word that is no state.
         """
         wait = Wait(mission_id, states, timeout_s, every_s)
         while True:
@@ -141,6 +154,24 @@ class Client(Operations):
             if pause_s is None:
                 return mission
             time.sleep(pause_s)
+
+    def pages(self, listing: Listing[T], *arguments: Any, **query: Any) -> Generator[T, None, None]:
+        """Yield all pages of a listing, one after the other: what an operation with ``after`` or ``before`` answers.
+
+        Parameters
+        ----------
+        listing : callable
+            The operation, for example :meth:`list_soundings` or :meth:`get_events`.
+        arguments, query
+            Its arguments; ``limit`` is how long a page is.
+        """
+        while True:
+            page = listing(*arguments, **query)
+            yield page
+            following = next_page(page)
+            if following is None:
+                return
+            query |= following
 
     def events(self, mission_id: str, *, after: int = 0, until_ended: bool = False) -> Generator[EventView, None, None]:
         """Yield the entries of a mission's log, first those that there are, then each as it is made.
@@ -156,12 +187,11 @@ class Client(Operations):
             those with a larger id any more, after the last one.
         """
         if until_ended and after and self.get_mission(mission_id).state in ENDED:
-            while entries := self.get_events(mission_id, after=after):
+            for entries in self.pages(self.get_events, mission_id, after=after):
                 for stored in entries:
                     yield stored
                     if ends(stored):
                         return
-                after = entries[-1].id
             return
         place = LogPlace(mission_id, after)
         attempts = self._attempts(place.name)
@@ -223,8 +253,9 @@ class Client(Operations):
         return super().post_measurements(mission_id, body, idempotency_key=idempotency_key or new_key())
 
     def send_measurements(self, mission_id: str, items: Iterable[Item], *, batch: int = BATCH) -> BatchVerdict:
-        """Post any number of measurements in batches; returns the verdicts on all, in order.
+        """Post any number of measurements, also pings of many beams, in batches; returns all verdicts, in order.
 
+        Numbers and arrays may be NumPy's. ``batch`` is how many go at once at most; long ones go fewer at a time.
         Where it raises, the batches before are stored: sent again, their items are duplicates.
         """
         return together(self.post_measurements(mission_id, {"items": some}) for some in batches(items, batch))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import ssl
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
 from typing import Any
 
 import httpx
 
+from bathyfleet.client.call import as_json
 from bathyfleet.client.models import BatchVerdict, ItemVerdict, Measurement
 
 ADDRESS = "http://127.0.0.1:8080"
@@ -17,26 +18,39 @@ PATIENCE_S = 30.0
 TIMEOUT_S = 75.0
 """A little more than the longest that the service lets a vehicle wait for its waypoint."""
 BATCH = 1000
+BATCH_BYTES = 1 << 20
+"""Whatever is in so much JSON: since a value takes two bytes, it is within the service's limits of values and beams."""
+
+TOKEN = re.compile(r"[!-~]+")
 
 Item = Measurement | Mapping[str, Any]
 
 
-def settings(address: str, token: str | None, timeout_s: float, verify: bool | ssl.SSLContext) -> dict[str, Any]:
-    """Return the settings of an HTTP connection. Raises ValueError for an address that is none."""
+def root(address: str) -> str:
+    """Return where a service answers, without ``/api/v1``. Raises ValueError for an address that is none."""
     url = httpx.URL(address)
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"address: {address!r} is not like {ADDRESS} or https://host:port")
+    return address.rstrip("/").removesuffix("/api/v1")
+
+
+def settings(address: str, token: str | None, timeout_s: float, verify: bool | ssl.SSLContext) -> dict[str, Any]:
+    """Return the settings of an HTTP connection to the service at an address that :func:`root` returned."""
     return {
-        "base_url": address.rstrip("/"),
+        "base_url": address,
         "headers": authorization(token) | {"Accept": "*/*"},
         "timeout": httpx.Timeout(timeout_s, connect=10.0),
         # Loading certificates takes longer than most requests; plain HTTP has no use for them.
-        "verify": verify if url.scheme == "https" else False,
+        "verify": verify if address.startswith("https:") else False,
     }
 
 
 def authorization(token: str | None) -> dict[str, str]:
-    """Return the header that shows a token."""
+    """Return the header that shows a token. Raises ValueError, which does not tell it, for what no token can be."""
+    if token is not None and not TOKEN.fullmatch(token):
+        raise ValueError(
+            "token: it is empty or has a blank, a line end or a letter that none has; strip what is read from a file"
+        )
     return {} if token is None else {"Authorization": f"Bearer {token}"}
 
 
@@ -46,11 +60,22 @@ def new_key() -> str:
 
 
 def batches(items: Iterable[Item], size: int) -> Iterator[list[Item]]:
-    """Yield the items in lists of at most ``size``. Raises ValueError unless that is 1 to 10 000."""
+    """Yield the items in lists of at most ``size`` and ``BATCH_BYTES`` of JSON, one that is longer by itself.
+
+    Raises ValueError unless the size is 1 to 10 000, TypeError for an item that cannot be sent.
+    """
     if not 1 <= size <= 10_000:
         raise ValueError(f"batch: {size} is not from 1 to 10000")
-    rest = iter(items)
-    while batch := list(islice(rest, size)):
+    batch: list[Item] = []
+    held = 0
+    for index, item in enumerate(items):
+        length = len(as_json(item, f"items.{index}"))
+        if len(batch) == size or (batch and held + length > BATCH_BYTES):
+            yield batch
+            batch, held = [], 0
+        batch.append(item)
+        held += length
+    if batch:
         yield batch
 
 

@@ -127,7 +127,15 @@ class Operations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> list[models.StepView]:
-        """See what was decided: ``GET /missions/{mission_id}/steps``."""
+        """See what was decided: ``GET /missions/{mission_id}/steps``.
+
+        Parameters
+        ----------
+        after : int, default 0
+            Only steps with a larger number
+        limit : int, 1 to 1000, default 1000
+            Most steps in the answer
+        """
         return self._call(Call[list[models.StepView]](
             "GET",
             f"/missions/{part(mission_id)}/steps",
@@ -136,7 +144,13 @@ class Operations(ABC):
         ))
 
     def get_telemetry(self, mission_id: str, *, points: int | None = None) -> models.TelemetryView:
-        """See the vehicles' figures over time: ``GET /missions/{mission_id}/telemetry``."""
+        """See the vehicles' figures over time: ``GET /missions/{mission_id}/telemetry``.
+
+        Parameters
+        ----------
+        points : int, 2 to 5000, default 720
+            Most moments in the answer, evenly spread
+        """
         return self._call(Call[models.TelemetryView](
             "GET",
             f"/missions/{part(mission_id)}/telemetry",
@@ -250,7 +264,17 @@ class Operations(ABC):
         to: str | None = None,
         confidence: float | None = None,
     ) -> models.ChangesView:
-        """See what changed between two surveys: ``GET /sites/{site_id}/changes``."""
+        """See what changed between two surveys: ``GET /sites/{site_id}/changes``.
+
+        Parameters
+        ----------
+        from_ : str
+            Mission of the earlier survey; default: the one before the other
+        to : str
+            Mission of the later survey; default: the newest
+        confidence : float, default 0.95
+            Of unchanged ground this share is not called changed
+        """
         return self._call(Call[models.ChangesView](
             "GET",
             f"/sites/{part(site_id)}/changes",
@@ -271,7 +295,17 @@ class Operations(ABC):
         to: str | None = None,
         confidence: float | None = None,
     ) -> bytes:
-        """Download what changed between two surveys: ``GET /sites/{site_id}/changes.{format}``."""
+        """Download what changed between two surveys: ``GET /sites/{site_id}/changes.{format}``.
+
+        Parameters
+        ----------
+        from_ : str
+            Mission of the earlier survey; default: the one before the other
+        to : str
+            Mission of the later survey; default: the newest
+        confidence : float, default 0.95
+            Of unchanged ground this share is not called changed
+        """
         return self._call(Call[bytes](
             "GET",
             f"/sites/{part(site_id)}/changes.{part(format)}",
@@ -289,7 +323,13 @@ class Operations(ABC):
         ))
 
     def forecast_mission(self, mission_id: str, *, floor_depth_m: float | None = None) -> models.ForecastView:
-        """Foretell a mission: ``POST /missions/{mission_id}/forecast``."""
+        """Foretell a mission: ``POST /missions/{mission_id}/forecast``.
+
+        Parameters
+        ----------
+        floor_depth_m : float, at most 11000
+            How deep it is where nothing is known; default: a guess
+        """
         return self._call(Call[models.ForecastView](
             "POST",
             f"/missions/{part(mission_id)}/forecast",
@@ -303,7 +343,13 @@ class Operations(ABC):
         *,
         floor_depth_m: float | None = None,
     ) -> models.ForecastView:
-        """Foretell a mission that is being described: ``POST /forecast``."""
+        """Foretell a mission that is being described: ``POST /forecast``.
+
+        Parameters
+        ----------
+        floor_depth_m : float, at most 11000
+            How deep it is where nothing is known; default: a guess
+        """
         return self._call(Call[models.ForecastView](
             "POST",
             "/forecast",
@@ -318,7 +364,13 @@ class Operations(ABC):
         *,
         floor_depth_m: float | None = None,
     ) -> models.PlanView:
-        """Plan a mission that is being described: ``POST /plan``."""
+        """Plan a mission that is being described: ``POST /plan``.
+
+        Parameters
+        ----------
+        floor_depth_m : float, at most 11000
+            How deep it is where nothing is known; default: a guess
+        """
         return self._call(Call[models.PlanView](
             "POST",
             "/plan",
@@ -334,7 +386,14 @@ class Operations(ABC):
         *,
         idempotency_key: str | None = None,
     ) -> models.BatchVerdict:
-        """Post measurements: ``POST /missions/{mission_id}/measurements``."""
+        """Post measurements: ``POST /missions/{mission_id}/measurements``.
+
+        Parameters
+        ----------
+        idempotency_key : str
+            Name of this batch, made by the sender. Sent again by the same sender with the same key and content,
+            nothing is stored twice and the first answer is given again
+        """
         return self._call(Call[models.BatchVerdict](
             "POST",
             f"/missions/{part(mission_id)}/measurements",
@@ -351,7 +410,15 @@ class Operations(ABC):
         after_step: int | None = None,
         timeout_s: float | None = None,
     ) -> models.WaypointView | None:
-        """Fetch a vehicle's waypoint: ``GET /missions/{mission_id}/vehicles/{name}/waypoint``."""
+        """Fetch a vehicle's waypoint: ``GET /missions/{mission_id}/vehicles/{name}/waypoint``.
+
+        Parameters
+        ----------
+        after_step : int
+            Step of the newest waypoint that the vehicle has: only a newer one is sent
+        timeout_s : float, 0 to 60.0, default 25.0
+            How long to wait for one, wall-clock seconds
+        """
         return self._call(Call[models.WaypointView | None](
             "GET",
             f"/missions/{part(mission_id)}/vehicles/{part(name)}/waypoint",
@@ -464,7 +531,28 @@ class Operations(ABC):
         order: models.Order | None = None,
         datum_offset_m: float | None = None,
     ) -> models.ImportView:
-        """Begin with soundings or a map from elsewhere: ``POST /missions/{mission_id}/imports``."""
+        """Begin with soundings or a map from elsewhere: ``POST /missions/{mission_id}/imports``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5
+            (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars)
+        source : str
+            Where it comes from, kept with the mission
+        crs : str
+            What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the
+            mission's own frame
+        positive : Literal["down", "up"]
+            Which way values grow: down for depths, up for heights; default: what the file says
+        sd_m : float, at most 1000
+            Standard deviation of the depths that state none, metres
+        order : models.Order
+            In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed
+        datum_offset_m : float, -200 to 200
+            Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said
+            where the file states another one
+        """
         return self._call(Call[models.ImportView](
             "POST",
             f"/missions/{part(mission_id)}/imports",
@@ -498,7 +586,28 @@ class Operations(ABC):
         order: models.Order | None = None,
         datum_offset_m: float | None = None,
     ) -> models.ReferenceView:
-        """Compare the map with a grid: ``PUT /missions/{mission_id}/reference``."""
+        """Compare the map with a grid: ``PUT /missions/{mission_id}/reference``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5
+            (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars)
+        source : str
+            Where it comes from, kept with the mission
+        crs : str
+            What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the
+            mission's own frame
+        positive : Literal["down", "up"]
+            Which way values grow: down for depths, up for heights; default: what the file says
+        sd_m : float, at most 1000
+            Standard deviation of the depths that state none, metres
+        order : models.Order
+            In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed
+        datum_offset_m : float, -200 to 200
+            Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said
+            where the file states another one
+        """
         return self._call(Call[models.ReferenceView](
             "PUT",
             f"/missions/{part(mission_id)}/reference",
@@ -529,7 +638,21 @@ class Operations(ABC):
         north_deg: float,
         margin_m: float | None = None,
     ) -> models.ProposedZonesView:
-        """Propose keep-out zones from a chart: ``POST /chart-zones``."""
+        """Propose keep-out zones from a chart: ``POST /chart-zones``.
+
+        Parameters
+        ----------
+        west_deg : float, -180 to 180
+            Western end of the area
+        south_deg : float, -90 to 90
+            Southern end of the area
+        east_deg : float, -180 to 180
+            Eastern end of the area
+        north_deg : float, -90 to 90
+            Northern end of the area
+        margin_m : float, 0 to 1000, default 10.0
+            How much all of it is enlarged, beside how well its place is known
+        """
         return self._call(Call[models.ProposedZonesView](
             "POST",
             "/chart-zones",
@@ -545,7 +668,15 @@ class Operations(ABC):
         layer: list[models.LayerName] | None = None,
         order: models.Order | None = None,
     ) -> models.MapView:
-        """See the map: ``GET /missions/{mission_id}/map``."""
+        """See the map: ``GET /missions/{mission_id}/map``.
+
+        Parameters
+        ----------
+        layer : list[models.LayerName]
+            Further layers, in `layers`; repeat it for several
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return self._call(Call[models.MapView](
             "GET",
             f"/missions/{part(mission_id)}/map",
@@ -562,7 +693,19 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
     ) -> bytes:
-        """See the map as a transparent picture: ``GET /missions/{mission_id}/map.overlay.png``."""
+        """See the map as a transparent picture: ``GET /missions/{mission_id}/map.overlay.png``.
+
+        Parameters
+        ----------
+        layer : models.OverlayLayer, default depth
+            What is shown
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        min : float, -20000.0 to 20000.0
+            Value at the palette's begin, m; default: the map's least
+        max : float, -20000.0 to 20000.0
+            Value at the palette's end, m; default: the map's largest
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.overlay.png",
@@ -578,7 +721,17 @@ class Operations(ABC):
         layer: list[models.FurtherLayer] | None = None,
         step: int | None = None,
     ) -> bytes:
-        """Follow the map: ``GET /missions/{mission_id}/map/tiles``."""
+        """Follow the map: ``GET /missions/{mission_id}/map/tiles``.
+
+        Parameters
+        ----------
+        since : str
+            `tag` of the map that the client has
+        layer : list[models.FurtherLayer]
+            Layers beside the usual ones
+        step : int
+            The map as it was at the end of this step; default: the newest
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map/tiles",
@@ -603,7 +756,13 @@ class Operations(ABC):
         return self._call(Call[dict[str, Any]]("GET", f"/missions/{part(mission_id)}/holidays", dict[str, Any]))
 
     def get_crosslines(self, mission_id: str, *, order: models.Order | None = None) -> models.CrossoversView:
-        """See how well the survey agrees with itself: ``GET /missions/{mission_id}/crosslines``."""
+        """See how well the survey agrees with itself: ``GET /missions/{mission_id}/crosslines``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return self._call(Call[models.CrossoversView](
             "GET",
             f"/missions/{part(mission_id)}/crosslines",
@@ -612,7 +771,13 @@ class Operations(ABC):
         ))
 
     def get_crossovers_file(self, mission_id: str, *, order: models.Order | None = None) -> str:
-        """Download the crossings: ``GET /missions/{mission_id}/crossovers.csv``."""
+        """Download the crossings: ``GET /missions/{mission_id}/crossovers.csv``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return self._call(Call[str]("GET", f"/missions/{part(mission_id)}/crossovers.csv", str, query={"order": order}))
 
     def list_products(self, mission_id: str) -> list[models.ProductView]:
@@ -634,7 +799,15 @@ class Operations(ABC):
         lang: models.Language | None = None,
         order: models.Order | None = None,
     ) -> bytes:
-        """Download the survey's report as PDF: ``GET /missions/{mission_id}/report.pdf``."""
+        """Download the survey's report as PDF: ``GET /missions/{mission_id}/report.pdf``.
+
+        Parameters
+        ----------
+        lang : models.Language, default en
+            Language that it is written in
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/report.pdf",
@@ -649,7 +822,15 @@ class Operations(ABC):
         lang: models.Language | None = None,
         order: models.Order | None = None,
     ) -> bytes:
-        """Download the survey's report as HTML: ``GET /missions/{mission_id}/report.html``."""
+        """Download the survey's report as HTML: ``GET /missions/{mission_id}/report.html``.
+
+        Parameters
+        ----------
+        lang : models.Language, default en
+            Language that it is written in
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/report.html",
@@ -668,7 +849,21 @@ class Operations(ABC):
         max: float | None = None,
         vehicle: str | None = None,
     ) -> bytes:
-        """Download the map: ``GET /missions/{mission_id}/map.{format}``."""
+        """Download the map: ``GET /missions/{mission_id}/map.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
@@ -687,7 +882,21 @@ class Operations(ABC):
         max: float | None = None,
         vehicle: str | None = None,
     ) -> bytes:
-        """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``."""
+        """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/soundings.{part(format)}",
@@ -706,7 +915,21 @@ class Operations(ABC):
         max: float | None = None,
         vehicle: str | None = None,
     ) -> bytes:
-        """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``."""
+        """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
@@ -724,7 +947,21 @@ class Operations(ABC):
         layer: list[models.LayerName] | None = None,
         order: models.Order | None = None,
     ) -> models.ProfileView:
-        """See the map along a line: ``GET /missions/{mission_id}/profile``."""
+        """See the map along a line: ``GET /missions/{mission_id}/profile``.
+
+        Parameters
+        ----------
+        line : str
+            Its 2 to 100 corners as longitude,latitude, with ; between them
+        spacing_m : float, at most 1000.0
+            Between points; default: half a cell
+        within_m : float, at most 1000.0
+            From the line to soundings at most; default: one cell
+        layer : list[models.LayerName]
+            Further layers, in `layers`; repeat it for several
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return self._call(Call[models.ProfileView](
             "GET",
             f"/missions/{part(mission_id)}/profile",
@@ -744,7 +981,15 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
     ) -> models.TileJson:
-        """See where a layer's tiles are: ``GET /missions/{mission_id}/tiles/{layer}.json``."""
+        """See where a layer's tiles are: ``GET /missions/{mission_id}/tiles/{layer}.json``.
+
+        Parameters
+        ----------
+        min : float, -20000.0 to 20000.0
+            Value of the first colour; default: what the layer's TileJSON says
+        max : float, -20000.0 to 20000.0
+            Value of the last colour; default: what the layer's TileJSON says
+        """
         return self._call(Call[models.TileJson](
             "GET",
             f"/missions/{part(mission_id)}/tiles/{part(layer)}.json",
@@ -763,7 +1008,15 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
     ) -> bytes:
-        """See the map as tiles: ``GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png``."""
+        """See the map as tiles: ``GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png``.
+
+        Parameters
+        ----------
+        min : float, -20000.0 to 20000.0
+            Value of the first colour; default: what the layer's TileJSON says
+        max : float, -20000.0 to 20000.0
+            Value of the last colour; default: what the layer's TileJSON says
+        """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tiles/{part(layer)}/{part(z)}/{part(x)}/{part(y)}.png",
@@ -780,7 +1033,19 @@ class Operations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> models.SoundingPage:
-        """See which soundings are not in the map, and why: ``GET /missions/{mission_id}/soundings``."""
+        """See which soundings are not in the map, and why: ``GET /missions/{mission_id}/soundings``.
+
+        Parameters
+        ----------
+        state : list[models.SoundingState]
+            Only soundings in these states; default: all that are not simply used
+        vehicle : str
+            Only this vehicle's
+        after : int, default 0
+            Only soundings with a larger id
+        limit : int, 1 to 1000, default 200
+            Most soundings in the answer
+        """
         return self._call(Call[models.SoundingPage](
             "GET",
             f"/missions/{part(mission_id)}/soundings",
@@ -795,7 +1060,15 @@ class Operations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> models.SoundingPoints:
-        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``."""
+        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``.
+
+        Parameters
+        ----------
+        after : int, default 0
+            Only soundings with a larger id
+        limit : int, 1 to 20000, default 20000
+            Most soundings in the answer
+        """
         return self._call(Call[models.SoundingPoints](
             "GET",
             f"/missions/{part(mission_id)}/soundings/points",
@@ -873,7 +1146,17 @@ class Operations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> models.TargetRangePage:
-        """See the ranges to targets, and which were used: ``GET /missions/{mission_id}/targets/ranges``."""
+        """See the ranges to targets, and which were used: ``GET /missions/{mission_id}/targets/ranges``.
+
+        Parameters
+        ----------
+        target : str
+            Only ranges to this target
+        after : int, default 0
+            Only ranges with a larger id
+        limit : int, 1 to 1000, default 200
+            Most ranges in the answer
+        """
         return self._call(Call[models.TargetRangePage](
             "GET",
             f"/missions/{part(mission_id)}/targets/ranges",
@@ -891,7 +1174,13 @@ class Operations(ABC):
         ))
 
     def get_search(self, mission_id: str, *, after: int | None = None) -> models.SearchGridView | None:
-        """See the site of a search as known now: ``GET /missions/{mission_id}/search``."""
+        """See the site of a search as known now: ``GET /missions/{mission_id}/search``.
+
+        Parameters
+        ----------
+        after : int
+            Only what is newer than this version
+        """
         return self._call(Call[models.SearchGridView | None](
             "GET",
             f"/missions/{part(mission_id)}/search",
@@ -914,7 +1203,15 @@ class Operations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> list[models.EventView]:
-        """Follow or read a mission's log: ``GET /missions/{mission_id}/events``."""
+        """Follow or read a mission's log: ``GET /missions/{mission_id}/events``.
+
+        Parameters
+        ----------
+        after : int, default 0
+            Only entries with a larger id, like `Last-Event-ID`, which is stronger
+        limit : int, 1 to 1000, default 1000
+            Most entries in a list
+        """
         return self._call(Call[list[models.EventView]](
             "GET",
             f"/missions/{part(mission_id)}/events",
@@ -993,7 +1290,17 @@ class Operations(ABC):
         mission: str | None = None,
         limit: int | None = None,
     ) -> list[models.AlarmReport]:
-        """List alarms: ``GET /alarms``."""
+        """List alarms: ``GET /alarms``.
+
+        Parameters
+        ----------
+        state : models.AlarmState
+            Only these; left out: all
+        mission : str
+            Only those of the mission with this id
+        limit : int, 1 to 1000, default 200
+            Most alarms in the answer
+        """
         return self._call(Call[list[models.AlarmReport]](
             "GET",
             "/alarms",
@@ -1022,7 +1329,21 @@ class Operations(ABC):
         mission: str | None = None,
         limit: int | None = None,
     ) -> list[models.AuditEntry]:
-        """See who commanded what: ``GET /audit``."""
+        """See who commanded what: ``GET /audit``.
+
+        Parameters
+        ----------
+        before : int
+            Only older entries than that of this id
+        days : float, at most 36500
+            Only entries of the last so many days
+        actor : str
+            Only of the token of this name
+        mission : str
+            Only to the mission of this id
+        limit : int, 1 to 1000, default 100
+            Most entries in the answer
+        """
         return self._call(Call[list[models.AuditEntry]](
             "GET",
             "/audit",
@@ -1175,7 +1496,15 @@ class AsyncOperations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> list[models.StepView]:
-        """See what was decided: ``GET /missions/{mission_id}/steps``."""
+        """See what was decided: ``GET /missions/{mission_id}/steps``.
+
+        Parameters
+        ----------
+        after : int, default 0
+            Only steps with a larger number
+        limit : int, 1 to 1000, default 1000
+            Most steps in the answer
+        """
         return await self._call(Call[list[models.StepView]](
             "GET",
             f"/missions/{part(mission_id)}/steps",
@@ -1184,7 +1513,13 @@ class AsyncOperations(ABC):
         ))
 
     async def get_telemetry(self, mission_id: str, *, points: int | None = None) -> models.TelemetryView:
-        """See the vehicles' figures over time: ``GET /missions/{mission_id}/telemetry``."""
+        """See the vehicles' figures over time: ``GET /missions/{mission_id}/telemetry``.
+
+        Parameters
+        ----------
+        points : int, 2 to 5000, default 720
+            Most moments in the answer, evenly spread
+        """
         return await self._call(Call[models.TelemetryView](
             "GET",
             f"/missions/{part(mission_id)}/telemetry",
@@ -1298,7 +1633,17 @@ class AsyncOperations(ABC):
         to: str | None = None,
         confidence: float | None = None,
     ) -> models.ChangesView:
-        """See what changed between two surveys: ``GET /sites/{site_id}/changes``."""
+        """See what changed between two surveys: ``GET /sites/{site_id}/changes``.
+
+        Parameters
+        ----------
+        from_ : str
+            Mission of the earlier survey; default: the one before the other
+        to : str
+            Mission of the later survey; default: the newest
+        confidence : float, default 0.95
+            Of unchanged ground this share is not called changed
+        """
         return await self._call(Call[models.ChangesView](
             "GET",
             f"/sites/{part(site_id)}/changes",
@@ -1319,7 +1664,17 @@ class AsyncOperations(ABC):
         to: str | None = None,
         confidence: float | None = None,
     ) -> bytes:
-        """Download what changed between two surveys: ``GET /sites/{site_id}/changes.{format}``."""
+        """Download what changed between two surveys: ``GET /sites/{site_id}/changes.{format}``.
+
+        Parameters
+        ----------
+        from_ : str
+            Mission of the earlier survey; default: the one before the other
+        to : str
+            Mission of the later survey; default: the newest
+        confidence : float, default 0.95
+            Of unchanged ground this share is not called changed
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/sites/{part(site_id)}/changes.{part(format)}",
@@ -1337,7 +1692,13 @@ class AsyncOperations(ABC):
         ))
 
     async def forecast_mission(self, mission_id: str, *, floor_depth_m: float | None = None) -> models.ForecastView:
-        """Foretell a mission: ``POST /missions/{mission_id}/forecast``."""
+        """Foretell a mission: ``POST /missions/{mission_id}/forecast``.
+
+        Parameters
+        ----------
+        floor_depth_m : float, at most 11000
+            How deep it is where nothing is known; default: a guess
+        """
         return await self._call(Call[models.ForecastView](
             "POST",
             f"/missions/{part(mission_id)}/forecast",
@@ -1351,7 +1712,13 @@ class AsyncOperations(ABC):
         *,
         floor_depth_m: float | None = None,
     ) -> models.ForecastView:
-        """Foretell a mission that is being described: ``POST /forecast``."""
+        """Foretell a mission that is being described: ``POST /forecast``.
+
+        Parameters
+        ----------
+        floor_depth_m : float, at most 11000
+            How deep it is where nothing is known; default: a guess
+        """
         return await self._call(Call[models.ForecastView](
             "POST",
             "/forecast",
@@ -1366,7 +1733,13 @@ class AsyncOperations(ABC):
         *,
         floor_depth_m: float | None = None,
     ) -> models.PlanView:
-        """Plan a mission that is being described: ``POST /plan``."""
+        """Plan a mission that is being described: ``POST /plan``.
+
+        Parameters
+        ----------
+        floor_depth_m : float, at most 11000
+            How deep it is where nothing is known; default: a guess
+        """
         return await self._call(Call[models.PlanView](
             "POST",
             "/plan",
@@ -1382,7 +1755,14 @@ class AsyncOperations(ABC):
         *,
         idempotency_key: str | None = None,
     ) -> models.BatchVerdict:
-        """Post measurements: ``POST /missions/{mission_id}/measurements``."""
+        """Post measurements: ``POST /missions/{mission_id}/measurements``.
+
+        Parameters
+        ----------
+        idempotency_key : str
+            Name of this batch, made by the sender. Sent again by the same sender with the same key and content,
+            nothing is stored twice and the first answer is given again
+        """
         return await self._call(Call[models.BatchVerdict](
             "POST",
             f"/missions/{part(mission_id)}/measurements",
@@ -1399,7 +1779,15 @@ class AsyncOperations(ABC):
         after_step: int | None = None,
         timeout_s: float | None = None,
     ) -> models.WaypointView | None:
-        """Fetch a vehicle's waypoint: ``GET /missions/{mission_id}/vehicles/{name}/waypoint``."""
+        """Fetch a vehicle's waypoint: ``GET /missions/{mission_id}/vehicles/{name}/waypoint``.
+
+        Parameters
+        ----------
+        after_step : int
+            Step of the newest waypoint that the vehicle has: only a newer one is sent
+        timeout_s : float, 0 to 60.0, default 25.0
+            How long to wait for one, wall-clock seconds
+        """
         return await self._call(Call[models.WaypointView | None](
             "GET",
             f"/missions/{part(mission_id)}/vehicles/{part(name)}/waypoint",
@@ -1520,7 +1908,28 @@ class AsyncOperations(ABC):
         order: models.Order | None = None,
         datum_offset_m: float | None = None,
     ) -> models.ImportView:
-        """Begin with soundings or a map from elsewhere: ``POST /missions/{mission_id}/imports``."""
+        """Begin with soundings or a map from elsewhere: ``POST /missions/{mission_id}/imports``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5
+            (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars)
+        source : str
+            Where it comes from, kept with the mission
+        crs : str
+            What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the
+            mission's own frame
+        positive : Literal["down", "up"]
+            Which way values grow: down for depths, up for heights; default: what the file says
+        sd_m : float, at most 1000
+            Standard deviation of the depths that state none, metres
+        order : models.Order
+            In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed
+        datum_offset_m : float, -200 to 200
+            Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said
+            where the file states another one
+        """
         return await self._call(Call[models.ImportView](
             "POST",
             f"/missions/{part(mission_id)}/imports",
@@ -1554,7 +1963,28 @@ class AsyncOperations(ABC):
         order: models.Order | None = None,
         datum_offset_m: float | None = None,
     ) -> models.ReferenceView:
-        """Compare the map with a grid: ``PUT /missions/{mission_id}/reference``."""
+        """Compare the map with a grid: ``PUT /missions/{mission_id}/reference``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .xyz, .csv, .txt (also with .gz), .asc, .tif, .nc, .bag, .h5
+            (S-102), .000 (ENC cell), .gsf or .kmall (multibeam sonars)
+        source : str
+            Where it comes from, kept with the mission
+        crs : str
+            What positions are in where the file does not say: EPSG:4326, EPSG:32629, WKT, or local for the
+            mission's own frame
+        positive : Literal["down", "up"]
+            Which way values grow: down for depths, up for heights; default: what the file says
+        sd_m : float, at most 1000
+            Standard deviation of the depths that state none, metres
+        order : models.Order
+            In place of sd_m: the S-44 order surveyed to; its largest TVU is assumed
+        datum_offset_m : float, -200 to 200
+            Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be said
+            where the file states another one
+        """
         return await self._call(Call[models.ReferenceView](
             "PUT",
             f"/missions/{part(mission_id)}/reference",
@@ -1585,7 +2015,21 @@ class AsyncOperations(ABC):
         north_deg: float,
         margin_m: float | None = None,
     ) -> models.ProposedZonesView:
-        """Propose keep-out zones from a chart: ``POST /chart-zones``."""
+        """Propose keep-out zones from a chart: ``POST /chart-zones``.
+
+        Parameters
+        ----------
+        west_deg : float, -180 to 180
+            Western end of the area
+        south_deg : float, -90 to 90
+            Southern end of the area
+        east_deg : float, -180 to 180
+            Eastern end of the area
+        north_deg : float, -90 to 90
+            Northern end of the area
+        margin_m : float, 0 to 1000, default 10.0
+            How much all of it is enlarged, beside how well its place is known
+        """
         return await self._call(Call[models.ProposedZonesView](
             "POST",
             "/chart-zones",
@@ -1601,7 +2045,15 @@ class AsyncOperations(ABC):
         layer: list[models.LayerName] | None = None,
         order: models.Order | None = None,
     ) -> models.MapView:
-        """See the map: ``GET /missions/{mission_id}/map``."""
+        """See the map: ``GET /missions/{mission_id}/map``.
+
+        Parameters
+        ----------
+        layer : list[models.LayerName]
+            Further layers, in `layers`; repeat it for several
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return await self._call(Call[models.MapView](
             "GET",
             f"/missions/{part(mission_id)}/map",
@@ -1618,7 +2070,19 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
     ) -> bytes:
-        """See the map as a transparent picture: ``GET /missions/{mission_id}/map.overlay.png``."""
+        """See the map as a transparent picture: ``GET /missions/{mission_id}/map.overlay.png``.
+
+        Parameters
+        ----------
+        layer : models.OverlayLayer, default depth
+            What is shown
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        min : float, -20000.0 to 20000.0
+            Value at the palette's begin, m; default: the map's least
+        max : float, -20000.0 to 20000.0
+            Value at the palette's end, m; default: the map's largest
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.overlay.png",
@@ -1634,7 +2098,17 @@ class AsyncOperations(ABC):
         layer: list[models.FurtherLayer] | None = None,
         step: int | None = None,
     ) -> bytes:
-        """Follow the map: ``GET /missions/{mission_id}/map/tiles``."""
+        """Follow the map: ``GET /missions/{mission_id}/map/tiles``.
+
+        Parameters
+        ----------
+        since : str
+            `tag` of the map that the client has
+        layer : list[models.FurtherLayer]
+            Layers beside the usual ones
+        step : int
+            The map as it was at the end of this step; default: the newest
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map/tiles",
@@ -1663,7 +2137,13 @@ class AsyncOperations(ABC):
         return await self._call(Call[dict[str, Any]]("GET", f"/missions/{part(mission_id)}/holidays", dict[str, Any]))
 
     async def get_crosslines(self, mission_id: str, *, order: models.Order | None = None) -> models.CrossoversView:
-        """See how well the survey agrees with itself: ``GET /missions/{mission_id}/crosslines``."""
+        """See how well the survey agrees with itself: ``GET /missions/{mission_id}/crosslines``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return await self._call(Call[models.CrossoversView](
             "GET",
             f"/missions/{part(mission_id)}/crosslines",
@@ -1672,7 +2152,13 @@ class AsyncOperations(ABC):
         ))
 
     async def get_crossovers_file(self, mission_id: str, *, order: models.Order | None = None) -> str:
-        """Download the crossings: ``GET /missions/{mission_id}/crossovers.csv``."""
+        """Download the crossings: ``GET /missions/{mission_id}/crossovers.csv``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return await self._call(Call[str](
             "GET",
             f"/missions/{part(mission_id)}/crossovers.csv",
@@ -1703,7 +2189,15 @@ class AsyncOperations(ABC):
         lang: models.Language | None = None,
         order: models.Order | None = None,
     ) -> bytes:
-        """Download the survey's report as PDF: ``GET /missions/{mission_id}/report.pdf``."""
+        """Download the survey's report as PDF: ``GET /missions/{mission_id}/report.pdf``.
+
+        Parameters
+        ----------
+        lang : models.Language, default en
+            Language that it is written in
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/report.pdf",
@@ -1718,7 +2212,15 @@ class AsyncOperations(ABC):
         lang: models.Language | None = None,
         order: models.Order | None = None,
     ) -> bytes:
-        """Download the survey's report as HTML: ``GET /missions/{mission_id}/report.html``."""
+        """Download the survey's report as HTML: ``GET /missions/{mission_id}/report.html``.
+
+        Parameters
+        ----------
+        lang : models.Language, default en
+            Language that it is written in
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/report.html",
@@ -1737,7 +2239,21 @@ class AsyncOperations(ABC):
         max: float | None = None,
         vehicle: str | None = None,
     ) -> bytes:
-        """Download the map: ``GET /missions/{mission_id}/map.{format}``."""
+        """Download the map: ``GET /missions/{mission_id}/map.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
@@ -1756,7 +2272,21 @@ class AsyncOperations(ABC):
         max: float | None = None,
         vehicle: str | None = None,
     ) -> bytes:
-        """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``."""
+        """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/soundings.{part(format)}",
@@ -1775,7 +2305,21 @@ class AsyncOperations(ABC):
         max: float | None = None,
         vehicle: str | None = None,
     ) -> bytes:
-        """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``."""
+        """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
@@ -1793,7 +2337,21 @@ class AsyncOperations(ABC):
         layer: list[models.LayerName] | None = None,
         order: models.Order | None = None,
     ) -> models.ProfileView:
-        """See the map along a line: ``GET /missions/{mission_id}/profile``."""
+        """See the map along a line: ``GET /missions/{mission_id}/profile``.
+
+        Parameters
+        ----------
+        line : str
+            Its 2 to 100 corners as longitude,latitude, with ; between them
+        spacing_m : float, at most 1000.0
+            Between points; default: half a cell
+        within_m : float, at most 1000.0
+            From the line to soundings at most; default: one cell
+        layer : list[models.LayerName]
+            Further layers, in `layers`; repeat it for several
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        """
         return await self._call(Call[models.ProfileView](
             "GET",
             f"/missions/{part(mission_id)}/profile",
@@ -1813,7 +2371,15 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
     ) -> models.TileJson:
-        """See where a layer's tiles are: ``GET /missions/{mission_id}/tiles/{layer}.json``."""
+        """See where a layer's tiles are: ``GET /missions/{mission_id}/tiles/{layer}.json``.
+
+        Parameters
+        ----------
+        min : float, -20000.0 to 20000.0
+            Value of the first colour; default: what the layer's TileJSON says
+        max : float, -20000.0 to 20000.0
+            Value of the last colour; default: what the layer's TileJSON says
+        """
         return await self._call(Call[models.TileJson](
             "GET",
             f"/missions/{part(mission_id)}/tiles/{part(layer)}.json",
@@ -1832,7 +2398,15 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
     ) -> bytes:
-        """See the map as tiles: ``GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png``."""
+        """See the map as tiles: ``GET /missions/{mission_id}/tiles/{layer}/{z}/{x}/{y}.png``.
+
+        Parameters
+        ----------
+        min : float, -20000.0 to 20000.0
+            Value of the first colour; default: what the layer's TileJSON says
+        max : float, -20000.0 to 20000.0
+            Value of the last colour; default: what the layer's TileJSON says
+        """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tiles/{part(layer)}/{part(z)}/{part(x)}/{part(y)}.png",
@@ -1849,7 +2423,19 @@ class AsyncOperations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> models.SoundingPage:
-        """See which soundings are not in the map, and why: ``GET /missions/{mission_id}/soundings``."""
+        """See which soundings are not in the map, and why: ``GET /missions/{mission_id}/soundings``.
+
+        Parameters
+        ----------
+        state : list[models.SoundingState]
+            Only soundings in these states; default: all that are not simply used
+        vehicle : str
+            Only this vehicle's
+        after : int, default 0
+            Only soundings with a larger id
+        limit : int, 1 to 1000, default 200
+            Most soundings in the answer
+        """
         return await self._call(Call[models.SoundingPage](
             "GET",
             f"/missions/{part(mission_id)}/soundings",
@@ -1864,7 +2450,15 @@ class AsyncOperations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> models.SoundingPoints:
-        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``."""
+        """See all soundings as points: ``GET /missions/{mission_id}/soundings/points``.
+
+        Parameters
+        ----------
+        after : int, default 0
+            Only soundings with a larger id
+        limit : int, 1 to 20000, default 20000
+            Most soundings in the answer
+        """
         return await self._call(Call[models.SoundingPoints](
             "GET",
             f"/missions/{part(mission_id)}/soundings/points",
@@ -1950,7 +2544,17 @@ class AsyncOperations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> models.TargetRangePage:
-        """See the ranges to targets, and which were used: ``GET /missions/{mission_id}/targets/ranges``."""
+        """See the ranges to targets, and which were used: ``GET /missions/{mission_id}/targets/ranges``.
+
+        Parameters
+        ----------
+        target : str
+            Only ranges to this target
+        after : int, default 0
+            Only ranges with a larger id
+        limit : int, 1 to 1000, default 200
+            Most ranges in the answer
+        """
         return await self._call(Call[models.TargetRangePage](
             "GET",
             f"/missions/{part(mission_id)}/targets/ranges",
@@ -1968,7 +2572,13 @@ class AsyncOperations(ABC):
         ))
 
     async def get_search(self, mission_id: str, *, after: int | None = None) -> models.SearchGridView | None:
-        """See the site of a search as known now: ``GET /missions/{mission_id}/search``."""
+        """See the site of a search as known now: ``GET /missions/{mission_id}/search``.
+
+        Parameters
+        ----------
+        after : int
+            Only what is newer than this version
+        """
         return await self._call(Call[models.SearchGridView | None](
             "GET",
             f"/missions/{part(mission_id)}/search",
@@ -1991,7 +2601,15 @@ class AsyncOperations(ABC):
         after: int | None = None,
         limit: int | None = None,
     ) -> list[models.EventView]:
-        """Follow or read a mission's log: ``GET /missions/{mission_id}/events``."""
+        """Follow or read a mission's log: ``GET /missions/{mission_id}/events``.
+
+        Parameters
+        ----------
+        after : int, default 0
+            Only entries with a larger id, like `Last-Event-ID`, which is stronger
+        limit : int, 1 to 1000, default 1000
+            Most entries in a list
+        """
         return await self._call(Call[list[models.EventView]](
             "GET",
             f"/missions/{part(mission_id)}/events",
@@ -2075,7 +2693,17 @@ class AsyncOperations(ABC):
         mission: str | None = None,
         limit: int | None = None,
     ) -> list[models.AlarmReport]:
-        """List alarms: ``GET /alarms``."""
+        """List alarms: ``GET /alarms``.
+
+        Parameters
+        ----------
+        state : models.AlarmState
+            Only these; left out: all
+        mission : str
+            Only those of the mission with this id
+        limit : int, 1 to 1000, default 200
+            Most alarms in the answer
+        """
         return await self._call(Call[list[models.AlarmReport]](
             "GET",
             "/alarms",
@@ -2108,7 +2736,21 @@ class AsyncOperations(ABC):
         mission: str | None = None,
         limit: int | None = None,
     ) -> list[models.AuditEntry]:
-        """See who commanded what: ``GET /audit``."""
+        """See who commanded what: ``GET /audit``.
+
+        Parameters
+        ----------
+        before : int
+            Only older entries than that of this id
+        days : float, at most 36500
+            Only entries of the last so many days
+        actor : str
+            Only of the token of this name
+        mission : str
+            Only to the mission of this id
+        limit : int, 1 to 1000, default 100
+            Most entries in the answer
+        """
         return await self._call(Call[list[models.AuditEntry]](
             "GET",
             "/audit",

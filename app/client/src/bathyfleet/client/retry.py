@@ -20,6 +20,18 @@ WORTH_REPEATING = (
     HTTPStatus.GATEWAY_TIMEOUT,
 )
 NEVER_SENT = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout)
+NEVER_DONE = frozenset(
+    {
+        "too-many-requests",
+        "too-many-bytes",
+        "too-many-connections",
+        "overloaded",
+        "import-unavailable",
+        "not-ready",
+        "database-unavailable",
+    }
+)
+"""Kinds of problems with which the service says that nothing of a request was done: it may be sent again."""
 
 
 class Attempts:
@@ -32,7 +44,7 @@ class Attempts:
     patience_s : float
         Since the first failure, or the first one after :meth:`reached`.
     repeatable : bool
-        Whether it may be done twice. What may not is only repeated where it cannot have arrived.
+        Whether it may be done twice. What may not is only repeated where it cannot have arrived or was refused whole.
     within_s : float, optional
         For how long at all, from now on; then TimeoutError is raised.
     now : callable
@@ -66,7 +78,12 @@ class Attempts:
         self._next_s = FIRST_S
 
     def after_error(self, error: Exception) -> float:
-        """Return seconds to wait before it is tried again. Raises UnreachableError when it is not."""
+        """Return seconds to wait before it is tried again.
+
+        Raises UnreachableError when it is not, ValueError where no request can be made of what was given.
+        """
+        if isinstance(error, httpx.LocalProtocolError):
+            raise ValueError(f"{self._what}: it cannot be sent: {error}") from error
         if not self._repeatable and not isinstance(error, NEVER_SENT):
             raise UnreachableError(
                 f"{self._what}: no answer came ({_told(error)}); whether it was done has to be looked up"
@@ -80,7 +97,9 @@ class Attempts:
 
     def after_answer(self, answer: httpx.Response) -> float | None:
         """Return seconds to wait before it is tried again; None: this answer is the one."""
-        if answer.status_code not in WORTH_REPEATING or not self._repeatable:
+        if answer.status_code not in WORTH_REPEATING:
+            return None
+        if not self._repeatable and problem_of(answer).kind not in NEVER_DONE:
             return None
         return self._wait(_retry_after_s(answer))
 

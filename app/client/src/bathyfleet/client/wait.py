@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Collection
+from typing import get_args
 
 from bathyfleet.client.call import Call, part
-from bathyfleet.client.models import MissionView
+from bathyfleet.client.models import MissionState, MissionView
 from bathyfleet.client.problems import EndedError
 from bathyfleet.client.streams import ENDED
+
+STATES: tuple[str, ...] = get_args(get_args(MissionState)[0])
 
 
 class Wait:
@@ -19,7 +22,7 @@ class Wait:
     ----------
     mission_id : str
         The mission.
-    states : collection of str
+    states : collection of MissionState
         The states that end the wait.
     timeout_s : float or None
         The longest wait, from now on.
@@ -27,16 +30,24 @@ class Wait:
         How often is asked.
     now : callable
         A clock in seconds.
+
+    Raises
+    ------
+    ValueError
+        For a word that is no state.
     """
 
     def __init__(
         self,
         mission_id: str,
-        states: Collection[str],
+        states: Collection[MissionState],
         timeout_s: float | None,
         every_s: float,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
+        for state in states:
+            if state not in STATES:
+                raise ValueError(f"states: {state!r} is not one of {', '.join(STATES)}")
         self._mission_id = mission_id
         self._states = states
         self._timeout_s = timeout_s
@@ -67,7 +78,7 @@ class Wait:
         return min(self._every_s, left_s)
 
 
-def is_reached(mission: MissionView, states: Collection[str]) -> bool:
+def is_reached(mission: MissionView, states: Collection[MissionState]) -> bool:
     """Tell whether a mission is in one of the states, or has ended where none is named.
 
     Raises
