@@ -14,13 +14,14 @@ from app.missions.service import MissionService
 from app.missions.spec.budget import Budget
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import MissionState
+from app.missions.team import Member
 from app.missions.views.mission import MissionView
 from app.storage.database import Database
 from app.storage.models import MissionRow, MissionVehicleRow
 from app.storage.queries import missions as mission_queries
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, view_of
 from tests.support.missions.searches import search_json
-from tests.support.missions.specs import lon_lat
+from tests.support.missions.specs import FRAME, lon_lat
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.usefixtures("simulated_time")
@@ -42,8 +43,12 @@ async def started(service: MissionService, spec: MissionSpec) -> LiveMission:
     return await service.get(mission.id)
 
 
+def come_m(member: Member) -> float:
+    return member.committed_m - member.way_ahead_m(FRAME)
+
+
 async def until_flown_m(live: LiveMission, metres: float) -> None:
-    await until(lambda: min(m.flown.on_plan_m for m in live.team) >= metres, f"everybody flew {metres:g} m of its plan")
+    await until(lambda: min(map(come_m, live.team)) >= metres, f"everybody came {metres:g} m along its legs")
 
 
 async def change(service: MissionService, live: LiveMission, **budget: float) -> MissionView:
@@ -97,10 +102,9 @@ async def test_a_shorter_mission_ends_where_it_is_to_and_everybody_comes_home(
 async def test_legs_ahead_beyond_the_new_end_are_taken_back(service: MissionService, database: Database) -> None:
     live = await started(service, survey("a", budget={"km_per_vehicle": 0.4}))
     [member] = live.team
-    await until(lambda: member.flown.on_plan_m > 20.0 and len(member.ahead) >= 2, "it has legs ahead")
+    await until(lambda: come_m(member) > 20.0 and len(member.ahead) >= 2, "it has legs ahead")
     numbers = {leg.number for leg in member.ahead}
-    used_m = member.committed_m - member.way_ahead_m(live.frame)
-    await change(service, live, km_per_vehicle=round((used_m + 5.0) / 1000, 4))
+    await change(service, live, km_per_vehicle=round((come_m(member) + 5.0) / 1000, 4))
     await until(lambda: live.fitted_budget == live.spec.budget and not member.ahead, "they are taken back")
     await until_state(service, live.id, MissionState.FINISHED)
     async with database.reading() as session:
