@@ -163,17 +163,20 @@ async def _change(live: LiveMission, budget: Budget, actor: str, *, together: bo
 
 
 async def _standings(session: AsyncSession, live: LiveMission) -> Mapping[str, _Standing]:
-    """Return how far each vehicle has come, by what is written down: after a restart nobody has counted yet."""
+    """Return how far each vehicle has come; where nobody has counted since a restart, by what is written down."""
     newest = {row.vehicle: row.step for row in await mission_queries.newest_waypoints(session, live.id)}
     way_m, _ = await mission_queries.committed_way(session, live.id)
     rows = await mission_queries.unsettled_waypoints(session, live.id, SETTLED)
     found = {}
     for member in live.team:
-        flies = member.flies_survey and member.report is not None
-        ends = [[row.east_m, row.north_m] for row in rows if row.vehicle == member.name]
-        open_m = np.array([member.place_m(live.frame), *ends]) if ends and flies else np.zeros((0, 2))
-        come_m = max(way_m.get(member.name, 0.0) - _length_m(open_m), 0.0)
-        found[member.name] = _Standing(newest.get(member.name, 0), open_m, come_m, member.flown.survey_s)
+        counted, flies = member.legs > 0, member.flies_survey and member.report is not None
+        stored = np.array([[row.east_m, row.north_m] for row in rows if row.vehicle == member.name]).reshape(-1, 2)
+        ends_m = member.legs_ahead_m() if counted else stored
+        open_m = np.vstack([member.place_m(live.frame), ends_m]) if len(ends_m) and flies else np.zeros((0, 2))
+        whole_m = member.committed_m if counted else way_m.get(member.name, 0.0)
+        last = member.legs if counted else newest.get(member.name, 0)
+        come_m = max(whole_m - _length_m(open_m), 0.0)
+        found[member.name] = _Standing(last, open_m, come_m, member.flown.survey_s)
     return found
 
 

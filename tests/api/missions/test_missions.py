@@ -220,8 +220,8 @@ async def test_the_length_of_a_mission_changes_while_it_runs_and_is_paused(
         ({"minutes": 20_000}, "minutes", "10080"),
         ({"steps": 0}, "steps", "1"),
         ({"minuets": 20}, "minuets", "did you mean minutes?"),
-        ({"minutes": 20, "steps": 3}, "", "exactly one of minutes, km_per_vehicle, steps"),
-        ({}, "", "exactly one of minutes, km_per_vehicle, steps"),
+        ({"minutes": 20, "steps": 3}, "body", "exactly one of minutes, km_per_vehicle, steps"),
+        ({}, "body", "exactly one of minutes, km_per_vehicle, steps"),
         ({"km_per_vehicle": 0.0005}, "km_per_vehicle", "none would begin"),
     ],
 )
