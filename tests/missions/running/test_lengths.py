@@ -134,10 +134,10 @@ async def test_a_length_may_be_told_in_another_unit(service: MissionService, dat
     by_way = await change(service, live, km_per_vehicle=0.15)
     assert by_way.progress.km_left_per_vehicle is not None
     assert 0.08 < by_way.progress.km_left_per_vehicle < 0.13
-    by_steps = await change(service, live, steps=12)
-    assert by_steps.progress.budget == Budget(steps=12)
+    by_steps = await change(service, live, steps=25)
+    assert by_steps.progress.budget == Budget(steps=25)
     ended = await until_state(service, live.id, MissionState.FINISHED)
-    assert ended.progress.step == 12
+    assert ended.progress.step == 25
     assert ended.reason.startswith("every step is done")
 
 
@@ -189,7 +189,7 @@ async def test_who_is_home_is_named_and_sent_on(service: MissionService) -> None
     live = await started(service, survey(budget={"km_per_vehicle": 0.08}, vehicles=vehicles))
     fast, slow = live.team
     await until(lambda: fast.withdrawal is not None, "the fast one has flown its way")
-    await change(service, live, km_per_vehicle=0.16)
+    await change(service, live, km_per_vehicle=0.3)
     assert (await lines_of(live))[0].endswith("changed by Ana; fast had flown all: resume who is to survey on")
     assert slow.withdrawal is None
     await until(lambda: fast.is_home, "it is home")
