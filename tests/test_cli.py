@@ -581,6 +581,13 @@ def test_missions_are_listed_paused_and_aborted_where_there_is_no_browser(
         (running,) = json.loads(bathyfleet(*asked, "--url", f"{url}/api/v1/").stdout)
         assert (running["id"], running["state"], running["progress"]["step"]) == (one, "running", 0)
         assert "no missions that are failed" in bathyfleet("missions", "list", "--state", "failed", **here).stdout
+        longer = bathyfleet("missions", "budget", "--steps", "60", **here)
+        assert (longer.code, longer.stdout.startswith(f"{one}  A: 60 steps")) == (0, True), longer.stderr
+        assert client.get(f"/missions/{one}").json()["progress"]["budget"] == {"steps": 60}
+        both = bathyfleet("missions", "budget", "--steps", "60", "--minutes", "3", **here)
+        assert (both.code, "2 lengths are given" in both.stderr) == (1, True)
+        none = bathyfleet("missions", "budget", one, "--steps", "0", "--url", url)
+        assert (none.code, "steps: " in none.stderr) == (1, True)
         for action, state in (("pause", "paused"), ("resume", "running"), ("abort", "aborted")):
             done = bathyfleet("missions", action, "--note", "a ferry", **here)
             assert (done.code, done.stdout.splitlines()[0]) == (0, f"{one}  A: {state}")

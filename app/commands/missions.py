@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from app.missions.views.mission import MissionSummary
 
 missions_app = typer.Typer(
-    help="List the missions of a running service, pause them and end them.", no_args_is_help=True
+    help="List the missions of a running service, pause them, change their length and end them.", no_args_is_help=True
 )
 
 Url = Annotated[str | None, typer.Option(help="A running service.", show_default="the one of this machine's settings")]
@@ -97,6 +97,31 @@ def abort(mission: Mission = "", home: Home = None, note: Note = "", url: Url = 
     _act("abort", mission, {"note": note, "return": home}, url, token, _is_under_way)
 
 
+@missions_app.command()
+def budget(
+    mission: Mission = "",
+    minutes: Annotated[float | None, typer.Option(help="Minutes in which each vehicle surveys.")] = None,
+    km_per_vehicle: Annotated[float | None, typer.Option(help="Kilometres that each vehicle flies.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Legs that each vehicle flies.")] = None,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Make a mission longer or shorter; the length counts from its beginning, and what is flown is part of it."""
+    from app.missions.views.mission import MissionView
+    from imc_bridge.printable import printable
+
+    given = {"minutes": minutes, "km_per_vehicle": km_per_vehicle, "steps": steps}
+    asked = {name: value for name, value in given.items() if value is not None}
+    if len(asked) != 1:
+        raise CommandError(
+            f"{len(asked)} lengths are given", "Give exactly one of --minutes, --km-per-vehicle and --steps"
+        )
+    with _service(url, token) as service:
+        meant = mission or _only_one(service, "budget", _is_under_way)
+        done = MissionView.model_validate(service.ask(meant, "PUT", "budget", json=asked))
+    typer.echo(f"{done.id}  {printable(done.name)}: {done.progress.budget.words}{_left(done)}")
+
+
 def _service(url: str | None, token: str | None) -> RunningService:
     settings = command_settings()
     if url is not None:
@@ -116,6 +141,18 @@ def _is_under_way(mission: "MissionSummary") -> bool:
     return mission.state in ("running", "paused")
 
 
+def _only_one(service: RunningService, action: str, meant: "Callable[[MissionSummary], bool]") -> str:
+    """Return the id of the only mission that an action can be meant for. Raises CommandError."""
+    from app.missions.views.mission import MissionSummary
+
+    every = map(MissionSummary.model_validate, service.missions())
+    fitting = [one for one in every if meant(one)]
+    if len(fitting) != 1:
+        there = "; ".join(f"{one.id} {one.name} ({one.state})" for one in fitting)
+        raise CommandError(f"{len(fitting)} missions can be meant by {action}", f"Name one of {there}" if there else "")
+    return fitting[0].id
+
+
 def _act(
     action: str,
     begin: str,
@@ -125,19 +162,11 @@ def _act(
     meant: "Callable[[MissionSummary], bool]",
 ) -> None:
     """Ask for an action and tell which vehicles acknowledged what it stopped; ``meant`` are missions it can be for."""
-    from app.missions.views.mission import ActionView, MissionSummary
+    from app.missions.views.mission import ActionView
     from imc_bridge.printable import printable
 
     with _service(url, token) as service:
-        if not begin:
-            every = map(MissionSummary.model_validate, service.missions())
-            fitting = [one for one in every if meant(one)]
-            if len(fitting) != 1:
-                there = "; ".join(f"{one.id} {one.name} ({one.state})" for one in fitting)
-                raise CommandError(
-                    f"{len(fitting)} missions can be meant by {action}", f"Name one of {there}" if there else ""
-                )
-            begin = fitting[0].id
+        begin = begin or _only_one(service, action, meant)
         done: ActionView = ActionView.model_validate(service.ask(begin, "POST", action, json=asked))
     typer.echo(f"{done.mission.id}  {printable(done.mission.name)}: {done.mission.state}")
     for stop in done.stops:

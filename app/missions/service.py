@@ -47,12 +47,14 @@ from app.missions.running.descriptions import describe_anew
 from app.missions.running.failover import Failover
 from app.missions.running.final_maps import FinalMaps
 from app.missions.running.homecoming import returns, send_on
+from app.missions.running.lengths import set_budget
 from app.missions.running.mission_views import action_view, idle_vehicle_view, mission_view
 from app.missions.running.ownership import Ownership
 from app.missions.running.registry import MissionRegistry
 from app.missions.running.supervisor import MissionSupervisor
 from app.missions.running.team_changes import TeamChanges, vehicle_row
 from app.missions.settings import ServiceSettings
+from app.missions.spec.budget import Budget
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import AT_SEA, ENDED, Action, MissionState
 from app.missions.succession import Succession
@@ -430,6 +432,11 @@ class MissionService:
     async def send_on(self, live: LiveMission, name: str, actor: str) -> None:
         """Let a vehicle survey again that went home or was stopped. Raises VehicleNotFoundError, ConflictError."""
         await send_on(live, self._supervisor, name, actor)
+
+    async def set_budget(self, live: LiveMission, budget: Budget, *, actor: str = "operator") -> MissionView:
+        """Change how long a mission is that has not ended. Raises InvalidRequestError, ConflictError."""
+        await set_budget(live, self._supervisor, budget, actor)
+        return mission_view(live)
 
     async def describe_anew(self, live: LiveMission, spec: MissionSpec, *, actor: str = "operator") -> MissionView:
         """Describe a mission anew that has not started. Raises InvalidRequestError, ConflictError."""

@@ -16,6 +16,7 @@ from app.missions.operations import history
 from app.missions.preflight.survey import preflight
 from app.missions.running.homecoming import call_home, hold
 from app.missions.running.mission_views import action_view, mission_view
+from app.missions.spec.budget import Budget
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import Action
@@ -111,6 +112,26 @@ async def describe_mission(
     One that started is refused, and one that was given depths or tides for its area.
     """
     return await service.describe_anew(mission, spec, actor=operator.name)
+
+
+@router.put(
+    "/{mission_id}/budget",
+    operation_id="setBudget",
+    summary="Change how long a mission is",
+    responses=body_problems("mission-not-found", "conflict"),
+)
+async def set_budget(
+    budget: Annotated[Budget, Body(openapi_examples={"longer": {"value": {"minutes": 80}}})],
+    service: Service,
+    operator: Operator,
+    mission: Mission,
+) -> MissionView:
+    """Make a survey longer or shorter, also while it runs or is paused: vehicles fly on, and what they flew counts.
+
+    The new length counts from the mission's beginning, in the same unit or another one. One that is used up already is
+    refused: finish the mission instead. A search is as long as its time window.
+    """
+    return await service.set_budget(mission, budget, actor=operator.name)
 
 
 @router.delete(

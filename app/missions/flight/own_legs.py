@@ -31,9 +31,11 @@ from app.missions.flight.orders import OrderBook
 from app.missions.live.mission import LiveMission
 from app.missions.live.remaining import left_words
 from app.missions.safety import free_space
+from app.missions.spec.budget import Budget
 from app.missions.spec.failsafes import Response
+from app.missions.spec.mission import MissionSpec
 from app.missions.task.constraints import INSET_M
-from app.missions.task.way import least_way_m, planned_way_m
+from app.missions.task.way import LEAST_WAY_M, least_way_m, planned_way_m, way_m
 from app.missions.team import Member, WithdrawalCause
 from app.missions.views.mission import Level
 
@@ -93,7 +95,6 @@ class OwnLegs:
         self._orders = orders
         self._constraints = constraints
         self._live = live
-        self._spec = live.spec
         self._decider = decider
         self._committing = committing
         self._dispatch = dispatch
@@ -121,15 +122,25 @@ class OwnLegs:
         self._left_pct = 0.0
         """Share of the area that was not ensonified when that was last looked at."""
 
+    @property
+    def _spec(self) -> MissionSpec:
+        """What the mission is to do, which may change while it is flown."""
+        return self._live.spec
+
     async def fly(self, *, resumed: bool) -> str:
         """Fly until every vehicle has used up its way; returns why nobody goes on.
 
         ``resumed``: the mission had begun in an earlier run.
         """
         patient_s: float | None = self._spec.step_deadline_s / self._time_scale
+        if resumed and not self._length_changed:
+            # The service may have been killed before they were taken back.
+            await self._give_back_beyond(self._spec.budget, begun=True)
         sending = asyncio.create_task(self._dispatch.keep())
         try:
             while not self._over():
+                if self._length_changed:
+                    await self._fit_legs()
                 for name in await self._orders.look():
                     self._again_at_s.pop(name, None)
                 if await self._take_lines_back():
@@ -177,6 +188,55 @@ class OwnLegs:
         await self._committing.remember(planner.snapshot())
         return True
 
+    @property
+    def _length_changed(self) -> bool:
+        return self._live.fitted_budget != self._spec.budget
+
+    async def _fit_legs(self) -> None:
+        """Take up another length: legs beyond its end are taken back, and who had nothing left to do is looked at."""
+        self._live.fitted_budget = budget = self._spec.budget
+        self._done, self._idle, self._sent_home = set(), set(), set()
+        self._again_at_s = {}
+        self._exchange.look_again()
+        await self._give_back_beyond(budget, begun=False)
+
+    async def _give_back_beyond(self, budget: Budget, *, begun: bool) -> None:
+        """Take legs back that are not begun and end beyond the mission's end.
+
+        ``begun``: only those that begin there. What is left of a vehicle's way before them is decided anew.
+        """
+        planner, given_back = self._decider.planner, False
+        for member in self._live.team.surveying:
+            keep = self._legs_within(member, begun=begun)
+            if keep == len(member.ahead):
+                continue
+            ends_m = self._dispatch.spare_after(member, keep, f"the mission ends after {budget.words}")
+            if member.asked is None:
+                planner.put_back(member.name, np.array(ends_m))
+                given_back = True
+        if given_back:
+            # What was stored with the legs has these as flown, and a restart would go on from that.
+            await self._committing.remember(planner.snapshot())
+
+    def _legs_within(self, member: Member, *, begun: bool) -> int:
+        """Return how many of the legs that a vehicle has ahead end within its way, with ``begun`` begin there."""
+        ahead, spec = member.ahead, self._spec
+        if spec.budget.steps is not None:
+            return sum(leg.number <= spec.steps for leg in ahead)
+        allowed_m, begin_m = spec.allowance(member.spec).metres, member.target_m if member.ordered else None
+        if allowed_m is None or not ahead or (begin_m is None and member.report is None):
+            return len(ahead)
+        begin_m = member.place_m(self._live.frame) if begin_m is None else begin_m
+        ends_m, over_m = [begin_m, *(leg.target_m for leg in ahead)], member.committed_m + member.late_m - allowed_m
+        keep = len(ahead)
+        while keep and over_m > LEAST_WAY_M:
+            last_m = way_m(ends_m[keep - 1 : keep + 1], spec)
+            if begun and over_m < last_m:
+                break
+            over_m -= last_m
+            keep -= 1
+        return keep
+
     def _all_seen(self) -> str:
         but = f" but {self._left_pct:.1f} % of the area, which lines do not see" if self._left_pct >= TOLD_PCT else ""
         return f"nothing is left to ensonify{but}"
@@ -198,6 +258,7 @@ class OwnLegs:
             lambda: (
                 bool(self._who_gets_legs())
                 or self._orders.waiting
+                or self._length_changed
                 or self._over()
                 or self._nobody_to_lead
                 or self._awaits_batteries
@@ -217,6 +278,7 @@ class OwnLegs:
             getting = self._who_gets_legs()
             if not getting:
                 return
+        budget = self._spec.budget
         names = {member.name for member in getting}
         numbers = {member.name: self._next_number(member) for member in getting}
         at_rest = {member.name for member in getting if not member.ordered and not member.ahead} & self._idle
@@ -229,6 +291,10 @@ class OwnLegs:
         not_given: dict[str, list[FloatArray]] = {}
         self._decider.attempt = max(self._refusals.get(name, 0) for name in names)
         decisions = await self._decider.decide_to_fly(max(numbers.values()), places, legs=self._legs_at_once(getting))
+        if self._spec.budget != budget:
+            # It was decided for what was left of another length.
+            planner.restore(memory)
+            return
         self._taking_part |= names
         self._again_at_s = {name: at_s for name, at_s in self._again_at_s.items() if name not in names}
         done = names & frozenset().union(*(decision.done for decision in decisions[:1]))
@@ -476,6 +542,8 @@ class OwnLegs:
 
         Who is held with some of its way left is waited for.
         """
+        if self._length_changed:
+            return False  # who had nothing left to do may have
         team = self._live.team.surveying
         left = [
             m

@@ -15,6 +15,8 @@ import numpy as np
 import structlog
 
 from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
+from app.exploration.planner.base import PlannerBase
 from app.exploration.planner.ordered import OrderedPlanner
 from app.missions import metrics
 from app.missions.fleet.hub import FleetHub
@@ -86,8 +88,7 @@ class Runner:
         self._time_scale = time_scale
         self._constraints = constraints = make_constraints(live.spec)
         planner = OrderedPlanner(make_planner(live.spec, live.planning_sensor))
-        linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
-        self._apart = live.search is None and not linked and planner.decides_apart
+        self._apart = flies_apart(live, constraints, planner.planner)
         self._maps = StepMaps(live, executor, time_scale, map_pause_s, maps_ready)
         self._waiting = Waiting(live)
         self._lookout = SearchHooks(live, time_scale, self._waiting.until)
@@ -132,6 +133,7 @@ class Runner:
             resumed = await self._recover()
             await self._orders.begin(self._ordered)
             reason = await self._fly_home(resumed)
+            live.flown_out = True
             await self._onboard.drop()
             return reason
         finally:
@@ -259,6 +261,12 @@ class Runner:
                 WaypointReport(member.name, self._live.id, leg.number, WaypointStatus.MISSED, reason)
             )
         del member.ahead[:first]
+
+
+def flies_apart(live: LiveMission, constraints: Constraints, planner: PlannerBase) -> bool:
+    """Whether vehicles of a mission have legs of their own, rather than go together in steps."""
+    linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
+    return live.search is None and not linked and planner.decides_apart
 
 
 async def kept_going(keep: Callable[[], Coroutine[Any, Any, None]]) -> None:

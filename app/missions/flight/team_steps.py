@@ -18,6 +18,7 @@ from app.missions.flight.legs.stragglers import missed, step_allowed_s, tell_of
 from app.missions.flight.observation.waiting import Waiting
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.live.mission import LiveMission
+from app.missions.spec.mission import MissionSpec
 from app.missions.team import Member
 
 REPORT_DELAY_S = 0.1
@@ -45,7 +46,6 @@ class TeamSteps:
         time_scale: float,
     ) -> None:
         self._live = live
-        self._spec = live.spec
         self._decider = decider
         self._committing = committing
         self._dispatch = dispatch
@@ -53,6 +53,11 @@ class TeamSteps:
         self._waiting = waiting
         self._lookout = lookout
         self._time_scale = time_scale
+
+    @property
+    def _spec(self) -> MissionSpec:
+        """What the mission is to do, which may change while it is flown."""
+        return self._live.spec
 
     async def fly(self, *, resumed: bool) -> str:
         """Fly all remaining steps; returns why there are no more. ``resumed``: legs of an earlier run come first."""

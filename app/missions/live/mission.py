@@ -48,6 +48,7 @@ from app.missions.search.scan_log import take
 from app.missions.search.state import Search
 from app.missions.soundings.corrections import Corrections
 from app.missions.soundings.gate import Gate
+from app.missions.spec.budget import Budget
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import Sensor as SensorName
@@ -141,6 +142,10 @@ class LiveMission:
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
+        self.fitted_budget = spec.budget
+        """The length that the legs which vehicles have ahead fit into."""
+        self.flown_out = False
+        """Whether its flight came to its end: nothing changes any more how long it is."""
         self.ending = Ending.recall(row.ending)
         """What it becomes once all vehicles are home; None while it goes on."""
         self.halted = False
@@ -231,6 +236,7 @@ class LiveMission:
         """Note that its flight goes on in this process from now on."""
         self.running_since_s = asyncio.get_running_loop().time()
         self._counting = True
+        self.flown_out = False
         self.call_everybody_home()
 
     def count_elapsed(self, seconds: float) -> None:
@@ -283,12 +289,26 @@ class LiveMission:
 
     def recorrect(self, spec: MissionSpec, corrections: Corrections, counts: Counts) -> None:
         """Correct soundings anew, as the database has them now; the caller holds the journal's ``writing``."""
-        self.spec = spec
+        # How long it is may have changed meanwhile.
+        self.spec = spec.with_budget(self.spec.budget)
         self.gate.corrections = corrections
         self.swath.correct(corrections)
         self.recount(counts)
         self.journal.tell_of_missing_level()
         self.revision += 1
+
+    def relength(self, budget: Budget, left_m: Mapping[str, float]) -> None:
+        """Be of another length from now on; ``left_m``: by vehicle what it may fly yet, metres, as it is stored."""
+        self.spec = self.vehicles.spec = self.spec.with_budget(budget)
+        for member in self.team:
+            if member.name in left_m:
+                member.flown.left_m = left_m[member.name]
+            if budget.minutes is None:
+                member.late_m = 0.0
+            elif member.legs:
+                member.count_late(self.spec, self.frame)
+        self.changed.set()
+        self.publish_summary()
 
     def recount(self, counts: Counts) -> None:
         """Note that stored soundings changed, of which there are so many now."""

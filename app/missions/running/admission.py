@@ -87,11 +87,11 @@ def check_limits(spec: MissionSpec) -> None:
             f"limits.min_vertical_separation_m, {limits.min_vertical_separation_m:g} m",
             "make limits.com_range_m larger than limits.min_separation_m",
         )
-    _check_way(spec)
+    check_way(spec)
     _check_room(spec)
 
 
-def _check_way(spec: MissionSpec) -> None:
+def check_way(spec: MissionSpec) -> None:
     """Refuse a budget that is flown before anybody moves. Raises InvalidRequestError."""
     way_m = max((spec.allowance(v).metres or 0.0 for v in spec.vehicles), default=0.0)
     for name, value in spec.budget:

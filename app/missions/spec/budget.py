@@ -64,6 +64,18 @@ class Budget(Model):
             )
         return self
 
+    @property
+    def unit(self) -> str:
+        """The name of what is given."""
+        return next(name for name, value in self if value is not None)
+
+    @property
+    def words(self) -> str:
+        """How long that is, as it is told."""
+        if self.minutes is not None:
+            return f"{self.minutes:g} min"
+        return f"{self.steps} steps" if self.km_per_vehicle is None else f"{self.km_per_vehicle:g} km per vehicle"
+
     def allowance(self, speed_mps: float) -> Allowance:
         """Return what a vehicle of this speed may fly."""
         if self.minutes is not None:

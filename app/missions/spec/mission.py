@@ -232,8 +232,7 @@ class MissionSpec(Model):
             raise FieldError(
                 "budget", "kind is search, whose length is search.window_s: leave budget out, or give it in steps"
             )
-        fastest = max([self.speed_of(vehicle) for vehicle in self.vehicles], default=self.speed_mps)
-        steps = self.budget.allowance(fastest).most_legs(self.limits.max_step_m)
+        steps = self._steps_of(self.budget)
         if "steps" in given and self.steps != steps:
             raise FieldError(
                 "steps",
@@ -242,6 +241,14 @@ class MissionSpec(Model):
             )
         object.__setattr__(self, "steps", steps)
         return self
+
+    def _steps_of(self, budget: Budget) -> int:
+        fastest = max([self.speed_of(vehicle) for vehicle in self.vehicles], default=self.speed_mps)
+        return budget.allowance(fastest).most_legs(self.limits.max_step_m)
+
+    def with_budget(self, budget: Budget) -> Self:
+        """Return the same mission of another length."""
+        return self.model_copy(update={"budget": budget, "steps": self._steps_of(budget)})
 
     @model_validator(mode="after")
     def _arrives_within_a_step(self) -> Self:

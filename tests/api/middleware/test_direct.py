@@ -38,6 +38,7 @@ REQUESTS: list[tuple[str, str, dict[str, Any]]] = [
     ("POST", "/missions/{id}/measurements", {"content": b"{", "headers": {"Content-Type": "application/json"}}),
     ("POST", "/missions/{id}/measurements", {"content": b"{}", "headers": {"Content-Type": "text/plain"}}),
     ("POST", "/missions/{id}/pause", {}),
+    ("PUT", "/missions/{id}/budget", {"json": {}}),
     ("POST", "/missions/{id}/notes", {"json": {"text": " "}}),
     ("DELETE", "/missions/{id}/sound-speed", {}),
     # What a route does not know is refused the same way.

@@ -192,3 +192,66 @@ async def test_a_mission_that_has_not_started_is_described_anew_and_keeps_its_id
     assert late.status_code == 409
     assert "copy it" in late.json()["remedy"]
     await client.post(f"{path}/abort")
+
+
+async def test_the_length_of_a_mission_changes_while_it_runs_and_is_paused(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    path = f"/missions/{mission['id']}"
+    await client.post(f"{path}/start")
+    answer = await client.put(f"{path}/budget", json={"minutes": 80})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["progress"]["budget"] == answer.json()["spec"]["budget"] == {"minutes": 80}
+    assert answer.json()["progress"]["steps"] == answer.json()["spec"]["steps"] > 100
+    await client.post(f"{path}/pause")
+    assert (await client.put(f"{path}/budget", json={"km_per_vehicle": 1.5})).status_code == 200
+    seen = (await client.get(path)).json()
+    assert (seen["state"], seen["progress"]["budget"]) == ("paused", {"km_per_vehicle": 1.5})
+    entries = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+    [_, line] = [entry for entry in entries if entry["kind"] == "budget"]
+    assert line["message"] == "the length is 1.5 km per vehicle now, it was 80 min: changed by local operator"
+    assert line["data"] == {"actor": "local operator", "before": {"minutes": 80}, "budget": {"km_per_vehicle": 1.5}}
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "words"),
+    [
+        ({"minutes": -3}, "minutes", "greater than 0"),
+        ({"minutes": 20_000}, "minutes", "10080"),
+        ({"steps": 0}, "steps", "1"),
+        ({"minuets": 20}, "minuets", "did you mean minutes?"),
+        ({"minutes": 20, "steps": 3}, "body", "exactly one of minutes, km_per_vehicle, steps"),
+        ({}, "body", "exactly one of minutes, km_per_vehicle, steps"),
+        ({"km_per_vehicle": 0.0005}, "km_per_vehicle", "none would begin"),
+    ],
+)
+async def test_a_length_that_cannot_be_is_refused_with_its_field(
+    client: httpx.AsyncClient, mission: dict[str, Any], body: dict[str, Any], field: str, words: str
+) -> None:
+    path = f"/missions/{mission['id']}"
+    await client.post(f"{path}/start")
+    answer = await client.put(f"{path}/budget", json=body)
+    assert answer.status_code == 422, answer.text
+    [fault] = answer.json()["errors"]
+    assert (fault["location"], fault["field"]) == ("body", field)
+    assert fault["value"] == body.get(field, body)
+    assert words in fault["message"] + fault["expected"]
+    assert (await client.get(path)).json()["progress"]["budget"] == mission["progress"]["budget"]
+
+
+async def test_missions_that_ended_and_searches_keep_their_length(
+    client: httpx.AsyncClient, mission: dict[str, Any]
+) -> None:
+    path = f"/missions/{mission['id']}"
+    ready = await client.put(f"{path}/budget", json={"steps": 7})
+    assert (ready.status_code, ready.json()["state"], ready.json()["progress"]["steps"]) == (200, "ready", 7)
+    await client.post(f"{path}/abort")
+    ended = await client.put(f"{path}/budget", json={"minutes": 80})
+    assert (ended.status_code, ended.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+    assert "its length stays as it is" in ended.json()["detail"]
+    search = (await client.post("/missions", json=search_json())).json()
+    refused = await client.put(f"/missions/{search['id']}/budget", json={"steps": 7})
+    assert refused.status_code == 409
+    assert "search.window_s" in refused.json()["detail"]
+    assert "PUT /api/v1/missions/{id}" in refused.json()["remedy"]
+    assert (await client.put("/missions/nobody/budget", json={"steps": 7})).status_code == 404

@@ -27,6 +27,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/targets": "listTargets",
     "GET /missions/{mission_id}/targets/ranges": "listTargetRanges",
     "GET /missions/{mission_id}/map/tiles": "getMapTiles",
+    "PUT /missions/{mission_id}/budget": "setBudget",
     "POST /missions/{mission_id}/pause": "pauseMission",
     "POST /missions/{mission_id}/resume": "resumeMission",
     "POST /missions/{mission_id}/abort": "abortMission",

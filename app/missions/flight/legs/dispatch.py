@@ -211,12 +211,20 @@ class Dispatch:
             # Since a restart it was not heard.
             self.unflown.add_left_line(member.name, ends_m[0], ends_m)
 
-    def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str) -> list[FloatArray]:
+    def spare_after(self, member: Member, keep: int, reason: str) -> list[FloatArray]:
+        """Take the legs back that a vehicle has not begun, but for the first ``keep``; as by :meth:`give_up_legs`."""
+        begin = [member.target_m] if member.ordered and member.target_m is not None else []
+        before = [leg.target_m for leg in member.ahead[:keep]][-1:] or begin
+        return self._note_given_up(member, self._spare(member, before, reason, keep=keep))
+
+    def _spare(self, member: Member, flown_to_m: list[FloatArray], reason: str, *, keep: int = 0) -> list[FloatArray]:
         """Take the legs back that a vehicle has not begun; returns where they were to end, each (2,).
 
         ``flown_to_m``: where the leg before them ends, if it has begun one; without one they begin where it is.
+        ``keep``: how many of them stay.
         """
-        legs, member.ahead[:] = list(member.ahead), []
+        legs = member.ahead[keep:]
+        del member.ahead[keep:]
         ends_m = [leg.target_m for leg in legs]
         for leg in legs:
             name, mission, shown = member.name, self._live.id, f"given up: {reason}"

@@ -49,6 +49,10 @@ class LegExchange:
         self._looked_at: object = None
         """The newest map when legs were last decided anew."""
 
+    def look_again(self) -> None:
+        """Let the legs be decided anew on the same map: how far vehicles may fly has changed."""
+        self._looked_at = None
+
     async def look(self) -> bool:
         """Decide the legs that are not begun anew, if there is a newer map than last time; whether any changed."""
         live = self._live
@@ -57,6 +61,7 @@ class LegExchange:
         old = {member.name: legs for member in live.team.plannable if (legs := self._open_legs(member))}
         planner = self._decider.planner
         memory, most = planner.snapshot(), {name: len(legs) for name, legs in old.items()}
+        budget = live.spec.budget
         if not old or not planner.take_back(most):
             return False
         places = [self._place(member, old.get(member.name, [])) for member in live.team.plannable]
@@ -66,6 +71,9 @@ class LegExchange:
         except BaseException:
             planner.restore(memory)
             raise
+        if live.spec.budget != budget:
+            planner.restore(memory)
+            return False
         self._looked_at = live.builder.newest
         anew = {name: [leg for d in decisions for leg in d.legs if leg.vehicle == name] for name in old}
         if self._are_same(old, anew):

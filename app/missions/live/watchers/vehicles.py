@@ -47,7 +47,8 @@ class VehicleViews:
     ) -> None:
         self._time_scale = time_scale
         self._mission_id = mission_id
-        self._spec = spec
+        self.spec = spec
+        """What the mission is to do, as it was said last."""
         self._frame = frame
         self._hub = hub
         self._team = team
@@ -77,7 +78,7 @@ class VehicleViews:
             left_at=member.left_at,
             breach=self._breach(member.name),
             link=info.state,
-            reason=_reason(member, info) or _waits_for_the_others(member, self._spec),
+            reason=_reason(member, info) or _waits_for_the_others(member, self.spec),
             age_s=None if heard_s is None else rounded(max(now().timestamp() - heard_s, 0.0), 2),
             address=info.address,
             imc_id=info.imc_id,
@@ -110,7 +111,7 @@ class VehicleViews:
                 "battery_pct": rounded(report.battery_pct, 2),
                 "position_sd_m": rounded(report.position_sd_m, 3),
                 "swath_m": _swath_m(member.swath, report),
-                "localization": _position_quality(report.position_sd_m, self._spec.surface_policy),
+                "localization": _position_quality(report.position_sd_m, self.spec.surface_policy),
             }
         )
 
@@ -152,7 +153,7 @@ class VehicleViews:
 
     def _recovery(self, member: Member) -> dict[str, Any]:
         """Return what is shown of a vehicle's energy, its way home, and what is wrong with it."""
-        recovery, left, needs_s = self._spec.recovery_of(member.spec), member.energy.left, member.return_needs_s
+        recovery, left, needs_s = self.spec.recovery_of(member.spec), member.energy.left, member.return_needs_s
         turn_back_at = None
         if left is not None and needs_s is not None and math.isfinite(needs_s) and member.withdrawal is None:
             slack_s = (left.safe_s - with_reserve_s(needs_s, member.drift_reserve_s)) / self._time_scale

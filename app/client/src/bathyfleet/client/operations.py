@@ -47,6 +47,15 @@ class Operations(ABC):
         """Delete a mission that was not flown: ``DELETE /missions/{mission_id}``."""
         return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}", None))
 
+    def set_budget(self, mission_id: str, body: models.Budget | Mapping[str, Any]) -> models.MissionView:
+        """Change how long a mission is: ``PUT /missions/{mission_id}/budget``."""
+        return self._call(Call[models.MissionView](
+            "PUT",
+            f"/missions/{part(mission_id)}/budget",
+            models.MissionView,
+            body=body,
+        ))
+
     def start_mission(
         self,
         mission_id: str,
@@ -1415,6 +1424,15 @@ class AsyncOperations(ABC):
     async def delete_mission(self, mission_id: str) -> None:
         """Delete a mission that was not flown: ``DELETE /missions/{mission_id}``."""
         return await self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}", None))
+
+    async def set_budget(self, mission_id: str, body: models.Budget | Mapping[str, Any]) -> models.MissionView:
+        """Change how long a mission is: ``PUT /missions/{mission_id}/budget``."""
+        return await self._call(Call[models.MissionView](
+            "PUT",
+            f"/missions/{part(mission_id)}/budget",
+            models.MissionView,
+            body=body,
+        ))
 
     async def start_mission(
         self,

@@ -5,6 +5,7 @@ import type {
   AdjustmentView,
   AlarmReport,
   AlarmView,
+  Budget,
   ChangesView,
   CrossoversView,
   DoctorView,
@@ -231,6 +232,8 @@ export const api = {
   /** `home`: whether vehicles go home before the mission ends; undefined: as the service does it. */
   act: (id: string, action: MissionAction, home?: boolean) =>
     post<ActionView>(`${missionPath(id)}/${action}`, home === undefined ? undefined : { return: home }),
+  /** Makes a mission longer or shorter, while it runs as well. */
+  setBudget: (id: string, budget: Budget) => put<MissionView>(`${missionPath(id)}/budget`, budget),
   log: readLog,
   mission: (id: string) => request<MissionView>(missionPath(id)),
   deleteMission: (id: string) => remove(missionPath(id)),

@@ -92,6 +92,9 @@ export type VehicleSpec = Pick<Schemas["VehicleSpec"], "name" | "kind" | "sensor
 export type Sensor = Schemas["Sensor"];
 export type PlannerOptions = Partial<Schemas["PlannerOptions"]>;
 
+/** How long a mission is. */
+export type Budget = Schemas["Budget"];
+
 /** What the form sends. */
 export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "cell_m"> & {
   kind?: Schemas["MissionKind"];

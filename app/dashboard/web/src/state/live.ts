@@ -135,7 +135,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       };
     case "mission":
       if (!view.mission) return view;
-      return { ...view, mission: { ...view.mission, ...message.mission }, progressAt: at };
+      return { ...view, mission: withSummary(view.mission, message.mission), progressAt: at };
     case "map":
       return { ...view, mapVersion: message.version, liveVersion: message.live };
     case "event":
@@ -264,3 +264,10 @@ type Decided = Pick<
   MissionView["progress"],
   "budget" | "step" | "steps" | "minutes_left" | "km_left_per_vehicle"
 >;
+
+/** A mission as it is told of now; how long it is may have changed since it was described. */
+function withSummary(mission: MissionView, told: MissionSummary): MissionView {
+  const { budget, steps } = told.progress;
+  const same = JSON.stringify(budget) === JSON.stringify(mission.progress.budget);
+  return { ...mission, ...told, spec: same ? mission.spec : { ...mission.spec, budget, steps } };
+}

@@ -116,6 +116,7 @@ export const dialogOpen = computed(
   () =>
     abortDialogOpen.value ||
     finishOpen.value ||
+    lengthOpen.value ||
     preflightOpen.value ||
     linksOpen.value ||
     fleetOpen.value ||
@@ -287,6 +288,8 @@ export const floorDepth = signal("");
 export const linksOpen = signal(false);
 /** Whether is asked if the mission is to be finished early. */
 export const finishOpen = signal(false);
+/** Whether is asked how long the mission is to be. */
+export const lengthOpen = signal(false);
 /** Whether is shown who is signed in. */
 export const accountOpen = signal(false);
 /** Whether is shown what each person sets for himself, and what the keys do. */

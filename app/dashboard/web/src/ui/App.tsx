@@ -23,6 +23,7 @@ import { AbortDialog } from "./dialogs/AbortDialog";
 import { FinishDialog } from "./dialogs/FinishDialog";
 import { FleetDialog } from "./dialogs/FleetDialog";
 import { KeysDialog } from "./dialogs/KeysDialog";
+import { LengthDialog } from "./dialogs/LengthDialog";
 import { LinksDialog } from "./dialogs/LinksDialog";
 import { PreflightDialog } from "./dialogs/PreflightDialog";
 import { SettingsDialog } from "./dialogs/SettingsDialog";
@@ -106,6 +107,7 @@ export function App() {
       <LinksDialog />
       <FleetDialog />
       <FinishDialog />
+      <LengthDialog />
       <AccountDialog />
       <SettingsDialog />
       <KeysDialog />

@@ -2,7 +2,7 @@ import "./TimeSlider.css";
 import { clock } from "../../state/format";
 import { awaited, pace, playing, replay, showPresent } from "../../state/past/replay";
 import { flownWords, hasEnded, isAllowed } from "../../state/stateNames";
-import { finishOpen, live, mission, replayStep, steps } from "../../state/store";
+import { finishOpen, lengthOpen, live, mission, replayStep, steps } from "../../state/store";
 import { say, sayWith } from "../../words/say";
 import { Button, sets } from "../parts/Controls";
 
@@ -65,6 +65,17 @@ export function TimeSlider() {
                   ? say("time.live")
                   : say("time.notLive")}
           </span>
+          {isAllowed("finish", present) && !present.ending && present.spec.kind !== "search" ? (
+            <Button
+              id="change-length"
+              kind="command finish"
+              commands
+              title={say("length.makeItLongerOrShorter")}
+              onClick={sets(lengthOpen, true)}
+            >
+              {say("length.change")}
+            </Button>
+          ) : null}
           {isAllowed("finish", present) ? (
             <Button
               id="finish"
