@@ -448,6 +448,10 @@ export const PLANNING = {
     en: "Full coverage needs vehicles with a multibeam: choose their sensor, or another planner",
     pt: "A cobertura total exige veículos com multifeixe: escolha o sensor deles, ou outro planeador",
   },
+  "draft.linesSoCloseAre": {
+    en: "Lines {spacing} m apart are {each} km for each vehicle, at most {most} km: lay them farther apart, or let more vehicles take part",
+    pt: "Fiadas a {spacing} m são {each} km para cada veículo, no máximo {most} km: afaste-as, ou use mais veículos",
+  },
   "draft.of": { en: "{label} of {name}", pt: "{label} de {name}" },
   "draft.recoveryPointOfType": {
     en: "Recovery point of {name}: type {sample}",

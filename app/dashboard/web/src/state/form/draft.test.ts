@@ -37,6 +37,47 @@ describe("a wrong value is named with what would be right", () => {
   });
 });
 
+describe("what the form does not show is neither judged nor sent", () => {
+  const search = { kind: "search", goal: "41.1853, -8.7045", entry: "41.1851, -8.7049" } as const;
+
+  it("overlap of swaths without full coverage", () => {
+    const lines = { ...draft, planner: "lawnmower", overlap_pct: "200", crosslines_pct: "x" };
+    expect(faultsOf(lines)).toEqual({});
+    expect(toMission(lines)).not.toHaveProperty("coverage.overlap_pct");
+    const swath = { ...lines, planner: "swath", sensor: "multibeam" } as const;
+    expect(Object.keys(faultsOf(swath))).toEqual(["overlap_pct", "crosslines_pct"]);
+  });
+
+  it("in a search the depth of the bottom, the distance of lines, the planner and other blocks", () => {
+    const hidden = { floor_depth_m: "abc", spacing_m: "-1", planner: "swath" };
+    const blocks = [{ name: "", ring: [] }];
+    expect(faultsOf({ ...draft, ...search, ...hidden, blocks })).toEqual({});
+    expect(Object.keys(faultsOf({ ...draft, ...hidden, blocks })).sort()).toEqual([
+      "blocks",
+      "floor_depth_m",
+      "planner",
+      "spacing_m",
+    ]);
+  });
+
+  it("a length that is said by the distance of lines", () => {
+    const lines = { ...draft, spacing_m: "10", steps: "x", km_per_vehicle: "y" };
+    expect(faultsOf(lines)).toEqual({});
+    expect(Object.keys(faultsOf({ ...lines, spacing_m: "wide" }))).toEqual(["spacing_m"]);
+  });
+});
+
+it("lines that are too close for what a vehicle may fly are told of where their distance is typed", () => {
+  const wide = { ...draft, east_m: "3000", north_m: "3000", cell_m: "5", spacing_m: "2" };
+  expect(faultsOf(wide)).toEqual({ spacing_m: expect.stringContaining("2250 km for each vehicle") });
+  expect(fieldOf("budget.km_per_vehicle", wide)).toBe("spacing_m");
+  // So it is in a block that the fields do not describe.
+  const small = { ...wide, east_m: "100", north_m: "100" };
+  expect(faultsOf(small)).toEqual({});
+  const ring = areaOf(wide)?.coordinates[0]?.slice(0, -1) as [number, number][];
+  expect(Object.keys(faultsOf({ ...small, blocks: [{ name: "", ring }] }))).toEqual(["spacing_m"]);
+});
+
 describe("a trained controller", () => {
   const options = { ...draft.options, model: { kind: "pcao" } } as unknown as typeof draft.options;
 
@@ -74,8 +115,8 @@ describe("swath sonars", () => {
   it("are held to the service's bounds", () => {
     expect(faultsOf(swath)).toEqual({});
     expect(faultsOf({ ...swath, own: { "sim-1": { beams: "1" } } }).own).toContain("Beams of sim-1 must be");
-    expect(fieldOf("vehicles.1.sonar.rate_hz")).toBe("own");
-    expect(fieldOf("coverage.overlap_pct")).toBe("overlap_pct");
+    expect(fieldOf("vehicles.1.sonar.rate_hz", swath)).toBe("own");
+    expect(fieldOf("coverage.overlap_pct", swath)).toBe("overlap_pct");
   });
 
   it("are needed on every vehicle for full coverage", () => {
@@ -109,8 +150,8 @@ describe("a search", () => {
   });
 
   it("is told of beside its own fields", () => {
-    expect(fieldOf("search.goal.0")).toBe("goal");
-    expect(fieldOf("search.goal_radius_m")).toBe("goal_radius_m");
+    expect(fieldOf("search.goal.0", search)).toBe("goal");
+    expect(fieldOf("search.goal_radius_m", search)).toBe("goal_radius_m");
   });
 });
 
@@ -150,7 +191,7 @@ it.each([
   ["tide.level_m", "tide_m"],
   ["sounding_noise", null],
 ])("the service's field %s is shown at %s", (service, own) => {
-  expect(fieldOf(service)).toBe(own);
+  expect(fieldOf(service, draft)).toBe(own);
 });
 
 describe("placing an area in the middle", () => {
@@ -340,7 +381,7 @@ describe("a site", () => {
     const copy = copyOf({ name: "Quay", spec: { tide: {}, ...mission } as unknown as MissionView["spec"] });
     expect(copy.site).toBe("s-1");
     expect(toMission({ ...copy, site: "" })).not.toHaveProperty("site");
-    expect(fieldOf("site")).toBe("site");
+    expect(fieldOf("site", draft)).toBe("site");
   });
 });
 

@@ -8,9 +8,11 @@ import { say } from "../../words/say";
 import { placeOf, placeSample, typedPlace } from "../coordinates";
 import {
   FIELDS,
+  type Field,
   type FieldName,
   fieldFault,
   fieldsOf,
+  floorDepthFault,
   type LengthUnit,
   type MissionKind,
   numberFault,
@@ -265,12 +267,16 @@ const VEHICLES: Schema = { type: "integer", minimum: 0, maximum: SPEC.vehicles.m
 
 /** The draft with the length that its lines ask of each vehicle, where it is given by how far they are apart. */
 export function resolved(draft: Draft): Draft {
+  const each_km = eachByLines(draft, cornersOf(draft));
+  return each_km === null ? draft : { ...draft, length: "km_per_vehicle", km_per_vehicle: String(each_km) };
+}
+
+/** Kilometres of each vehicle that lines over an area are; null where that is not said. */
+function eachByLines(draft: Draft, ring: readonly LngLat[]): number | null {
   const spacing_m = Number(draft.spacing_m);
   const vehicles = vehicleNames(draft).length;
-  const corners = cornersOf(draft);
-  if (!(spacing_m > 0) || vehicles === 0 || corners.length < 3) return draft;
-  const each_km = sizeOf(corners).area_m2 / (spacing_m * vehicles * 1000);
-  return { ...draft, length: "km_per_vehicle", km_per_vehicle: String(Number(each_km.toPrecision(3))) };
+  if (!(spacing_m > 0) || vehicles === 0 || ring.length < 3) return null;
+  return Number((sizeOf(ring).area_m2 / (spacing_m * vehicles * 1000)).toPrecision(3));
 }
 
 /** What a mission's length is said in. */
@@ -287,37 +293,42 @@ export function withLength(choice: LengthChoice, draft: Draft): Partial<Draft> {
   return { spacing_m: now ? String(Number(now.spacing_m.toPrecision(2))) : "1" };
 }
 
-/** What is wrong with a draft, field by field, with what would be right. */
-export function faultsOf(described: Draft): Faults {
+/** The plain fields that count for what is described; of the length the one that is said. */
+function fieldsThatCount(draft: Draft): [FieldName, Field][] {
+  return fieldsOf(draft.kind, draft.length).filter(([, { part }]) => {
+    if (part === "coverage") return draft.planner === "swath";
+    return part !== "recovery" || draft.recovery.trim() !== "";
+  });
+}
+
+/** What is wrong with a draft, field by field, with what would be right; only what the form shows is judged. */
+export function faultsOf(draft: Draft): Faults {
   const faults: Faults = {};
-  const draft = resolved(described);
   const note = (field: keyof Draft, fault: string) => {
     if (fault) faults[field] = fault;
   };
   note("name", draft.name.trim() ? "" : say("draft.giveTheMissionAName"));
-  if (draft.spacing_m.trim() !== "")
-    note("spacing_m", numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE));
-  if (draft.floor_depth_m.trim() !== "")
-    note(
-      "floor_depth_m",
-      numberFault(say("asked.depthOfTheBottom"), draft.floor_depth_m, SPEC.floor_depth_m),
-    );
   if (draft.source === "typed") {
     for (const [field, label, schema] of corner()) note(field, numberFault(label, draft[field], schema));
   }
-  for (const [name, field] of fieldsOf(draft.kind, draft.length)) {
-    if (field.part !== "recovery" || draft.recovery.trim() !== "") note(name, fieldFault(field, draft[name]));
+  for (const [name, field] of fieldsThatCount(draft)) {
+    if (field.part !== "length" || lengthChoiceOf(draft) === name) note(name, fieldFault(field, draft[name]));
   }
   if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
     faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
   }
   note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
   const cell_m = faults.cell_m ? 0 : Number(draft.cell_m);
-  if (draft.source === "drawn") {
-    const fault = areaFault(draft.ring, cell_m);
-    if (fault) faults.ring = draft.ring.length === 0 ? say("draft.drawTheAreaOrReadIt") : fault;
+  if (draft.source === "drawn" && draft.ring.length === 0) faults.ring = say("draft.drawTheAreaOrReadIt");
+  else if (draft.source === "drawn" || areaOf(draft)) {
+    note("ring", areaFault(draft.source === "drawn" ? draft.ring : cornersOf(draft), cell_m));
   }
-  for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
+  if (draft.kind === "survey") {
+    if (lengthChoiceOf(draft) === "spacing_m") note("spacing_m", spacingFault(draft));
+    note("floor_depth_m", floorDepthFault(draft.floor_depth_m));
+    for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
+    if (!canPlan(draft.planner, draft)) faults.planner = say("draft.fullCoverageNeedsVehicles");
+  }
   draft.keepOut.forEach((zone, i) => {
     const fault = areaFault(zone, 0);
     if (fault) faults.keepOut = say("draft.keepOutZone", { i: i + 1, fault: fault.toLowerCase() });
@@ -349,10 +360,18 @@ export function faultsOf(described: Draft): Faults {
     faults.simulated = say("draft.chooseAtLeastOneVehicleOr");
   }
   for (const name of vehicleNames(draft)) note("own", ownFault(name, draft));
-  if (draft.kind === "survey" && !canPlan(draft.planner, draft)) {
-    faults.planner = say("draft.fullCoverageNeedsVehicles");
-  }
   return faults;
+}
+
+/** What is wrong with how far lines are to be apart: with the number, or with the way that it asks of each vehicle. */
+function spacingFault(draft: Draft): string {
+  const fault = numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE);
+  if (fault) return fault;
+  const most_km = SPEC["budget.km_per_vehicle"].maximum;
+  const each_km = Math.max(...allBlocks(draft).map(({ ring }) => eachByLines(draft, ring) ?? 0));
+  return each_km > most_km
+    ? say("draft.linesSoCloseAre", { spacing: draft.spacing_m.trim(), each: each_km, most: most_km })
+    : "";
 }
 
 /** What is wrong with what a vehicle has of its own. */
@@ -423,7 +442,7 @@ export function toMission(described: Draft): NewMission {
       ? searchOf(draft, vehicles)
       : { planner: { name: draft.planner, options: optionsOf(draft) } }),
   };
-  const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
+  const { recovery, ...made } = withTexts(mission, draft, fieldsThatCount(draft));
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
   return { ...made, ...homing } as unknown as NewMission;
 }
@@ -474,13 +493,13 @@ export interface Estimate {
   farthest_m: number | null;
 }
 
-/** How long a mission takes at most and how far its vehicles go; null while that is not said. */
 /** A planner's options: a trained controller, of a file, is of no use to any but `pcao`. */
 function optionsOf(draft: Draft): PlannerOptions {
   const { model, ...others } = draft.options;
   return draft.planner === "pcao" && model ? draft.options : others;
 }
 
+/** How long a mission takes at most and how far its vehicles go; null while that is not said. */
 export function estimate(described: Draft, area_m2: number): Estimate | null {
   const draft = resolved(described);
   const shares = vehicleNames(draft).map((name): Share => {
@@ -522,8 +541,9 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["site", "site"],
 ];
 
-/** Which of the form's fields a field of the service's refusal stands for. */
-export function fieldOf(serviceField: string): keyof Draft | null {
+/** Which of the form's fields a field of the service's refusal of a draft stands for. */
+export function fieldOf(serviceField: string, draft: Draft): keyof Draft | null {
+  if (serviceField.startsWith("budget.") && draft.kind === "survey") return lengthChoiceOf(draft);
   const plain = Object.entries(FIELDS).map(([name, { path }]) => [path, name as FieldName] as const);
   const path = serviceField.replace(/^vehicles\.\d+/, "vehicles");
   const found = [...plain, ...OTHERS].find(([known]) => `${path}.`.startsWith(`${known}.`));

@@ -128,7 +128,7 @@ export function NewMissionForm() {
       if (!(error instanceof ServiceError)) throw error;
       refused.value = error;
       for (const { field, message, expected } of error.faults) {
-        const own = fieldOf(field);
+        const own = fieldOf(field, draft.value);
         if (own)
           faults.value = {
             ...faults.value,
