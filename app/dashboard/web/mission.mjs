@@ -9,7 +9,7 @@ const [source, target] = process.argv.slice(2);
 const text = source.startsWith("http") ? await (await fetch(source)).text() : await readFile(source, "utf8");
 const { components, paths } = JSON.parse(text);
 const { schemas } = components;
-const KEPT = /^(type|minimum|maximum|exclusiveMinimum|exclusiveMaximum|maxItems|enum|default|description)$/;
+const KEPT = /^(type|minimum|maximum|exclusiveMinimum|exclusiveMaximum|maxItems|maxLength|pattern|enum|default|description)$/;
 
 /** A schema without references; of alternatives the one that is not null. */
 function whole({ $ref, anyOf, ...own }) {

@@ -30,6 +30,8 @@ describe("a wrong value is named with what would be right", () => {
     [{ min_depth_m: "40" }, "max_depth_m", "shallowest"],
     [{ simulated: "0" }, "simulated", "at least one"],
     [{ name: "  " }, "name", "name"],
+    [{ names: "port side" }, "names", "port side is no vehicle's name"],
+    [{ east_m: "50000", north_m: "50000" }, "ring", "million cells of 1 m"],
   ] as const)("%j", (change, field, words) => {
     const faults = faultsOf({ ...draft, ...change });
     expect(Object.keys(faults)).toEqual([field]);
@@ -114,8 +116,10 @@ describe("swath sonars", () => {
 
   it("are held to the service's bounds", () => {
     expect(faultsOf(swath)).toEqual({});
-    expect(faultsOf({ ...swath, own: { "sim-1": { beams: "1" } } }).own).toContain("Beams of sim-1 must be");
-    expect(fieldOf("vehicles.1.sonar.rate_hz", swath)).toBe("own");
+    expect(faultsOf({ ...swath, own: { "sim-1": { beams: "1" } } })["own.sim-1.beams"]).toContain(
+      "Beams of sim-1 must be",
+    );
+    expect(fieldOf("vehicles.1.sonar.rate_hz", swath)).toBe("own.sim-2.rate_hz");
     expect(fieldOf("coverage.overlap_pct", swath)).toBe("overlap_pct");
   });
 
@@ -181,15 +185,17 @@ it("an area needs its four numbers only", () => {
 
 it.each([
   ["limits.max_step_m", "max_step_m"],
-  ["vehicles.0.name", "simulated"],
+  ["vehicles", "simulated"],
+  ["vehicles.0.kind", "simulated"],
+  ["vehicles.0.name", "names"],
   ["area.coordinates.0", "ring"],
   ["budget.steps", "steps"],
-  ["vehicles.0.speed_mps", "own"],
-  ["vehicles.12.recovery_point", "own"],
+  ["vehicles.0.speed_mps", "own.sim-1.speed_mps"],
+  ["vehicles.1.recovery_point.0", "own.sim-2.recovery_point"],
   ["recovery.point.0", "recovery"],
   ["recovery.radius_m", "recovery_radius_m"],
   ["tide.level_m", "tide_m"],
-  ["sounding_noise", null],
+  ["sounding_noise", "other.sounding_noise"],
 ])("the service's field %s is shown at %s", (service, own) => {
   expect(fieldOf(service, draft)).toBe(own);
 });
@@ -267,7 +273,9 @@ describe("the length of a mission", () => {
       simulated: "1",
       own: { "lauv-1": { speed_mps: "0.8" }, gone: { speed_mps: "9" } },
     };
-    expect(faultsOf({ ...fleet, own: { "sim-1": { speed_mps: "6" } } }).own).toContain("Speed of sim-1");
+    expect(faultsOf({ ...fleet, own: { "sim-1": { speed_mps: "6" } } })["own.sim-1.speed_mps"]).toContain(
+      "Speed of sim-1",
+    );
     expect(faultsOf(fleet)).toEqual({});
     const mission = toMission(fleet);
     expect(mission.vehicles.map((vehicle) => vehicle.speed_mps)).toEqual([0.8, undefined]);
@@ -364,12 +372,12 @@ describe("recovery", () => {
 
   it("has its faults named", () => {
     expect(faultsOf({ ...homing, recovery: "quay" }).recovery).toContain("Pick the recovery point");
-    expect(faultsOf({ ...homing, own: { "sim-1": { endurance_min: "0" } } }).own).toContain(
-      "Endurance of sim-1",
-    );
-    expect(faultsOf({ ...homing, own: { "sim-1": { recovery_point: "91, 0" } } }).own).toContain(
-      "Recovery point of sim-1",
-    );
+    expect(
+      faultsOf({ ...homing, own: { "sim-1": { endurance_min: "0" } } })["own.sim-1.endurance_min"],
+    ).toContain("Endurance of sim-1");
+    expect(
+      faultsOf({ ...homing, own: { "sim-1": { recovery_point: "91, 0" } } })["own.sim-1.recovery_point"],
+    ).toContain("Recovery point of sim-1");
   });
 });
 

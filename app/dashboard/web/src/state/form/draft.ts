@@ -88,7 +88,13 @@ export interface Draft extends Texts {
   base: Partial<NewMission>;
 }
 
-export type Faults = Partial<Record<keyof Draft, string>>;
+/** What a fault belongs to: a field, a number of one vehicle, or a value of the service that the form does not have. */
+export type FaultKey = keyof Draft | `own.${string}` | `other.${string}`;
+
+export type Faults = Partial<Record<FaultKey, string>>;
+
+/** The fault of what a vehicle has of its own. */
+export const ownKey = (name: string, field: keyof Own): FaultKey => `own.${name}.${field}`;
 
 /** Planners in plain words, the sensible one first. */
 export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: string }>> = {
@@ -304,7 +310,7 @@ function fieldsThatCount(draft: Draft): [FieldName, Field][] {
 /** What is wrong with a draft, field by field, with what would be right; only what the form shows is judged. */
 export function faultsOf(draft: Draft): Faults {
   const faults: Faults = {};
-  const note = (field: keyof Draft, fault: string) => {
+  const note = (field: FaultKey, fault: string) => {
     if (fault) faults[field] = fault;
   };
   note("name", draft.name.trim() ? "" : say("draft.giveTheMissionAName"));
@@ -352,6 +358,12 @@ export function faultsOf(draft: Draft): Faults {
   }
   if (!faults.simulated) {
     const all = vehicleNames(draft);
+    const wrong = all.find((name) => !isVehicleName(name));
+    if (wrong !== undefined)
+      faults.names = say("draft.isNoNameOfAVehicle", {
+        name: wrong || say("draft.nothing"),
+        most: NAME.maxLength,
+      });
     const twice = all.find((name, i) => all.indexOf(name) !== i);
     if (twice !== undefined)
       faults.names = say("draft.twoVehiclesAreCalled", { twice: twice || say("draft.nothing") });
@@ -359,7 +371,7 @@ export function faultsOf(draft: Draft): Faults {
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = say("draft.chooseAtLeastOneVehicleOr");
   }
-  for (const name of vehicleNames(draft)) note("own", ownFault(name, draft));
+  for (const name of vehicleNames(draft)) Object.assign(faults, ownFaults(name, draft));
   return faults;
 }
 
@@ -374,22 +386,25 @@ function spacingFault(draft: Draft): string {
     : "";
 }
 
+const NAME = SPEC["vehicles.name"];
+const isVehicleName = (name: string) => name.length <= NAME.maxLength && new RegExp(NAME.pattern).test(name);
+
 /** What is wrong with what a vehicle has of its own. */
-function ownFault(name: string, draft: Draft): string {
+function ownFaults(name: string, draft: Draft): Faults {
   const own = draft.own[name] ?? {};
-  const fault = vehicleFieldsOf(draft.kind, sensorOf(draft, name))
-    .map(([field, declared]) =>
-      fieldFault(
-        { ...declared, label: say("draft.of", { label: declared.label, name }), optional: true },
-        own[field] ?? "",
-      ),
-    )
-    .find((words) => words !== "");
+  const faults: Faults = {};
+  for (const [field, declared] of vehicleFieldsOf(draft.kind, sensorOf(draft, name))) {
+    const label = say("draft.of", { label: declared.label, name });
+    const fault = fieldFault({ ...declared, label, optional: true }, own[field] ?? "");
+    if (fault) faults[ownKey(name, field)] = fault;
+  }
   const point = own.recovery_point?.trim() ?? "";
-  return (
-    fault ??
-    (point === "" || placeOf(point) ? "" : say("draft.recoveryPointOfType", { name, sample: placeSample() }))
-  );
+  if (point !== "" && !placeOf(point))
+    faults[ownKey(name, "recovery_point")] = say("draft.recoveryPointOfType", {
+      name,
+      sample: placeSample(),
+    });
+  return faults;
 }
 
 /** The area that a draft describes; null while it describes none. */
@@ -532,8 +547,6 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["recovery", "recovery"],
   ["planner", "planner"],
   ["tide", "tide_m"],
-  ["vehicles.recovery_point", "own"],
-  ...Object.values(VEHICLE_FIELDS).map(({ path }): [string, keyof Draft] => [path, "own"]),
   ["vehicles", "simulated"],
   ["keep_out", "keepOut"],
   ["area", "ring"],
@@ -541,11 +554,23 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["site", "site"],
 ];
 
-/** Which of the form's fields a field of the service's refusal of a draft stands for. */
-export function fieldOf(serviceField: string, draft: Draft): keyof Draft | null {
+/** What is at fault where a service refuses a draft for one of its own fields. */
+export function fieldOf(serviceField: string, draft: Draft): FaultKey {
+  const [, place, part] = /^vehicles\.(\d+)\.(.+)$/.exec(serviceField) ?? [];
+  if (part) return vehicleFieldOf(part, vehicleNames(draft)[Number(place)] ?? "");
   if (serviceField.startsWith("budget.") && draft.kind === "survey") return lengthChoiceOf(draft);
   const plain = Object.entries(FIELDS).map(([name, { path }]) => [path, name as FieldName] as const);
-  const path = serviceField.replace(/^vehicles\.\d+/, "vehicles");
-  const found = [...plain, ...OTHERS].find(([known]) => `${path}.`.startsWith(`${known}.`));
-  return found?.[1] ?? null;
+  const found = [...plain, ...OTHERS].find(([known]) => `${serviceField}.`.startsWith(`${known}.`));
+  return found?.[1] ?? `other.${serviceField}`;
+}
+
+/** What is at fault where a part of a vehicle's description is refused. */
+function vehicleFieldOf(part: string, name: string): FaultKey {
+  if (part === "name") return "names";
+  const own = [
+    ...Object.entries(VEHICLE_FIELDS),
+    ["recovery_point", { path: "vehicles.recovery_point" }],
+  ] as [keyof Own, { path: string }][];
+  const found = own.find(([, { path }]) => `vehicles.${part}.`.startsWith(`${path}.`));
+  return found ? ownKey(name, found[0]) : "simulated";
 }

@@ -3,7 +3,7 @@
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 import { typedPlace } from "../../state/coordinates";
-import type { Draft, Faults } from "../../state/form/draft";
+import type { Draft, FaultKey, Faults } from "../../state/form/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../../state/form/missionFields";
 import { pointed } from "../../state/format";
 import { picking } from "../../state/store";
@@ -192,7 +192,7 @@ function Plain({ name, field }: { name: FieldName; field: Field }) {
   );
 }
 
-export function Fault({ field }: { field: keyof Draft }) {
+export function Fault({ field }: { field: FaultKey }) {
   const { faults } = useForm();
   return faults[field] ? (
     <span class="fault" data-testid={`fault-${field}`}>

@@ -1,6 +1,6 @@
 import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
-import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
 import type { LngLat } from "../../api/types";
 import { polygonOf } from "../../map/area";
@@ -14,6 +14,7 @@ import {
   copyOf,
   type Draft,
   emptyDraft,
+  type FaultKey,
   type Faults,
   faultsOf,
   fieldOf,
@@ -57,9 +58,15 @@ export function NewMissionForm() {
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
   const form = useRef<HTMLFormElement>(null);
-  /** How often it was sent with faults. */
+  /** How often it was sent and not taken. */
   const faulty = useSignal(0);
-  useLayoutEffect(() => {
+  const unplaced = useSignal<readonly FaultKey[]>([]);
+  // After the next picture: parts of the form that do not read its faults themselves show theirs later than the form.
+  useEffect(() => {
+    const found = form.current ? unplacedIn(form.current, faults.value) : [];
+    if (found.join() !== unplaced.peek().join()) unplaced.value = found;
+  }, [faults.value, draft.value]);
+  useEffect(() => {
     if (faulty.value > 0 && form.current) showFault(form.current);
   }, [faulty.value]);
 
@@ -95,6 +102,7 @@ export function NewMissionForm() {
   const set: FormState["set"] = (how) => {
     const change = typeof how === "function" ? how(draft.value) : how;
     draft.value = { ...draft.value, ...change };
+    refused.value = null;
     const found = faultsOf(draft.value);
     // What was drawn is judged at once, typed fields only after the first try.
     if (Object.keys(faults.value).length > 0) faults.value = found;
@@ -128,13 +136,10 @@ export function NewMissionForm() {
       if (!(error instanceof ServiceError)) throw error;
       refused.value = error;
       for (const { field, message, expected } of error.faults) {
-        const own = fieldOf(field, draft.value);
-        if (own)
-          faults.value = {
-            ...faults.value,
-            [own]: [message, expected].filter(Boolean).join(say("mission.expected")),
-          };
+        const words = [message, expected].filter(Boolean).join(say("mission.expected"));
+        faults.value = { ...faults.value, [fieldOf(field, draft.value)]: words };
       }
+      faulty.value += 1;
     } finally {
       sending.value = false;
     }
@@ -190,11 +195,21 @@ export function NewMissionForm() {
           </FileButton>
           <p class="hint">{say("mission.tidesCanBeSetAndChanged")}</p>
         </details>
-        {refused.value ? (
-          <p class="reason alarm" role="alert">
-            {said(refused.value)}
-          </p>
-        ) : null}
+        <div class="refusal" role="alert">
+          {refused.value ? (
+            <p class="reason alarm">
+              {refused.value.faults.length > 0
+                ? say("mission.whatIsMarkedCannotBeTaken")
+                : said(refused.value)}
+            </p>
+          ) : null}
+          {unplaced.value.map((field) => (
+            <span key={field} class="fault" data-testid={`unplaced-${field}`}>
+              ▲ {field.startsWith("other.") ? `${field.slice("other.".length)}: ` : ""}
+              {faults.value[field]}
+            </span>
+          ))}
+        </div>
         <button
           type="submit"
           class="command primary wide"
@@ -213,9 +228,17 @@ export function NewMissionForm() {
   );
 }
 
+/** Faults of what the form does not show. */
+function unplacedIn(form: HTMLFormElement, faults: Faults): FaultKey[] {
+  const placed = new Set(
+    [...form.querySelectorAll<HTMLElement>("[data-testid^='fault-']")].map(({ dataset }) => dataset.testid),
+  );
+  return (Object.keys(faults) as FaultKey[]).filter((field) => !placed.has(`fault-${field}`));
+}
+
 /** Brings the first fault into sight, whatever it is folded into: the form is longer than the window. */
 function showFault(form: HTMLFormElement): void {
-  const fault = form.querySelector("span.fault:not([role])");
+  const fault = form.querySelector("[data-testid^='fault-']") ?? form.querySelector(".refusal");
   for (let part = fault?.closest("details"); part; part = part.parentElement?.closest("details"))
     part.open = true;
   fault?.scrollIntoView({ block: "center" });
