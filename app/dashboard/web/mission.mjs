@@ -21,7 +21,8 @@ function whole({ $ref, anyOf, ...own }) {
 function* leaves(schema, path = []) {
   const { properties, items, prefixItems, examples, nullable, ...rest } = whole(schema);
   const inner = Object.entries(properties ?? prefixItems ?? {});
-  if (path.join(".") === "planner.options") return;
+  // A trained controller is a document of its own: it comes in a file.
+  if (path.join(".") === "planner.options.model") return;
   for (const [name, one] of inner) yield* leaves(one, [...path, name]);
   if (properties) return;
   if (items) yield* leaves(items, path);

@@ -74,7 +74,10 @@ def test_a_refusal_of_what_the_form_does_not_have_stands_by_the_button(page: Pag
     described(page, "Unknown")
     problem = {"field": "sounding_noise", "message": "0.9 is too much", "expected": "at most 0.5"}
     answer = {"title": "no", "status": 422, "detail": "1 value cannot be taken", "errors": [problem]}
-    page.route("**/api/v1/missions", lambda route: route.fulfill(status=422, json=answer))
+    page.route(
+        "**/api/v1/missions",
+        lambda route: route.fulfill(status=422, json=answer) if route.request.method == "POST" else route.fallback(),
+    )
     by_id(page, "create-mission").click()
     told = by_id(page, "unplaced-other.sounding_noise")
     expect(told).to_contain_text("sounding_noise: 0.9 is too much; expected at most 0.5")

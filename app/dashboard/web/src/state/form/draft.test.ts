@@ -80,18 +80,6 @@ it("lines that are too close for what a vehicle may fly are told of where their 
   expect(Object.keys(faultsOf({ ...small, blocks: [{ name: "", ring }] }))).toEqual(["spacing_m"]);
 });
 
-describe("a trained controller", () => {
-  const options = { ...draft.options, model: { kind: "pcao" } } as unknown as typeof draft.options;
-
-  it.each([
-    ["pcao", true],
-    ["cao", false],
-  ] as const)("goes along with %s: %s", (planner, goes) => {
-    const mission = toMission({ ...draft, planner, options });
-    expect("model" in (mission.planner?.options ?? {})).toBe(goes);
-  });
-});
-
 describe("swath sonars", () => {
   const swath = { ...draft, sensor: "multibeam" as const, planner: "swath" };
 
@@ -195,6 +183,8 @@ it.each([
   ["recovery.point.0", "recovery"],
   ["recovery.radius_m", "recovery_radius_m"],
   ["tide.level_m", "tide_m"],
+  ["planner.name", "planner"],
+  ["planner.options.degree", "options.degree"],
   ["sounding_noise", "other.sounding_noise"],
 ])("the service's field %s is shown at %s", (service, own) => {
   expect(fieldOf(service, draft)).toBe(own);

@@ -1,7 +1,7 @@
 /** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
 
 import SPEC from "../../api/mission.json";
-import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSpec } from "../../api/types";
+import type { LngLat, MissionView, NewMission, Sensor, VehicleSpec } from "../../api/types";
 import { areaFault, polygonOf, ringOf, sizeOf } from "../../map/area";
 import { rectangle, wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
@@ -30,6 +30,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./missionFields";
+import { optionFault, optionTexts, typedOptions } from "./plannerOptions";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -75,7 +76,8 @@ export interface Draft extends Texts {
   tide_source: string;
   tide_table: string;
   planner: string;
-  options: PlannerOptions;
+  /** The planner's settings, as typed. */
+  options: Readonly<Record<string, string>>;
   simulated: string;
   /** Of the simulated vehicles that have no other of their own. */
   sensor: Sensor;
@@ -88,8 +90,8 @@ export interface Draft extends Texts {
   base: Partial<NewMission>;
 }
 
-/** What a fault belongs to: a field, a number of one vehicle, or a value of the service that the form does not have. */
-export type FaultKey = keyof Draft | `own.${string}` | `other.${string}`;
+/** What a fault belongs to: a field, a number of one vehicle, a setting of the planner, or a value of the service that the form does not have. */
+export type FaultKey = keyof Draft | `own.${string}` | `options.${string}` | `other.${string}`;
 
 export type Faults = Partial<Record<FaultKey, string>>;
 
@@ -186,7 +188,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
     tide_source: texts.tide_m === "" ? "" : tide.source,
     planner: spec.planner.name,
-    options: spec.planner.options as PlannerOptions,
+    options: optionTexts(spec.planner.options),
     recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
     chosen: spec.vehicles.map(
@@ -333,6 +335,8 @@ export function faultsOf(draft: Draft): Faults {
     if (lengthChoiceOf(draft) === "spacing_m") note("spacing_m", spacingFault(draft));
     note("floor_depth_m", floorDepthFault(draft.floor_depth_m));
     for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
+    for (const [name, text] of Object.entries(draft.options))
+      note(`options.${name}`, optionFault(name, text));
     if (!canPlan(draft.planner, draft)) faults.planner = say("draft.fullCoverageNeedsVehicles");
   }
   draft.keepOut.forEach((zone, i) => {
@@ -455,7 +459,7 @@ export function toMission(described: Draft): NewMission {
       : {}),
     ...(draft.kind === "search"
       ? searchOf(draft, vehicles)
-      : { planner: { name: draft.planner, options: optionsOf(draft) } }),
+      : { planner: { name: draft.planner, options: typedOptions(draft) } }),
   };
   const { recovery, ...made } = withTexts(mission, draft, fieldsThatCount(draft));
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
@@ -508,12 +512,6 @@ export interface Estimate {
   farthest_m: number | null;
 }
 
-/** A planner's options: a trained controller, of a file, is of no use to any but `pcao`. */
-function optionsOf(draft: Draft): PlannerOptions {
-  const { model, ...others } = draft.options;
-  return draft.planner === "pcao" && model ? draft.options : others;
-}
-
 /** How long a mission takes at most and how far its vehicles go; null while that is not said. */
 export function estimate(described: Draft, area_m2: number): Estimate | null {
   const draft = resolved(described);
@@ -558,6 +556,8 @@ const OTHERS: [path: string, field: keyof Draft][] = [
 export function fieldOf(serviceField: string, draft: Draft): FaultKey {
   const [, place, part] = /^vehicles\.(\d+)\.(.+)$/.exec(serviceField) ?? [];
   if (part) return vehicleFieldOf(part, vehicleNames(draft)[Number(place)] ?? "");
+  const [, option] = /^planner\.options\.(\w+)/.exec(serviceField) ?? [];
+  if (option) return `options.${option}`;
   if (serviceField.startsWith("budget.") && draft.kind === "survey") return lengthChoiceOf(draft);
   const plain = Object.entries(FIELDS).map(([name, { path }]) => [path, name as FieldName] as const);
   const found = [...plain, ...OTHERS].find(([known]) => `${serviceField}.`.startsWith(`${known}.`));

@@ -30,7 +30,7 @@ function draftWith(changes: Partial<Draft>, kind: Draft["kind"] = "survey"): Dra
 const shown = (mission: NewMission): Pick<MissionView, "name" | "spec"> =>
   ({
     name: "Quay",
-    spec: { tide: {}, search: null, planner: {}, budget: { steps: 100 }, ...mission },
+    spec: { tide: {}, search: null, planner: { options: {} }, budget: { steps: 100 }, ...mission },
   }) as unknown as MissionView;
 
 describe.each(ENTRIES)("the field %s", (name, field) => {

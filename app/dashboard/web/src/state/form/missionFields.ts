@@ -27,7 +27,16 @@ export interface Field {
   /** Where the value stands in a mission. */
   path: keyof typeof SPEC;
   /** Where it stands in the form. */
-  part: "quality" | "length" | "limits" | "search" | "tide" | "recovery" | "coverage" | "uncertainty";
+  part:
+    | "quality"
+    | "length"
+    | "limits"
+    | "search"
+    | "tide"
+    | "recovery"
+    | "coverage"
+    | "uncertainty"
+    | "planner";
   label: string;
   unit?: string;
   placeholder?: string;

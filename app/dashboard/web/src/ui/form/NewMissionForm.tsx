@@ -2,7 +2,7 @@ import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
-import type { LngLat } from "../../api/types";
+import type { LngLat, PlannerView } from "../../api/types";
 import { polygonOf } from "../../map/area";
 import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
@@ -33,7 +33,7 @@ import {
   picking,
 } from "../../state/store";
 import { say } from "../../words/say";
-import { Button, FileButton, useEscape } from "../parts/Controls";
+import { Button, FileButton, into, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
 import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
@@ -57,6 +57,13 @@ export function NewMissionForm() {
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
+  const planners = useSignal<readonly PlannerView[]>([]);
+  const plannersFault = useSignal("");
+  useEffect(() => {
+    api.planners().then(into(planners), (error: unknown) => {
+      plannersFault.value = said(error);
+    });
+  }, []);
   const form = useRef<HTMLFormElement>(null);
   /** How often it was sent and not taken. */
   const faulty = useSignal(0);
@@ -145,7 +152,7 @@ export function NewMissionForm() {
     }
   };
   return (
-    <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
+    <Form.Provider value={{ draft: draft.value, faults: faults.value, planners: planners.value, set }}>
       <form
         ref={form}
         class="new-mission"
@@ -177,7 +184,7 @@ export function NewMissionForm() {
         {draft.value.kind === "search" ? <SearchFields /> : null}
         <VehicleFields />
         <RecoveryFields />
-        <ExpertFields />
+        <ExpertFields fault={plannersFault.value} />
         <details>
           <summary>{say("mission.tide")}</summary>
           <div class="pair">

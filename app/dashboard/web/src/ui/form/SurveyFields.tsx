@@ -16,6 +16,7 @@ import {
   withLength,
 } from "../../state/form/draft";
 import { FIELDS } from "../../state/form/missionFields";
+import { withPlanner } from "../../state/form/plannerOptions";
 import { distance, duration, fixed } from "../../state/format";
 import { planned } from "../../state/store";
 import { say } from "../../words/say";
@@ -74,7 +75,7 @@ function Quality() {
 
 /** How the area is covered. */
 function Coverage() {
-  const { draft, set } = useForm();
+  const { draft, planners, set } = useForm();
   const presets = Object.entries(PLANNER_PRESETS).filter(
     ([name]) => name === draft.planner || canPlan(name, draft),
   );
@@ -87,7 +88,7 @@ function Coverage() {
             name="planner"
             checked={draft.planner === name}
             data-testid={`planner-${name}`}
-            onChange={() => set({ planner: name })}
+            onChange={() => set((present) => withPlanner(name, present, planners))}
           />
           <span>
             <b>{title}</b> <small>{words}</small>
