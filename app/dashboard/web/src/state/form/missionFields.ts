@@ -34,6 +34,7 @@ export interface Field {
     | "search"
     | "tide"
     | "recovery"
+    | "shoals"
     | "coverage"
     | "uncertainty"
     | "planner";
@@ -201,7 +202,7 @@ export const FIELDS = {
   },
   shoal_depth_m: {
     path: "shoal_depth_m",
-    part: "quality",
+    part: "shoals",
     get label() {
       return say("fields.shoalAbove");
     },

@@ -31,6 +31,7 @@ export function SurveyFields() {
     <fieldset class="asked">
       <legend>{say("asked.whatIsAsked")}</legend>
       <Quality />
+      <Part of="shoals" explained />
       <Coverage />
       <Length />
       <Expected />

@@ -1,0 +1,35 @@
+"""What a survey is asked for, as the form and the checklist have it, in Chromium against the real service."""
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.support.dashboard.steps import by_id
+from tests.support.paths import PROJECT
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+
+TABLE = PROJECT / "app" / "dashboard" / "web" / "src" / "state" / "form" / "missionFields.ts"
+
+
+def declared(kind: str) -> set[str]:
+    """Names of the fields that the form's table has for missions of a kind, the choice of a length aside."""
+    table = TABLE.read_text().partition("VEHICLE_FIELDS")[0]
+    entries = re.findall(r"^  (\w+): \{\n(.*?)^  \},\n", table, re.DOTALL | re.MULTILINE)
+    lengths = {"minutes", "km_per_vehicle"}
+    return {name for name, entry in entries if f'kind: "{kind}"' in entry or "kind:" not in entry} - lengths
+
+
+@pytest.mark.parametrize("kind", ["survey", "search"])
+def test_every_field_of_the_table_is_in_the_form(page: Page, kind: str) -> None:
+    names = declared(kind)
+    assert {"cell_m", "shoal_depth_m" if kind == "survey" else "reach_m"} <= names
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, f"kind-{kind}").click()
+    by_id(page, "field-recovery").fill("41.1850 -8.7050")
+    if kind == "survey":
+        by_id(page, "template").select_option("Multibeam, full coverage")
+    for name in names:
+        expect(by_id(page, f"field-{name}")).to_have_count(1)
