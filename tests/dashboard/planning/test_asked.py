@@ -33,3 +33,12 @@ def test_every_field_of_the_table_is_in_the_form(page: Page, kind: str) -> None:
         by_id(page, "template").select_option("Multibeam, full coverage")
     for name in names:
         expect(by_id(page, f"field-{name}")).to_have_count(1)
+
+
+def test_orders_that_ask_for_the_same_are_one_choice(page: Page) -> None:
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-order").select_option("S-44 Order 1a, Order 1b")
+    expect(by_id(page, "field-accuracy_m")).to_have_value("0.255")
+    by_id(page, "field-accuracy_m").fill("0.3")
+    expect(by_id(page, "field-order")).to_have_value("")

@@ -39,8 +39,15 @@ export function SurveyFields() {
   );
 }
 
-/** What each order asks for where it is strictest, the most demanding first. */
-const ORDERS = Object.entries(SPEC.accuracy_m.orders).sort(([, a], [, b]) => a - b);
+const STRICTEST_M = Object.entries<number>(SPEC.accuracy_m.orders);
+
+/** What orders ask for where they are strictest, the most demanding first; those that ask for the same are one choice. */
+const ORDERS = [...new Set(STRICTEST_M.map(([, sd_m]) => sd_m))]
+  .sort((a, b) => a - b)
+  .map((figure) => {
+    const alike = STRICTEST_M.filter(([, sd_m]) => sd_m === figure);
+    return [alike.map(([name]) => name).join(", "), figure] as const;
+  });
 
 /** How sure depths are to be: as an order of S-44 asks, or a deviation of one's own. */
 function Quality() {
