@@ -42,3 +42,22 @@ def test_orders_that_ask_for_the_same_are_one_choice(page: Page) -> None:
     expect(by_id(page, "field-accuracy_m")).to_have_value("0.255")
     by_id(page, "field-accuracy_m").fill("0.3")
     expect(by_id(page, "field-order")).to_have_value("")
+
+
+def test_the_checklist_has_the_depth_of_the_bottom_that_the_form_had(page: Page) -> None:
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Twelve metres")
+    by_id(page, "field-floor_depth_m").fill("12")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("Twelve metres")
+    by_id(page, "start").click()
+    depth = by_id(page, "preflight-floor_depth_m")
+    expect(depth).to_have_value("12")
+    expect(by_id(page, "ask-forecast")).to_be_visible()
+    depth.fill("abc")
+    expect(by_id(page, "preflight")).to_contain_text("Depth of the bottom needs a number")
+    expect(depth).to_have_attribute("aria-invalid", "true")
+    expect(by_id(page, "ask-forecast")).to_have_count(0)
+    depth.fill("")
+    expect(by_id(page, "ask-forecast")).to_be_visible()

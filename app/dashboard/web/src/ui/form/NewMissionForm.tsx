@@ -25,10 +25,12 @@ import {
 import { createMissions, describeMission, said } from "../../state/session";
 import {
   copied,
+  describedDepths,
   describing,
   draftShapes,
   drawing,
   editedMission,
+  floorDepth,
   mapCentre,
   picking,
 } from "../../state/store";
@@ -49,7 +51,7 @@ export function NewMissionForm() {
   const edited = editedMission.peek();
   const draft = useSignal(
     edited
-      ? { ...copyOf(edited), name: edited.name }
+      ? { ...copyOf(edited), name: edited.name, floor_depth_m: floorDepth.peek() }
       : original
         ? copyOf(original)
         : emptyDraft(mapCentre.peek()),
@@ -128,7 +130,7 @@ export function NewMissionForm() {
     }
     sending.value = true;
     try {
-      const { tide_table: table, tide_source } = draft.value;
+      const { tide_table: table, tide_source, floor_depth_m } = draft.value;
       const source = tide_source || say("mission.tideTable");
       const withTide = async (id: string) => {
         if (table) await api.setTide(id, { table, source });
@@ -137,7 +139,11 @@ export function NewMissionForm() {
         // What it follows stays as it is.
         await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
         await withTide(edited.id);
-      } else await createMissions(toMissions(draft.value), withTide);
+        floorDepth.value = floor_depth_m;
+      } else {
+        const made = await createMissions(toMissions(draft.value), withTide);
+        for (const id of made) describedDepths.set(id, floor_depth_m);
+      }
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;
