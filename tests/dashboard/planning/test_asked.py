@@ -5,7 +5,8 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.support.dashboard.steps import by_id
+from tests.support.dashboard.service import Service
+from tests.support.dashboard.steps import by_id, show
 from tests.support.paths import PROJECT
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
@@ -61,3 +62,16 @@ def test_the_checklist_has_the_depth_of_the_bottom_that_the_form_had(page: Page)
     expect(by_id(page, "ask-forecast")).to_have_count(0)
     depth.fill("")
     expect(by_id(page, "ask-forecast")).to_be_visible()
+
+
+def test_the_template_for_multibeams_suits_the_simulated_vehicles_of_a_copy(page: Page, service: Service) -> None:
+    show(page, service.create(name="By DVL"))
+    by_id(page, "copy-mission").click()
+    by_id(page, "template").select_option("Multibeam, full coverage")
+    by_id(page, "field-name").fill("By multibeam")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-name")).to_have_text("By multibeam")
+    [made] = [one["id"] for one in service.get("/missions") if one["name"] == "By multibeam"]
+    spec = service.get(f"/missions/{made}")["spec"]
+    assert spec["planner"]["name"] == "swath"
+    assert [vehicle["sensor"] for vehicle in spec["vehicles"]] == ["multibeam"]

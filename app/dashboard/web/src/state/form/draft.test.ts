@@ -10,8 +10,10 @@ import {
   estimate,
   faultsOf,
   fieldOf,
+  sensorOf,
   toMission,
   vehicleNames,
+  withSensor,
 } from "./draft";
 
 const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
@@ -117,6 +119,26 @@ describe("swath sonars", () => {
     expect(canPlan("swath", one)).toBe(false);
     expect(faultsOf(one).planner).toContain("multibeam");
   });
+});
+
+it("all simulated vehicles take another sensor, also those of a copy, and no real one does", () => {
+  const chosen = [
+    { name: "sim-1", kind: "sim", sensor: "dvl" },
+    { name: "lauv-1", kind: "imc", sensor: "dvl" },
+  ] as const;
+  const copy = {
+    ...draft,
+    chosen,
+    simulated: "1",
+    own: { "sim-1": { sensor: "dvl" as const, speed_mps: "2" } },
+  };
+  const made = { ...copy, ...withSensor("multibeam", copy) };
+  expect(vehicleNames(made).map((name) => [name, sensorOf(made, name)])).toEqual([
+    ["sim-1", "multibeam"],
+    ["lauv-1", "dvl"],
+    ["sim-2", "multibeam"],
+  ]);
+  expect(made.own["sim-1"]).toEqual({ speed_mps: "2" });
 });
 
 describe("a search", () => {

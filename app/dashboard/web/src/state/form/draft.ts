@@ -245,6 +245,21 @@ export const vehicleNames = (draft: Draft): string[] => [
 export const sensorOf = (draft: Draft, name: string): Sensor =>
   draft.own[name]?.sensor ?? draft.chosen.find((vehicle) => vehicle.name === name)?.sensor ?? draft.sensor;
 
+/** All simulated vehicles sound the bottom so, also those of a mission that is copied; real ones have what they have. */
+export function withSensor(sensor: Sensor, { chosen, own }: Draft): Partial<Draft> {
+  const real = new Set(chosen.filter(({ kind }) => kind !== "sim").map(({ name }) => name));
+  return {
+    sensor,
+    chosen: chosen.map((vehicle) => (real.has(vehicle.name) ? vehicle : { ...vehicle, sensor })),
+    own: Object.fromEntries(
+      Object.entries(own).map(([name, { sensor: its, ...others }]) => [
+        name,
+        real.has(name) && its ? { ...others, sensor: its } : others,
+      ]),
+    ),
+  };
+}
+
 /** Whether a planner can lead these vehicles. */
 export const canPlan = (planner: string, draft: Draft): boolean =>
   planner !== "swath" || vehicleNames(draft).every((name) => sensorOf(draft, name) === "multibeam");

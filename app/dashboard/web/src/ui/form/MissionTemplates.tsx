@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
 import type { NewMission } from "../../api/types";
 import { kept } from "../../persistentSignal";
-import { allBlocks, type Draft, faultsOf, toMission, turnedInto } from "../../state/form/draft";
+import { allBlocks, type Draft, faultsOf, toMission, turnedInto, withSensor } from "../../state/form/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
 import { withPlanner } from "../../state/form/plannerOptions";
 import { type Key, say } from "../../words/say";
@@ -39,7 +39,7 @@ export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (d
         ...draft,
         ...turnedInto("survey", draft),
         ...withPlanner(builtIn.planner, draft, planners),
-        sensor: builtIn.sensor,
+        ...withSensor(builtIn.sensor, draft),
       });
     }
   };
