@@ -9,7 +9,7 @@ const [source, target] = process.argv.slice(2);
 const text = source.startsWith("http") ? await (await fetch(source)).text() : await readFile(source, "utf8");
 const { components, paths } = JSON.parse(text);
 const { schemas } = components;
-const KEPT = /^(type|minimum|maximum|exclusiveMinimum|exclusiveMaximum|maxItems|enum|default|description)$/;
+const KEPT = /^(type|minimum|maximum|exclusiveMinimum|exclusiveMaximum|maxItems|maxLength|pattern|enum|default|description)$/;
 
 /** A schema without references; of alternatives the one that is not null. */
 function whole({ $ref, anyOf, ...own }) {
@@ -21,7 +21,8 @@ function whole({ $ref, anyOf, ...own }) {
 function* leaves(schema, path = []) {
   const { properties, items, prefixItems, examples, nullable, ...rest } = whole(schema);
   const inner = Object.entries(properties ?? prefixItems ?? {});
-  if (path.join(".") === "planner.options") return;
+  // A trained controller is a document of its own: it comes in a file.
+  if (path.join(".") === "planner.options.model") return;
   for (const [name, one] of inner) yield* leaves(one, [...path, name]);
   if (properties) return;
   if (items) yield* leaves(items, path);

@@ -55,16 +55,6 @@ def test_the_form_names_wrong_values_and_creates_nothing(page: Page, service: Se
     assert len(service.get("/missions")) == before
 
 
-def test_what_only_the_service_can_refuse_is_shown_beside_its_field(page: Page) -> None:
-    page.goto("/")
-    by_id(page, "new-mission").click()
-    by_id(page, "field-name").fill("One cell")
-    page.get_by_text("Expert settings").click()
-    by_id(page, "field-cell_m").fill("90")
-    by_id(page, "create-mission").click()
-    expect(by_id(page, "mission-form").get_by_role("alert")).to_contain_text("cannot be taken")
-
-
 def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, service: Service) -> None:
     page.goto("/")
     expect(by_id(page, "map")).to_have_attribute("data-ready", "true")

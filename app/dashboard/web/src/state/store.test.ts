@@ -47,10 +47,13 @@ it("lists are of now while the service answers, and not while it is silent about
   expect(listsLive.value).toBe(false);
 });
 
-it("the depth that is typed in a mission's checklist is that mission's alone", async () => {
-  const { floorDepth, selectedId } = await import("./store");
+it("the depth that is typed in a mission's checklist is that mission's alone, and begins as it was described", async () => {
+  const { describedDepths, floorDepth, selectedId } = await import("./store");
+  describedDepths.set("c", "7");
   selectedId.value = "a";
   floorDepth.value = "12.5";
   selectedId.value = "b";
   expect(floorDepth.value).toBe("");
+  selectedId.value = "c";
+  expect(floorDepth.value).toBe("7");
 });

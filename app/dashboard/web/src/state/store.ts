@@ -282,8 +282,10 @@ export const abortOne = signal<string | null>(null);
 /** Whether the table of all vehicles is shown. */
 export const fleetOpen = signal(false);
 export const preflightOpen = signal(false);
-/** How deep it is where the shown mission goes, as typed in its checklist. */
+/** How deep it is where the shown mission goes, as typed in its checklist; it begins with what the form was told. */
 export const floorDepth = signal("");
+/** How deep it is where missions go that were described here, by their ids. */
+export const describedDepths = new Map<string, string>();
 /** Whether the link doctor is shown. */
 export const linksOpen = signal(false);
 /** Whether is asked if the mission is to be finished early. */
@@ -303,11 +305,11 @@ export type Tab = "log" | "files" | "charts" | "soundings" | "compare" | "profil
 export const tab = signal<Tab | null>(null);
 
 effect(() => {
-  selectedId.value;
+  const id = selectedId.value;
   replayStep.value = null;
   reviewed.value = null;
   chosenSounding.value = null;
   steps.value = [];
   telemetry.value = null;
-  floorDepth.value = "";
+  floorDepth.value = describedDepths.get(id ?? "") ?? "";
 });

@@ -288,6 +288,10 @@ export const PLANNING = {
     pt: "As marés podem ser dadas e mudadas em qualquer altura; as sondas mantêm os valores em bruto.",
   },
   "mission.oneMoment": { en: "One moment…", pt: "Um momento…" },
+  "mission.whatIsMarkedCannotBeTaken": {
+    en: "What is marked ▲ cannot be taken: correct it",
+    pt: "O que está marcado com ▲ não pode ser aceite: corrija-o",
+  },
   "mission.saveMission": { en: "Save mission", pt: "Guardar a missão" },
   "mission.createMission": { en: "Create mission", pt: "Criar a missão" },
   "mission.whatFor": { en: "What for", pt: "Para quê" },
@@ -447,6 +451,14 @@ export const PLANNING = {
   "draft.fullCoverageNeedsVehicles": {
     en: "Full coverage needs vehicles with a multibeam: choose their sensor, or another planner",
     pt: "A cobertura total exige veículos com multifeixe: escolha o sensor deles, ou outro planeador",
+  },
+  "draft.linesSoCloseAre": {
+    en: "Lines {spacing} m apart are {each} km for each vehicle, at most {most} km: lay them farther apart, or let more vehicles take part",
+    pt: "Fiadas a {spacing} m são {each} km para cada veículo, no máximo {most} km: afaste-as, ou use mais veículos",
+  },
+  "draft.isNoNameOfAVehicle": {
+    en: "{name} is no vehicle's name: letters, digits, dots, hyphens and underscores, at most {most}, a letter or digit first",
+    pt: "{name} não serve de nome de um veículo: letras, dígitos, pontos, hífenes e sublinhados, no máximo {most}, primeiro uma letra ou um dígito",
   },
   "draft.of": { en: "{label} of {name}", pt: "{label} de {name}" },
   "draft.recoveryPointOfType": {

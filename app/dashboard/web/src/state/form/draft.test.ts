@@ -10,8 +10,10 @@ import {
   estimate,
   faultsOf,
   fieldOf,
+  sensorOf,
   toMission,
   vehicleNames,
+  withSensor,
 } from "./draft";
 
 const draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
@@ -30,6 +32,8 @@ describe("a wrong value is named with what would be right", () => {
     [{ min_depth_m: "40" }, "max_depth_m", "shallowest"],
     [{ simulated: "0" }, "simulated", "at least one"],
     [{ name: "  " }, "name", "name"],
+    [{ names: "port side" }, "names", "port side is no vehicle's name"],
+    [{ east_m: "50000", north_m: "50000" }, "ring", "million cells of 1 m"],
   ] as const)("%j", (change, field, words) => {
     const faults = faultsOf({ ...draft, ...change });
     expect(Object.keys(faults)).toEqual([field]);
@@ -37,16 +41,45 @@ describe("a wrong value is named with what would be right", () => {
   });
 });
 
-describe("a trained controller", () => {
-  const options = { ...draft.options, model: { kind: "pcao" } } as unknown as typeof draft.options;
+describe("what the form does not show is neither judged nor sent", () => {
+  const search = { kind: "search", goal: "41.1853, -8.7045", entry: "41.1851, -8.7049" } as const;
 
-  it.each([
-    ["pcao", true],
-    ["cao", false],
-  ] as const)("goes along with %s: %s", (planner, goes) => {
-    const mission = toMission({ ...draft, planner, options });
-    expect("model" in (mission.planner?.options ?? {})).toBe(goes);
+  it("overlap of swaths without full coverage", () => {
+    const lines = { ...draft, planner: "lawnmower", overlap_pct: "200", crosslines_pct: "x" };
+    expect(faultsOf(lines)).toEqual({});
+    expect(toMission(lines)).not.toHaveProperty("coverage.overlap_pct");
+    const swath = { ...lines, planner: "swath", sensor: "multibeam" } as const;
+    expect(Object.keys(faultsOf(swath))).toEqual(["overlap_pct", "crosslines_pct"]);
   });
+
+  it("in a search the depth of the bottom, the distance of lines, the planner and other blocks", () => {
+    const hidden = { floor_depth_m: "abc", spacing_m: "-1", planner: "swath" };
+    const blocks = [{ name: "", ring: [] }];
+    expect(faultsOf({ ...draft, ...search, ...hidden, blocks })).toEqual({});
+    expect(Object.keys(faultsOf({ ...draft, ...hidden, blocks })).sort()).toEqual([
+      "blocks",
+      "floor_depth_m",
+      "planner",
+      "spacing_m",
+    ]);
+  });
+
+  it("a length that is said by the distance of lines", () => {
+    const lines = { ...draft, spacing_m: "10", steps: "x", km_per_vehicle: "y" };
+    expect(faultsOf(lines)).toEqual({});
+    expect(Object.keys(faultsOf({ ...lines, spacing_m: "wide" }))).toEqual(["spacing_m"]);
+  });
+});
+
+it("lines that are too close for what a vehicle may fly are told of where their distance is typed", () => {
+  const wide = { ...draft, east_m: "3000", north_m: "3000", cell_m: "5", spacing_m: "2" };
+  expect(faultsOf(wide)).toEqual({ spacing_m: expect.stringContaining("2250 km for each vehicle") });
+  expect(fieldOf("budget.km_per_vehicle", wide)).toBe("spacing_m");
+  // So it is in a block that the fields do not describe.
+  const small = { ...wide, east_m: "100", north_m: "100" };
+  expect(faultsOf(small)).toEqual({});
+  const ring = areaOf(wide)?.coordinates[0]?.slice(0, -1) as [number, number][];
+  expect(Object.keys(faultsOf({ ...small, blocks: [{ name: "", ring }] }))).toEqual(["spacing_m"]);
 });
 
 describe("swath sonars", () => {
@@ -73,9 +106,11 @@ describe("swath sonars", () => {
 
   it("are held to the service's bounds", () => {
     expect(faultsOf(swath)).toEqual({});
-    expect(faultsOf({ ...swath, own: { "sim-1": { beams: "1" } } }).own).toContain("Beams of sim-1 must be");
-    expect(fieldOf("vehicles.1.sonar.rate_hz")).toBe("own");
-    expect(fieldOf("coverage.overlap_pct")).toBe("overlap_pct");
+    expect(faultsOf({ ...swath, own: { "sim-1": { beams: "1" } } })["own.sim-1.beams"]).toContain(
+      "Beams of sim-1 must be",
+    );
+    expect(fieldOf("vehicles.1.sonar.rate_hz", swath)).toBe("own.sim-2.rate_hz");
+    expect(fieldOf("coverage.overlap_pct", swath)).toBe("overlap_pct");
   });
 
   it("are needed on every vehicle for full coverage", () => {
@@ -84,6 +119,26 @@ describe("swath sonars", () => {
     expect(canPlan("swath", one)).toBe(false);
     expect(faultsOf(one).planner).toContain("multibeam");
   });
+});
+
+it("all simulated vehicles take another sensor, also those of a copy, and no real one does", () => {
+  const chosen = [
+    { name: "sim-1", kind: "sim", sensor: "dvl" },
+    { name: "lauv-1", kind: "imc", sensor: "dvl" },
+  ] as const;
+  const copy = {
+    ...draft,
+    chosen,
+    simulated: "1",
+    own: { "sim-1": { sensor: "dvl" as const, speed_mps: "2" } },
+  };
+  const made = { ...copy, ...withSensor("multibeam", copy) };
+  expect(vehicleNames(made).map((name) => [name, sensorOf(made, name)])).toEqual([
+    ["sim-1", "multibeam"],
+    ["lauv-1", "dvl"],
+    ["sim-2", "multibeam"],
+  ]);
+  expect(made.own["sim-1"]).toEqual({ speed_mps: "2" });
 });
 
 describe("a search", () => {
@@ -109,8 +164,8 @@ describe("a search", () => {
   });
 
   it("is told of beside its own fields", () => {
-    expect(fieldOf("search.goal.0")).toBe("goal");
-    expect(fieldOf("search.goal_radius_m")).toBe("goal_radius_m");
+    expect(fieldOf("search.goal.0", search)).toBe("goal");
+    expect(fieldOf("search.goal_radius_m", search)).toBe("goal_radius_m");
   });
 });
 
@@ -140,17 +195,21 @@ it("an area needs its four numbers only", () => {
 
 it.each([
   ["limits.max_step_m", "max_step_m"],
-  ["vehicles.0.name", "simulated"],
+  ["vehicles", "simulated"],
+  ["vehicles.0.kind", "simulated"],
+  ["vehicles.0.name", "names"],
   ["area.coordinates.0", "ring"],
   ["budget.steps", "steps"],
-  ["vehicles.0.speed_mps", "own"],
-  ["vehicles.12.recovery_point", "own"],
+  ["vehicles.0.speed_mps", "own.sim-1.speed_mps"],
+  ["vehicles.1.recovery_point.0", "own.sim-2.recovery_point"],
   ["recovery.point.0", "recovery"],
   ["recovery.radius_m", "recovery_radius_m"],
   ["tide.level_m", "tide_m"],
-  ["sounding_noise", null],
+  ["planner.name", "planner"],
+  ["planner.options.degree", "options.degree"],
+  ["sounding_noise", "other.sounding_noise"],
 ])("the service's field %s is shown at %s", (service, own) => {
-  expect(fieldOf(service)).toBe(own);
+  expect(fieldOf(service, draft)).toBe(own);
 });
 
 describe("placing an area in the middle", () => {
@@ -226,7 +285,9 @@ describe("the length of a mission", () => {
       simulated: "1",
       own: { "lauv-1": { speed_mps: "0.8" }, gone: { speed_mps: "9" } },
     };
-    expect(faultsOf({ ...fleet, own: { "sim-1": { speed_mps: "6" } } }).own).toContain("Speed of sim-1");
+    expect(faultsOf({ ...fleet, own: { "sim-1": { speed_mps: "6" } } })["own.sim-1.speed_mps"]).toContain(
+      "Speed of sim-1",
+    );
     expect(faultsOf(fleet)).toEqual({});
     const mission = toMission(fleet);
     expect(mission.vehicles.map((vehicle) => vehicle.speed_mps)).toEqual([0.8, undefined]);
@@ -323,12 +384,12 @@ describe("recovery", () => {
 
   it("has its faults named", () => {
     expect(faultsOf({ ...homing, recovery: "quay" }).recovery).toContain("Pick the recovery point");
-    expect(faultsOf({ ...homing, own: { "sim-1": { endurance_min: "0" } } }).own).toContain(
-      "Endurance of sim-1",
-    );
-    expect(faultsOf({ ...homing, own: { "sim-1": { recovery_point: "91, 0" } } }).own).toContain(
-      "Recovery point of sim-1",
-    );
+    expect(
+      faultsOf({ ...homing, own: { "sim-1": { endurance_min: "0" } } })["own.sim-1.endurance_min"],
+    ).toContain("Endurance of sim-1");
+    expect(
+      faultsOf({ ...homing, own: { "sim-1": { recovery_point: "91, 0" } } })["own.sim-1.recovery_point"],
+    ).toContain("Recovery point of sim-1");
   });
 });
 
@@ -340,7 +401,7 @@ describe("a site", () => {
     const copy = copyOf({ name: "Quay", spec: { tide: {}, ...mission } as unknown as MissionView["spec"] });
     expect(copy.site).toBe("s-1");
     expect(toMission({ ...copy, site: "" })).not.toHaveProperty("site");
-    expect(fieldOf("site")).toBe("site");
+    expect(fieldOf("site", draft)).toBe("site");
   });
 });
 

@@ -1,16 +1,18 @@
 /** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
 
 import SPEC from "../../api/mission.json";
-import type { LngLat, MissionView, NewMission, PlannerOptions, Sensor, VehicleSpec } from "../../api/types";
+import type { LngLat, MissionView, NewMission, Sensor, VehicleSpec } from "../../api/types";
 import { areaFault, polygonOf, ringOf, sizeOf } from "../../map/area";
 import { rectangle, wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
 import { placeOf, placeSample, typedPlace } from "../coordinates";
 import {
   FIELDS,
+  type Field,
   type FieldName,
   fieldFault,
   fieldsOf,
+  floorDepthFault,
   type LengthUnit,
   type MissionKind,
   numberFault,
@@ -28,6 +30,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./missionFields";
+import { optionFault, optionTexts, typedOptions } from "./plannerOptions";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -73,7 +76,8 @@ export interface Draft extends Texts {
   tide_source: string;
   tide_table: string;
   planner: string;
-  options: PlannerOptions;
+  /** The planner's settings, as typed. */
+  options: Readonly<Record<string, string>>;
   simulated: string;
   /** Of the simulated vehicles that have no other of their own. */
   sensor: Sensor;
@@ -86,7 +90,13 @@ export interface Draft extends Texts {
   base: Partial<NewMission>;
 }
 
-export type Faults = Partial<Record<keyof Draft, string>>;
+/** What a fault belongs to: a field, a number of one vehicle, a setting of the planner, or a value of the service that the form does not have. */
+export type FaultKey = keyof Draft | `own.${string}` | `options.${string}` | `other.${string}`;
+
+export type Faults = Partial<Record<FaultKey, string>>;
+
+/** The fault of what a vehicle has of its own. */
+export const ownKey = (name: string, field: keyof Own): FaultKey => `own.${name}.${field}`;
 
 /** Planners in plain words, the sensible one first. */
 export const PLANNER_PRESETS: Readonly<Record<string, { title: string; words: string }>> = {
@@ -178,7 +188,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
     tide_source: texts.tide_m === "" ? "" : tide.source,
     planner: spec.planner.name,
-    options: spec.planner.options as PlannerOptions,
+    options: optionTexts(spec.planner.options),
     recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
     chosen: spec.vehicles.map(
@@ -235,6 +245,21 @@ export const vehicleNames = (draft: Draft): string[] => [
 export const sensorOf = (draft: Draft, name: string): Sensor =>
   draft.own[name]?.sensor ?? draft.chosen.find((vehicle) => vehicle.name === name)?.sensor ?? draft.sensor;
 
+/** All simulated vehicles sound the bottom so, also those of a mission that is copied; real ones have what they have. */
+export function withSensor(sensor: Sensor, { chosen, own }: Draft): Partial<Draft> {
+  const real = new Set(chosen.filter(({ kind }) => kind !== "sim").map(({ name }) => name));
+  return {
+    sensor,
+    chosen: chosen.map((vehicle) => (real.has(vehicle.name) ? vehicle : { ...vehicle, sensor })),
+    own: Object.fromEntries(
+      Object.entries(own).map(([name, { sensor: its, ...others }]) => [
+        name,
+        real.has(name) && its ? { ...others, sensor: its } : others,
+      ]),
+    ),
+  };
+}
+
 /** Whether a planner can lead these vehicles. */
 export const canPlan = (planner: string, draft: Draft): boolean =>
   planner !== "swath" || vehicleNames(draft).every((name) => sensorOf(draft, name) === "multibeam");
@@ -265,12 +290,16 @@ const VEHICLES: Schema = { type: "integer", minimum: 0, maximum: SPEC.vehicles.m
 
 /** The draft with the length that its lines ask of each vehicle, where it is given by how far they are apart. */
 export function resolved(draft: Draft): Draft {
+  const each_km = eachByLines(draft, cornersOf(draft));
+  return each_km === null ? draft : { ...draft, length: "km_per_vehicle", km_per_vehicle: String(each_km) };
+}
+
+/** Kilometres of each vehicle that lines over an area are; null where that is not said. */
+function eachByLines(draft: Draft, ring: readonly LngLat[]): number | null {
   const spacing_m = Number(draft.spacing_m);
   const vehicles = vehicleNames(draft).length;
-  const corners = cornersOf(draft);
-  if (!(spacing_m > 0) || vehicles === 0 || corners.length < 3) return draft;
-  const each_km = sizeOf(corners).area_m2 / (spacing_m * vehicles * 1000);
-  return { ...draft, length: "km_per_vehicle", km_per_vehicle: String(Number(each_km.toPrecision(3))) };
+  if (!(spacing_m > 0) || vehicles === 0 || ring.length < 3) return null;
+  return Number((sizeOf(ring).area_m2 / (spacing_m * vehicles * 1000)).toPrecision(3));
 }
 
 /** What a mission's length is said in. */
@@ -287,37 +316,44 @@ export function withLength(choice: LengthChoice, draft: Draft): Partial<Draft> {
   return { spacing_m: now ? String(Number(now.spacing_m.toPrecision(2))) : "1" };
 }
 
-/** What is wrong with a draft, field by field, with what would be right. */
-export function faultsOf(described: Draft): Faults {
+/** The plain fields that count for what is described; of the length the one that is said. */
+function fieldsThatCount(draft: Draft): [FieldName, Field][] {
+  return fieldsOf(draft.kind, draft.length).filter(([, { part }]) => {
+    if (part === "coverage") return draft.planner === "swath";
+    return part !== "recovery" || draft.recovery.trim() !== "";
+  });
+}
+
+/** What is wrong with a draft, field by field, with what would be right; only what the form shows is judged. */
+export function faultsOf(draft: Draft): Faults {
   const faults: Faults = {};
-  const draft = resolved(described);
-  const note = (field: keyof Draft, fault: string) => {
+  const note = (field: FaultKey, fault: string) => {
     if (fault) faults[field] = fault;
   };
   note("name", draft.name.trim() ? "" : say("draft.giveTheMissionAName"));
-  if (draft.spacing_m.trim() !== "")
-    note("spacing_m", numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE));
-  if (draft.floor_depth_m.trim() !== "")
-    note(
-      "floor_depth_m",
-      numberFault(say("asked.depthOfTheBottom"), draft.floor_depth_m, SPEC.floor_depth_m),
-    );
   if (draft.source === "typed") {
     for (const [field, label, schema] of corner()) note(field, numberFault(label, draft[field], schema));
   }
-  for (const [name, field] of fieldsOf(draft.kind, draft.length)) {
-    if (field.part !== "recovery" || draft.recovery.trim() !== "") note(name, fieldFault(field, draft[name]));
+  for (const [name, field] of fieldsThatCount(draft)) {
+    if (field.part !== "length" || lengthChoiceOf(draft) === name) note(name, fieldFault(field, draft[name]));
   }
   if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
     faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
   }
   note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
   const cell_m = faults.cell_m ? 0 : Number(draft.cell_m);
-  if (draft.source === "drawn") {
-    const fault = areaFault(draft.ring, cell_m);
-    if (fault) faults.ring = draft.ring.length === 0 ? say("draft.drawTheAreaOrReadIt") : fault;
+  if (draft.source === "drawn" && draft.ring.length === 0) faults.ring = say("draft.drawTheAreaOrReadIt");
+  else if (draft.source === "drawn" || areaOf(draft)) {
+    note("ring", areaFault(draft.source === "drawn" ? draft.ring : cornersOf(draft), cell_m));
   }
-  for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
+  if (draft.kind === "survey") {
+    if (lengthChoiceOf(draft) === "spacing_m") note("spacing_m", spacingFault(draft));
+    note("floor_depth_m", floorDepthFault(draft.floor_depth_m));
+    for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
+    for (const [name, text] of Object.entries(draft.options))
+      note(`options.${name}`, optionFault(name, text));
+    if (!canPlan(draft.planner, draft)) faults.planner = say("draft.fullCoverageNeedsVehicles");
+  }
   draft.keepOut.forEach((zone, i) => {
     const fault = areaFault(zone, 0);
     if (fault) faults.keepOut = say("draft.keepOutZone", { i: i + 1, fault: fault.toLowerCase() });
@@ -341,6 +377,12 @@ export function faultsOf(described: Draft): Faults {
   }
   if (!faults.simulated) {
     const all = vehicleNames(draft);
+    const wrong = all.find((name) => !isVehicleName(name));
+    if (wrong !== undefined)
+      faults.names = say("draft.isNoNameOfAVehicle", {
+        name: wrong || say("draft.nothing"),
+        most: NAME.maxLength,
+      });
     const twice = all.find((name, i) => all.indexOf(name) !== i);
     if (twice !== undefined)
       faults.names = say("draft.twoVehiclesAreCalled", { twice: twice || say("draft.nothing") });
@@ -348,29 +390,40 @@ export function faultsOf(described: Draft): Faults {
   if (!faults.simulated && Number(draft.simulated) + draft.chosen.length === 0) {
     faults.simulated = say("draft.chooseAtLeastOneVehicleOr");
   }
-  for (const name of vehicleNames(draft)) note("own", ownFault(name, draft));
-  if (draft.kind === "survey" && !canPlan(draft.planner, draft)) {
-    faults.planner = say("draft.fullCoverageNeedsVehicles");
-  }
+  for (const name of vehicleNames(draft)) Object.assign(faults, ownFaults(name, draft));
   return faults;
 }
 
+/** What is wrong with how far lines are to be apart: with the number, or with the way that it asks of each vehicle. */
+function spacingFault(draft: Draft): string {
+  const fault = numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE);
+  if (fault) return fault;
+  const most_km = SPEC["budget.km_per_vehicle"].maximum;
+  const each_km = Math.max(...allBlocks(draft).map(({ ring }) => eachByLines(draft, ring) ?? 0));
+  return each_km > most_km
+    ? say("draft.linesSoCloseAre", { spacing: draft.spacing_m.trim(), each: each_km, most: most_km })
+    : "";
+}
+
+const NAME = SPEC["vehicles.name"];
+const isVehicleName = (name: string) => name.length <= NAME.maxLength && new RegExp(NAME.pattern).test(name);
+
 /** What is wrong with what a vehicle has of its own. */
-function ownFault(name: string, draft: Draft): string {
+function ownFaults(name: string, draft: Draft): Faults {
   const own = draft.own[name] ?? {};
-  const fault = vehicleFieldsOf(draft.kind, sensorOf(draft, name))
-    .map(([field, declared]) =>
-      fieldFault(
-        { ...declared, label: say("draft.of", { label: declared.label, name }), optional: true },
-        own[field] ?? "",
-      ),
-    )
-    .find((words) => words !== "");
+  const faults: Faults = {};
+  for (const [field, declared] of vehicleFieldsOf(draft.kind, sensorOf(draft, name))) {
+    const label = say("draft.of", { label: declared.label, name });
+    const fault = fieldFault({ ...declared, label, optional: true }, own[field] ?? "");
+    if (fault) faults[ownKey(name, field)] = fault;
+  }
   const point = own.recovery_point?.trim() ?? "";
-  return (
-    fault ??
-    (point === "" || placeOf(point) ? "" : say("draft.recoveryPointOfType", { name, sample: placeSample() }))
-  );
+  if (point !== "" && !placeOf(point))
+    faults[ownKey(name, "recovery_point")] = say("draft.recoveryPointOfType", {
+      name,
+      sample: placeSample(),
+    });
+  return faults;
 }
 
 /** The area that a draft describes; null while it describes none. */
@@ -421,9 +474,9 @@ export function toMission(described: Draft): NewMission {
       : {}),
     ...(draft.kind === "search"
       ? searchOf(draft, vehicles)
-      : { planner: { name: draft.planner, options: optionsOf(draft) } }),
+      : { planner: { name: draft.planner, options: typedOptions(draft) } }),
   };
-  const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
+  const { recovery, ...made } = withTexts(mission, draft, fieldsThatCount(draft));
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
   return { ...made, ...homing } as unknown as NewMission;
 }
@@ -475,12 +528,6 @@ export interface Estimate {
 }
 
 /** How long a mission takes at most and how far its vehicles go; null while that is not said. */
-/** A planner's options: a trained controller, of a file, is of no use to any but `pcao`. */
-function optionsOf(draft: Draft): PlannerOptions {
-  const { model, ...others } = draft.options;
-  return draft.planner === "pcao" && model ? draft.options : others;
-}
-
 export function estimate(described: Draft, area_m2: number): Estimate | null {
   const draft = resolved(described);
   const shares = vehicleNames(draft).map((name): Share => {
@@ -513,8 +560,6 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["recovery", "recovery"],
   ["planner", "planner"],
   ["tide", "tide_m"],
-  ["vehicles.recovery_point", "own"],
-  ...Object.values(VEHICLE_FIELDS).map(({ path }): [string, keyof Draft] => [path, "own"]),
   ["vehicles", "simulated"],
   ["keep_out", "keepOut"],
   ["area", "ring"],
@@ -522,10 +567,25 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["site", "site"],
 ];
 
-/** Which of the form's fields a field of the service's refusal stands for. */
-export function fieldOf(serviceField: string): keyof Draft | null {
+/** What is at fault where a service refuses a draft for one of its own fields. */
+export function fieldOf(serviceField: string, draft: Draft): FaultKey {
+  const [, place, part] = /^vehicles\.(\d+)\.(.+)$/.exec(serviceField) ?? [];
+  if (part) return vehicleFieldOf(part, vehicleNames(draft)[Number(place)] ?? "");
+  const [, option] = /^planner\.options\.(\w+)/.exec(serviceField) ?? [];
+  if (option) return `options.${option}`;
+  if (serviceField.startsWith("budget.") && draft.kind === "survey") return lengthChoiceOf(draft);
   const plain = Object.entries(FIELDS).map(([name, { path }]) => [path, name as FieldName] as const);
-  const path = serviceField.replace(/^vehicles\.\d+/, "vehicles");
-  const found = [...plain, ...OTHERS].find(([known]) => `${path}.`.startsWith(`${known}.`));
-  return found?.[1] ?? null;
+  const found = [...plain, ...OTHERS].find(([known]) => `${serviceField}.`.startsWith(`${known}.`));
+  return found?.[1] ?? `other.${serviceField}`;
+}
+
+/** What is at fault where a part of a vehicle's description is refused. */
+function vehicleFieldOf(part: string, name: string): FaultKey {
+  if (part === "name") return "names";
+  const own = [
+    ...Object.entries(VEHICLE_FIELDS),
+    ["recovery_point", { path: "vehicles.recovery_point" }],
+  ] as [keyof Own, { path: string }][];
+  const found = own.find(([, { path }]) => `vehicles.${part}.`.startsWith(`${path}.`));
+  return found ? ownKey(name, found[0]) : "simulated";
 }

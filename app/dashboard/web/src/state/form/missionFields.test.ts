@@ -30,7 +30,7 @@ function draftWith(changes: Partial<Draft>, kind: Draft["kind"] = "survey"): Dra
 const shown = (mission: NewMission): Pick<MissionView, "name" | "spec"> =>
   ({
     name: "Quay",
-    spec: { tide: {}, search: null, planner: {}, budget: { steps: 100 }, ...mission },
+    spec: { tide: {}, search: null, planner: { options: {} }, budget: { steps: 100 }, ...mission },
   }) as unknown as MissionView;
 
 describe.each(ENTRIES)("the field %s", (name, field) => {
@@ -43,6 +43,7 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
   const switched = isSwitch ? !schema.default : undefined;
   const text = String(other ?? switched ?? inside / (field.factor ?? 1));
   const length = field.part === "length" ? { length: name as LengthUnit } : {};
+  const led = field.part === "coverage" ? { planner: "swath", sensor: "multibeam" as const } : {};
 
   it("begins with what the service takes where nothing is said", () => {
     const begun = draftWith({}, kind)[name];
@@ -56,7 +57,9 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
     const past = [least - 1, ...(schema.maximum === undefined ? [] : [schema.maximum + 1])];
     const wrong = other || isSwitch ? [] : past;
     for (const value of wrong) {
-      const faults = faultsOf(draftWith({ ...length, [name]: String(value / (field.factor ?? 1)) }, kind));
+      const faults = faultsOf(
+        draftWith({ ...length, ...led, [name]: String(value / (field.factor ?? 1)) }, kind),
+      );
       expect(faults[name]).toContain(`${field.label} must be`);
     }
     expect(fieldFault(field, text)).toBe("");
@@ -64,13 +67,13 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
 
   it("is sent at its place, copied, and has the service's refusal shown beside it", () => {
     const draft = draftWith(
-      { ...length, [name]: text, max_depth_m: name === "max_depth_m" ? text : "6000" },
+      { ...length, ...led, [name]: text, max_depth_m: name === "max_depth_m" ? text : "6000" },
       kind,
     );
     const mission = toMission(draft);
     expect(valueAt(mission, field.path)).toBe(other ?? switched ?? Number(text) * (field.factor ?? 1));
     expect(copyOf(shown(mission))).toMatchObject({ ...length, [name]: text });
-    expect(fieldOf(field.path)).toBe(name);
+    expect(fieldOf(field.path, draft)).toBe(name);
   });
 });
 
@@ -89,7 +92,7 @@ describe("one entry in the table", () => {
     expect((draftWith({}) as unknown as Record<string, string>).noise).toBe("0.01");
     expect(Object.keys(faultsOf(change("2")))).toEqual(["noise"]);
     expect(toMission(change("0.03"))).toMatchObject({ sounding_noise: 0.03 });
-    expect(fieldOf("sounding_noise")).toBe("noise");
+    expect(fieldOf("sounding_noise", draftWith({}))).toBe("noise");
   });
 
   it("adds a choice or a switch just so", () => {

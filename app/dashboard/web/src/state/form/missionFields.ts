@@ -27,7 +27,17 @@ export interface Field {
   /** Where the value stands in a mission. */
   path: keyof typeof SPEC;
   /** Where it stands in the form. */
-  part: "quality" | "length" | "limits" | "search" | "tide" | "recovery" | "coverage" | "uncertainty";
+  part:
+    | "quality"
+    | "length"
+    | "limits"
+    | "search"
+    | "tide"
+    | "recovery"
+    | "shoals"
+    | "coverage"
+    | "uncertainty"
+    | "planner";
   label: string;
   unit?: string;
   placeholder?: string;
@@ -192,7 +202,7 @@ export const FIELDS = {
   },
   shoal_depth_m: {
     path: "shoal_depth_m",
-    part: "quality",
+    part: "shoals",
     get label() {
       return say("fields.shoalAbove");
     },
@@ -516,9 +526,9 @@ export type Tree = { [key: string]: unknown };
 export const valueAt = (tree: unknown, path: readonly string[]): unknown =>
   path.reduce((part, key) => (part as Tree | null | undefined)?.[key], tree);
 
-/** A mission with the values that were typed. */
-export function withTexts(mission: Tree, texts: Texts, kind: MissionKind, length: LengthUnit): Tree {
-  return fieldsOf(kind, length).reduce((made, [name, field]) => {
+/** A mission with the values that were typed in these fields. */
+export function withTexts(mission: Tree, texts: Texts, fields: readonly [FieldName, Field][]): Tree {
+  return fields.reduce((made, [name, field]) => {
     const value = typedValue(field, texts[name]);
     return value === undefined ? made : put(made, field.path.split("."), value);
   }, mission);
@@ -546,6 +556,10 @@ export function numberFault(label: string, text: string, schema: Schema, factor 
     ? ""
     : say("fields.mustBe", { label, schema: boundsIn(schema, factor) });
 }
+
+/** What is wrong with how deep it is said to be; it need not be said. */
+export const floorDepthFault = (text: string): string =>
+  text.trim() === "" ? "" : numberFault(say("asked.depthOfTheBottom"), text, SPEC.floor_depth_m);
 
 export function isWithin(value: number, schema: Schema): boolean {
   const { minimum = -Infinity, exclusiveMinimum = -Infinity } = schema;

@@ -4,6 +4,7 @@ import { useEffect } from "preact/hooks";
 import { api } from "../../api/client";
 import SPEC from "../../api/mission.json";
 import type { CheckStatus, PreflightView } from "../../api/types";
+import { floorDepthFault } from "../../state/form/missionFields";
 import { pointed } from "../../state/format";
 import { act, actionWords, busyWith, refusal, said } from "../../state/session";
 import { floorDepth, mission, preflightOpen, selectedId } from "../../state/store";
@@ -47,6 +48,8 @@ export function PreflightDialog() {
     };
   }, [open]);
 
+  const depth_m = pointed(floorDepth.value);
+  const wrongDepth = floorDepthFault(depth_m);
   const close = sets(preflightOpen, false);
   const start = async () => {
     if (await act("start")) close();
@@ -101,13 +104,25 @@ export function PreflightDialog() {
         <>
           <label class="field">
             {say("asked.depthOfTheBottomM")}
-            <Typed text={floorDepth} id="preflight-floor_depth_m" placeholder={say("asked.aGuess")} />
+            <Typed
+              text={floorDepth}
+              id="preflight-floor_depth_m"
+              placeholder={say("asked.aGuess")}
+              invalid={wrongDepth !== ""}
+            />
+            {wrongDepth ? (
+              <span class="fault" data-testid="fault-floor_depth_m">
+                ▲ {wrongDepth}
+              </span>
+            ) : null}
             <small>{SPEC.floor_depth_m.description}</small>
           </label>
-          <Forecast
-            of={`${selectedId.value} ${floorDepth.value}`}
-            asks={[(gone) => api.forecast(selectedId.peek() ?? "", pointed(floorDepth.value), gone)]}
-          />
+          {wrongDepth ? null : (
+            <Forecast
+              of={`${selectedId.value} ${depth_m}`}
+              asks={[(gone) => api.forecast(selectedId.peek() ?? "", depth_m, gone)]}
+            />
+          )}
         </>
       ) : null}
     </Dialog>

@@ -2,8 +2,9 @@
 
 import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
+import type { PlannerView } from "../../api/types";
 import { typedPlace } from "../../state/coordinates";
-import type { Draft, Faults } from "../../state/form/draft";
+import type { Draft, FaultKey, Faults } from "../../state/form/draft";
 import { type Field, type FieldName, fieldsOf, schemaOf, startOf } from "../../state/form/missionFields";
 import { pointed } from "../../state/format";
 import { picking } from "../../state/store";
@@ -14,6 +15,8 @@ import { Button, Choice } from "../parts/Controls";
 export interface FormState {
   draft: Draft;
   faults: Faults;
+  /** The planners that there are; empty until the service has told. */
+  planners: readonly PlannerView[];
   /** A change that follows from what there is then is a function of it. */
   set: (change: Partial<Draft> | ((draft: Draft) => Partial<Draft>)) => void;
 }
@@ -192,7 +195,7 @@ function Plain({ name, field }: { name: FieldName; field: Field }) {
   );
 }
 
-export function Fault({ field }: { field: keyof Draft }) {
+export function Fault({ field }: { field: FaultKey }) {
   const { faults } = useForm();
   return faults[field] ? (
     <span class="fault" data-testid={`fault-${field}`}>

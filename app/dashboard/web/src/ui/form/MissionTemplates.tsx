@@ -1,23 +1,26 @@
 import { useSignal } from "@preact/signals";
 import type { NewMission } from "../../api/types";
 import { kept } from "../../persistentSignal";
-import { allBlocks, type Draft, faultsOf, toMission } from "../../state/form/draft";
+import { allBlocks, type Draft, faultsOf, toMission, turnedInto, withSensor } from "../../state/form/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
+import { withPlanner } from "../../state/form/plannerOptions";
 import { type Key, say } from "../../words/say";
 import { Button, Choice, FileButton, same, Trouble } from "../parts/Controls";
 import { saveText } from "../parts/download";
+import { useForm } from "./Fields";
 
 /** Templates that were kept on this device. */
 const templates = kept<readonly Template[]>("templates", []);
 
-/** What comes with the page: changes of a draft. */
-const BUILT_IN: Readonly<Partial<Record<Key, Partial<Draft>>>> = {
-  "beginnings.singleBeamsOrDvlAdaptive": { kind: "survey", planner: "cao", sensor: "dvl" },
-  "beginnings.multibeamFullCoverage": { kind: "survey", planner: "swath", sensor: "multibeam" },
+/** What comes with the page: surveys by a planner with a sensor. */
+const BUILT_IN: Readonly<Partial<Record<Key, Pick<Draft, "planner" | "sensor">>>> = {
+  "beginnings.singleBeamsOrDvlAdaptive": { planner: "cao", sensor: "dvl" },
+  "beginnings.multibeamFullCoverage": { planner: "swath", sensor: "multibeam" },
 };
 
 /** What a new mission begins with: a template, or a file. */
 export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (draft: Draft) => void }) {
+  const { planners } = useForm();
   const fault = useSignal("");
   const read = (name: string, text: string) => {
     try {
@@ -29,8 +32,16 @@ export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (d
   };
   const choose = (name: string) => {
     const own = templates.value.find((one) => one.name === name);
+    const builtIn = BUILT_IN[name as Key];
     if (own) onBegin(withTemplate(own.mission, draft));
-    else onBegin({ ...draft, ...BUILT_IN[name as Key] });
+    else if (builtIn) {
+      onBegin({
+        ...draft,
+        ...turnedInto("survey", draft),
+        ...withPlanner(builtIn.planner, draft, planners),
+        ...withSensor(builtIn.sensor, draft),
+      });
+    }
   };
   const builtIn = (Object.keys(BUILT_IN) as Key[]).map(
     (key) => [key, say(key as "beginnings.multibeamFullCoverage")] as const,

@@ -1,8 +1,8 @@
 import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
-import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
-import type { LngLat } from "../../api/types";
+import type { LngLat, PlannerView } from "../../api/types";
 import { polygonOf } from "../../map/area";
 import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
@@ -14,6 +14,7 @@ import {
   copyOf,
   type Draft,
   emptyDraft,
+  type FaultKey,
   type Faults,
   faultsOf,
   fieldOf,
@@ -24,15 +25,17 @@ import {
 import { createMissions, describeMission, said } from "../../state/session";
 import {
   copied,
+  describedDepths,
   describing,
   draftShapes,
   drawing,
   editedMission,
+  floorDepth,
   mapCentre,
   picking,
 } from "../../state/store";
 import { say } from "../../words/say";
-import { Button, FileButton, useEscape } from "../parts/Controls";
+import { Button, FileButton, into, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
 import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
@@ -48,7 +51,7 @@ export function NewMissionForm() {
   const edited = editedMission.peek();
   const draft = useSignal(
     edited
-      ? { ...copyOf(edited), name: edited.name }
+      ? { ...copyOf(edited), name: edited.name, floor_depth_m: floorDepth.peek() }
       : original
         ? copyOf(original)
         : emptyDraft(mapCentre.peek()),
@@ -56,10 +59,23 @@ export function NewMissionForm() {
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
   const sending = useSignal(false);
+  const planners = useSignal<readonly PlannerView[]>([]);
+  const plannersFault = useSignal("");
+  useEffect(() => {
+    api.planners().then(into(planners), (error: unknown) => {
+      plannersFault.value = said(error);
+    });
+  }, []);
   const form = useRef<HTMLFormElement>(null);
-  /** How often it was sent with faults. */
+  /** How often it was sent and not taken. */
   const faulty = useSignal(0);
-  useLayoutEffect(() => {
+  const unplaced = useSignal<readonly FaultKey[]>([]);
+  // After the next picture: parts of the form that do not read its faults themselves show theirs later than the form.
+  useEffect(() => {
+    const found = form.current ? unplacedIn(form.current, faults.value) : [];
+    if (found.join() !== unplaced.peek().join()) unplaced.value = found;
+  }, [faults.value, draft.value]);
+  useEffect(() => {
     if (faulty.value > 0 && form.current) showFault(form.current);
   }, [faulty.value]);
 
@@ -95,6 +111,7 @@ export function NewMissionForm() {
   const set: FormState["set"] = (how) => {
     const change = typeof how === "function" ? how(draft.value) : how;
     draft.value = { ...draft.value, ...change };
+    refused.value = null;
     const found = faultsOf(draft.value);
     // What was drawn is judged at once, typed fields only after the first try.
     if (Object.keys(faults.value).length > 0) faults.value = found;
@@ -113,7 +130,7 @@ export function NewMissionForm() {
     }
     sending.value = true;
     try {
-      const { tide_table: table, tide_source } = draft.value;
+      const { tide_table: table, tide_source, floor_depth_m } = draft.value;
       const source = tide_source || say("mission.tideTable");
       const withTide = async (id: string) => {
         if (table) await api.setTide(id, { table, source });
@@ -122,25 +139,26 @@ export function NewMissionForm() {
         // What it follows stays as it is.
         await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
         await withTide(edited.id);
-      } else await createMissions(toMissions(draft.value), withTide);
+        floorDepth.value = floor_depth_m;
+      } else {
+        const made = await createMissions(toMissions(draft.value), withTide);
+        for (const id of made) describedDepths.set(id, floor_depth_m);
+      }
       close();
     } catch (error) {
       if (!(error instanceof ServiceError)) throw error;
       refused.value = error;
       for (const { field, message, expected } of error.faults) {
-        const own = fieldOf(field);
-        if (own)
-          faults.value = {
-            ...faults.value,
-            [own]: [message, expected].filter(Boolean).join(say("mission.expected")),
-          };
+        const words = [message, expected].filter(Boolean).join(say("mission.expected"));
+        faults.value = { ...faults.value, [fieldOf(field, draft.value)]: words };
       }
+      faulty.value += 1;
     } finally {
       sending.value = false;
     }
   };
   return (
-    <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
+    <Form.Provider value={{ draft: draft.value, faults: faults.value, planners: planners.value, set }}>
       <form
         ref={form}
         class="new-mission"
@@ -172,7 +190,7 @@ export function NewMissionForm() {
         {draft.value.kind === "search" ? <SearchFields /> : null}
         <VehicleFields />
         <RecoveryFields />
-        <ExpertFields />
+        <ExpertFields fault={plannersFault.value} />
         <details>
           <summary>{say("mission.tide")}</summary>
           <div class="pair">
@@ -190,11 +208,21 @@ export function NewMissionForm() {
           </FileButton>
           <p class="hint">{say("mission.tidesCanBeSetAndChanged")}</p>
         </details>
-        {refused.value ? (
-          <p class="reason alarm" role="alert">
-            {said(refused.value)}
-          </p>
-        ) : null}
+        <div class="refusal" role="alert">
+          {refused.value ? (
+            <p class="reason alarm">
+              {refused.value.faults.length > 0
+                ? say("mission.whatIsMarkedCannotBeTaken")
+                : said(refused.value)}
+            </p>
+          ) : null}
+          {unplaced.value.map((field) => (
+            <span key={field} class="fault" data-testid={`unplaced-${field}`}>
+              ▲ {field.startsWith("other.") ? `${field.slice("other.".length)}: ` : ""}
+              {faults.value[field]}
+            </span>
+          ))}
+        </div>
         <button
           type="submit"
           class="command primary wide"
@@ -213,9 +241,17 @@ export function NewMissionForm() {
   );
 }
 
+/** Faults of what the form does not show. */
+function unplacedIn(form: HTMLFormElement, faults: Faults): FaultKey[] {
+  const placed = new Set(
+    [...form.querySelectorAll<HTMLElement>("[data-testid^='fault-']")].map(({ dataset }) => dataset.testid),
+  );
+  return (Object.keys(faults) as FaultKey[]).filter((field) => !placed.has(`fault-${field}`));
+}
+
 /** Brings the first fault into sight, whatever it is folded into: the form is longer than the window. */
 function showFault(form: HTMLFormElement): void {
-  const fault = form.querySelector("span.fault:not([role])");
+  const fault = form.querySelector("[data-testid^='fault-']") ?? form.querySelector(".refusal");
   for (let part = fault?.closest("details"); part; part = part.parentElement?.closest("details"))
     part.open = true;
   fault?.scrollIntoView({ block: "center" });

@@ -16,6 +16,7 @@ import {
   withLength,
 } from "../../state/form/draft";
 import { FIELDS } from "../../state/form/missionFields";
+import { withPlanner } from "../../state/form/plannerOptions";
 import { distance, duration, fixed } from "../../state/format";
 import { planned } from "../../state/store";
 import { say } from "../../words/say";
@@ -30,6 +31,7 @@ export function SurveyFields() {
     <fieldset class="asked">
       <legend>{say("asked.whatIsAsked")}</legend>
       <Quality />
+      <Part of="shoals" explained />
       <Coverage />
       <Length />
       <Expected />
@@ -37,8 +39,15 @@ export function SurveyFields() {
   );
 }
 
-/** What each order asks for where it is strictest, the most demanding first. */
-const ORDERS = Object.entries(SPEC.accuracy_m.orders).sort(([, a], [, b]) => a - b);
+const STRICTEST_M = Object.entries<number>(SPEC.accuracy_m.orders);
+
+/** What orders ask for where they are strictest, the most demanding first; those that ask for the same are one choice. */
+const ORDERS = [...new Set(STRICTEST_M.map(([, sd_m]) => sd_m))]
+  .sort((a, b) => a - b)
+  .map((figure) => {
+    const alike = STRICTEST_M.filter(([, sd_m]) => sd_m === figure);
+    return [alike.map(([name]) => name).join(", "), figure] as const;
+  });
 
 /** How sure depths are to be: as an order of S-44 asks, or a deviation of one's own. */
 function Quality() {
@@ -74,7 +83,7 @@ function Quality() {
 
 /** How the area is covered. */
 function Coverage() {
-  const { draft, set } = useForm();
+  const { draft, planners, set } = useForm();
   const presets = Object.entries(PLANNER_PRESETS).filter(
     ([name]) => name === draft.planner || canPlan(name, draft),
   );
@@ -87,7 +96,7 @@ function Coverage() {
             name="planner"
             checked={draft.planner === name}
             data-testid={`planner-${name}`}
-            onChange={() => set({ planner: name })}
+            onChange={() => set((present) => withPlanner(name, present, planners))}
           />
           <span>
             <b>{title}</b> <small>{words}</small>

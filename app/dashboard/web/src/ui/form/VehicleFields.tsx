@@ -1,5 +1,5 @@
 import type { Sensor, VehicleSpec, VehicleView } from "../../api/types";
-import { type Own, sensorOf, simulatedNames, vehicleNames } from "../../state/form/draft";
+import { type Own, ownKey, sensorOf, simulatedNames, vehicleNames } from "../../state/form/draft";
 import { SENSORS, schemaOf, vehicleFieldsOf } from "../../state/form/missionFields";
 import { pointed } from "../../state/format";
 import { batteryWords, vehicleState } from "../../state/stateNames";
@@ -74,7 +74,7 @@ function SimulatedNames() {
 
 /** What single vehicles have of their own: another speed or sensor, how long their energy lasts, where they come home to. */
 function Singles() {
-  const { draft, set } = useForm();
+  const { draft, faults, set } = useForm();
   const names = vehicleNames(draft);
   if (names.length === 0) return null;
   const change = (name: string, field: keyof Own, text: string | Sensor) =>
@@ -111,9 +111,11 @@ function Singles() {
                             (field === "altitude_m" ? say("vehicles.keepsItsDepth") : say("asked.notKnown")),
                         )
                   }
+                  aria-invalid={faults[ownKey(name, field)] ? "true" : "false"}
                   data-testid={`${field}-${name}`}
                   onInput={(event) => change(name, field, pointed(event.currentTarget.value))}
                 />
+                <Fault field={ownKey(name, field)} />
               </label>
             ))}
           </div>
@@ -123,10 +125,12 @@ function Singles() {
             placeholder={say("vehicles.theMissionS")}
             text={draft.own[name]?.recovery_point ?? ""}
             onText={(text) => change(name, "recovery_point", text)}
-          />
+            invalid={faults[ownKey(name, "recovery_point")] !== undefined}
+          >
+            <Fault field={ownKey(name, "recovery_point")} />
+          </Place>
         </fieldset>
       ))}
-      <Fault field="own" />
     </details>
   );
 }

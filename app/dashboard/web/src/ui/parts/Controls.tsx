@@ -113,15 +113,17 @@ interface TypedProps {
   placeholder?: string;
   maxLength?: number;
   autocomplete?: string;
+  invalid?: boolean;
 }
 
 /** A line of text, kept in a signal. */
-export function Typed({ text, label, id, type = "text", ...rest }: TypedProps) {
+export function Typed({ text, label, id, type = "text", invalid = false, ...rest }: TypedProps) {
   return (
     <input
       // The element's attributes depend on its type; these belong to every line of text.
       type={type as "text"}
       aria-label={label}
+      aria-invalid={invalid ? "true" : "false"}
       value={text.value}
       data-testid={id}
       onInput={(event) => {
