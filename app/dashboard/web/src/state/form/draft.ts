@@ -82,6 +82,8 @@ export interface Draft extends Texts {
   chosen: readonly VehicleSpec[];
   /** By vehicle. */
   own: Readonly<Record<string, Own>>;
+  /** Names that vehicles are to have while others are still called so, by vehicle. */
+  wanted: Readonly<Record<string, string>>;
   /** What a mission that is copied has and the form does not show. */
   base: Partial<NewMission>;
 }
@@ -149,6 +151,7 @@ export function emptyDraft(middle: LngLat): Draft {
     names: "",
     chosen: [],
     own: {},
+    wanted: {},
     base: {},
   };
   return { ...draft, ...centred(draft, middle) };
@@ -340,7 +343,10 @@ export function faultsOf(described: Draft): Faults {
     faults.max_depth_m = say("draft.deepestTravelMustNotBeAbove");
   }
   if (!faults.simulated) {
-    const all = vehicleNames(draft);
+    const all = vehicleNames(draft).flatMap((name) => [
+      name,
+      ...(draft.wanted[name] ? [draft.wanted[name]] : []),
+    ]);
     const twice = all.find((name, i) => all.indexOf(name) !== i);
     if (twice !== undefined)
       faults.names = say("draft.twoVehiclesAreCalled", { twice: twice || say("draft.nothing") });

@@ -96,11 +96,12 @@ export function NewMissionForm() {
     const change = typeof how === "function" ? how(draft.value) : how;
     draft.value = { ...draft.value, ...change };
     const found = faultsOf(draft.value);
-    // What was drawn is judged at once, typed fields only after the first try.
+    // What was drawn, and vehicles' names, are judged at once, other fields only after the first try.
     if (Object.keys(faults.value).length > 0) faults.value = found;
-    else if (change.ring || change.keepOut) {
-      const { ring, keepOut } = found;
-      faults.value = { ...(ring ? { ring } : {}), ...(keepOut ? { keepOut } : {}) };
+    else if (change.ring || change.keepOut || change.wanted) {
+      const { ring, keepOut, names } = found;
+      const atOnce = Object.entries({ ring, keepOut, names }).filter(([, fault]) => fault);
+      faults.value = Object.fromEntries(atOnce);
     }
   };
   const submit = async (event: SubmitEvent) => {
