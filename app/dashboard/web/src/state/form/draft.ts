@@ -7,6 +7,7 @@ import { rectangle, wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
 import { placeOf, placeSample, typedPlace } from "../coordinates";
 import {
+  carriedOver,
   FIELDS,
   type FieldName,
   fieldFault,
@@ -180,8 +181,9 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     ring,
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
     tide_source: texts.tide_m === "" ? "" : tide.source,
-    planner: spec.planner.name,
-    options: spec.planner.options as PlannerOptions,
+    ...(spec.kind === "survey"
+      ? { planner: spec.planner.name, options: spec.planner.options as PlannerOptions }
+      : {}),
     recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
     chosen: spec.vehicles.map(
@@ -407,13 +409,19 @@ export function toMission(described: Draft): NewMission {
   const draft = resolved(described);
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
-  const { search, budget: _, recovery: before, site: _site, ...base } = draft.base;
+  const from = draft.base.kind ?? draft.kind;
+  const carried: Partial<NewMission> = carriedOver(draft.base, from, draft.kind);
+  const { search: _s, budget: _b, recovery: before, site: _site, ...base } = carried;
   const point = placeOf(draft.recovery);
   const simulated = simulatedNames(draft).map(
     (name): VehicleSpec => ({ name, kind: "sim", sensor: draft.sensor }),
   );
-  const all = [...draft.chosen, ...simulated];
-  const vehicles = all.map((vehicle) => withOwn(vehicle, draft));
+  // At which depth they travel is another matter in a mission of the other kind.
+  const chosen =
+    from === draft.kind
+      ? draft.chosen
+      : draft.chosen.map(({ depth_m: _, ...vehicle }) => vehicle as VehicleSpec);
+  const vehicles = [...chosen, ...simulated].map((vehicle) => withOwn(vehicle, draft));
   const mission = {
     ...base,
     name: draft.name.trim(),
@@ -426,7 +434,7 @@ export function toMission(described: Draft): NewMission {
       ? { tide: { source: draft.tide_source.trim() || say("draft.statedByTheOperator") } }
       : {}),
     ...(draft.kind === "search"
-      ? searchOf(draft, vehicles)
+      ? searchOf({ ...draft, base: carried }, vehicles)
       : { planner: { name: draft.planner, options: optionsOf(draft) } }),
   };
   const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
