@@ -217,7 +217,9 @@ export function turnedInto(kind: MissionKind, draft: Draft): Partial<Draft> {
 
 /** Names of the simulated vehicles: those that were given, for the rest such as nobody else has. */
 export function simulatedNames(draft: Draft): string[] {
-  const wanted = Number(draft.simulated);
+  // As many as are asked for while a number is typed, but never more than a mission can have.
+  const asked = Number(draft.simulated);
+  const wanted = Number.isInteger(asked) ? Math.min(asked, SPEC.vehicles.maxItems) : 0;
   const given = draft.names
     .split(",")
     .map((name) => name.trim())

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { type Draft, emptyDraft, faultsOf, vehicleNames } from "./draft";
+import { type Draft, emptyDraft, faultsOf, simulatedNames, vehicleNames } from "./draft";
 import { withVehicleCalled } from "./vehicles";
 
 const draft: Draft = {
@@ -55,4 +55,14 @@ describe("a vehicle that is called otherwise", () => {
     expect(called(left, [1, "auv-10"]).own["auv-10"]).toEqual({ endurance_min: "70" });
     expect(called({ ...left, simulated: "3" }, [3, "auv-10"]).own["auv-10"]).toBeUndefined();
   });
+});
+
+it.each([
+  ["5000", 100],
+  ["1e999", 0],
+  ["2.5", 0],
+  ["-1", 0],
+  ["", 0],
+])("%j simulated vehicles are %i while that is typed", (simulated, count) => {
+  expect(simulatedNames({ ...draft, simulated })).toHaveLength(count);
 });
