@@ -158,17 +158,22 @@ export function emptyDraft(middle: LngLat): Draft {
   return { ...draft, ...centred(draft, middle) };
 }
 
+/** Where the water level of a mission comes from that has none. */
+const NO_TIDE: string = SPEC["tide.source"].default;
+
 /** A draft of a mission like one that there is, its vehicles as they are described there. */
 export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
   const ring = ringOf(spec.area as NewMission["area"]);
-  const { tide, steps: _, after: _after, ...base } = spec;
-  const { search } = base;
+  const { steps: _, after: _after, ...base } = spec;
+  const { search, tide } = base;
   const places = search && {
     goal: typedPlace(search.goal as LngLat),
     entry: typedPlace(search.entry as LngLat),
     obstacles: search.obstacles.map((one) => ringOf(one as NewMission["area"])),
   };
   const texts = textsOf(spec, spec.kind);
+  // A level of nothing is a level where somebody stated it.
+  const isStated = texts.tide_m !== "" || (tide.source ?? NO_TIDE) !== NO_TIDE;
   return {
     ...emptyDraft(ring[0] ?? [0, 0]),
     ...texts,
@@ -180,7 +185,8 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     source: "drawn",
     ring,
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
-    tide_source: texts.tide_m === "" ? "" : tide.source,
+    tide_m: isStated ? String(tide.level_m) : "",
+    tide_source: isStated ? tide.source : "",
     ...(spec.kind === "survey"
       ? { planner: spec.planner.name, options: spec.planner.options as PlannerOptions }
       : {}),
@@ -318,6 +324,9 @@ export function faultsOf(described: Draft): Faults {
   if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
     faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
   }
+  // A table has its own source.
+  if (draft.tide_source.trim() !== "" && draft.tide_table === "")
+    note("tide_m", numberFault(FIELDS.tide_m.label, draft.tide_m, SPEC["tide.level_m"]));
   note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
   const cell_m = faults.cell_m ? 0 : Number(draft.cell_m);
   if (draft.source === "drawn") {
@@ -413,7 +422,7 @@ export function toMission(described: Draft): NewMission {
   if (!area) throw new Error("the draft has faults");
   const from = draft.base.kind ?? draft.kind;
   const carried: Partial<NewMission> = carriedOver(draft.base, from, draft.kind);
-  const { search: _s, budget: _b, recovery: before, site: _site, ...base } = carried;
+  const { search: _s, budget: _b, recovery: before, site: _site, tide, ...base } = carried;
   const point = placeOf(draft.recovery);
   const simulated = simulatedNames(draft).map(
     (name): VehicleSpec => ({ name, kind: "sim", sensor: draft.sensor }),
@@ -432,9 +441,7 @@ export function toMission(described: Draft): NewMission {
     keep_out: draft.keepOut.map(polygonOf),
     vehicles,
     ...(draft.kind === "survey" && draft.site ? { site: draft.site } : {}),
-    ...(draft.tide_m.trim()
-      ? { tide: { source: draft.tide_source.trim() || say("draft.statedByTheOperator") } }
-      : {}),
+    ...tideOf(draft, tide),
     ...(draft.kind === "search"
       ? searchOf({ ...draft, base: carried }, vehicles)
       : { planner: { name: draft.planner, options: optionsOf(draft) } }),
@@ -442,6 +449,15 @@ export function toMission(described: Draft): NewMission {
   const { recovery, ...made } = withTexts(mission, draft, draft.kind, draft.length);
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
   return { ...made, ...homing } as unknown as NewMission;
+}
+
+/** The level's source, and what the form does not show of the tide; the level itself is a plain field. */
+function tideOf({ tide_m, tide_source }: Draft, before: NewMission["tide"]): Pick<NewMission, "tide"> {
+  const { level_m: _l, source: _s, ...others } = before ?? {};
+  const isStated = tide_m.trim() !== "";
+  const source = isStated ? { source: tide_source.trim() || say("draft.statedByTheOperator") } : {};
+  const tide = { ...others, ...source };
+  return Object.keys(tide).length > 0 ? { tide } : {};
 }
 
 function withOwn(vehicle: VehicleSpec, draft: Draft): VehicleSpec {

@@ -13,6 +13,8 @@ interface MissionFile {
   format: typeof FORMAT;
   mission: NewMission;
   tide_table?: string;
+  /** How far apart lines are to be, where the length is given by that. */
+  spacing_m?: number;
   /** Where there are several areas: all of them in their order. */
   blocks?: readonly { name: string; area: PolygonGeometry }[];
 }
@@ -21,6 +23,7 @@ export function missionFile(
   described: NewMission & { steps?: unknown },
   tide_table = "",
   blocks: readonly Block[] = [],
+  spacing_m = "",
 ): string {
   // As shown by the service it has its steps, which follow from its budget; sites and missions are known to it alone.
   const { steps: _, site: _site, after: _after, ...mission } = described;
@@ -28,6 +31,7 @@ export function missionFile(
     format: FORMAT,
     mission,
     ...(tide_table ? { tide_table } : {}),
+    ...(spacing_m ? { spacing_m: Number(spacing_m) } : {}),
     ...(blocks.length > 1
       ? { blocks: blocks.map(({ name, ring }) => ({ name, area: polygonOf(ring) })) }
       : {}),
@@ -57,6 +61,7 @@ export function draftIn(fileName: string, text: string): Draft {
   return {
     ...draftOf(mission),
     ...(content.tide_table ? { tide_table: content.tide_table } : {}),
+    ...(content.spacing_m ? { spacing_m: String(content.spacing_m) } : {}),
     ...(first ? { ring: first.ring, block_name: first.name, blocks } : {}),
   };
 }
@@ -79,23 +84,28 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
   return { ...copyOf(shown), name: mission.name };
 }
 
-/** What a template says of a mission elsewhere: everything but its name and its places. */
-export function withTemplate(template: NewMission, draft: Draft): Draft {
+/** What a template says of a mission elsewhere: everything but its name, its places and the day's water level. */
+export function withTemplate({ mission, spacing_m = "" }: Omit<Template, "name">, draft: Draft): Draft {
   const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
     draft;
-  const { blocks, turn, block_name, floor_depth_m } = draft;
-  const { own, ...settings } = draftOf(template);
+  const { blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table } = draft;
+  const { own, base, ...settings } = draftOf(mission);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
+  const { sd_m: _, ...tide } = base.tide ?? {};
   return {
     ...settings,
     own: Object.fromEntries(placeless),
+    base: { ...base, tide },
+    spacing_m,
     obstacles: [],
     ...{ name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery },
-    ...{ blocks, turn, block_name, floor_depth_m },
+    ...{ blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table },
   };
 }
 
 export interface Template {
   name: string;
   mission: NewMission;
+  /** How far apart lines are to be, where the length is given by that. */
+  spacing_m?: string;
 }
