@@ -509,10 +509,14 @@ export function startTexts(kind: MissionKind): Texts {
   return textsWith((field) => startOf(field, kind));
 }
 
+/** Of values in other units than the service's. */
+const SHOWN_DIGITS = 6;
+
 /** A value of a mission as it is typed. */
 export function textOf(field: Field, value: unknown): string {
   if (value == null || (field.optional && value === schemaOf(field).default)) return "";
-  return String(typeof value === "number" ? value / (field.factor ?? 1) : value);
+  if (typeof value !== "number" || !field.factor) return String(value);
+  return String(Number((value / field.factor).toPrecision(SHOWN_DIGITS)));
 }
 
 /** The texts of a mission that there is; what it lacks, and what its kind does not have, begins as in a new one. */
@@ -541,11 +545,14 @@ export type Tree = { [key: string]: unknown };
 export const valueAt = (tree: unknown, path: readonly string[]): unknown =>
   path.reduce((part, key) => (part as Tree | null | undefined)?.[key], tree);
 
-/** A mission with the values that were typed. */
+/** A mission with the values that were typed; one whose text is what it is shown as stays to all its digits. */
 export function withTexts(mission: Tree, texts: Texts, kind: MissionKind, length: LengthUnit): Tree {
   return fieldsOf(kind, length).reduce((made, [name, field]) => {
+    const path = field.path.split(".");
+    const now = valueAt(made, path);
     const value = typedValue(field, texts[name]);
-    return value === undefined ? made : put(made, field.path.split("."), value);
+    const stays = value === undefined || (now != null && textOf(field, now) === texts[name]);
+    return stays ? made : put(made, path, value);
   }, mission);
 }
 
