@@ -8,6 +8,10 @@ export const PLANNING = {
     en: "One mission for each, flown in this order by the same vehicles: each begins by itself when the one before was flown to its end. The fields above describe the one that is marked.",
     pt: "Uma missão por bloco, por esta ordem e com os mesmos veículos: cada uma começa sozinha quando a anterior foi percorrida até ao fim. Os campos acima descrevem o bloco marcado.",
   },
+  "blocks.leftOut": {
+    en: "A search has one area: {others} more {others|block is|blocks are} left out.",
+    pt: "Uma busca tem uma só área: mais {others} {others|bloco fica|blocos ficam} de fora.",
+  },
   "blocks.describe": { en: "{i}: describe {name}", pt: "{i}: descrever {name}" },
   "blocks.nameOf": { en: "Name of block {i}", pt: "Nome do bloco {i}" },
   "blocks.ha": { en: "{area} ha", pt: "{area} ha" },

@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
 import { kept } from "../../persistentSignal";
-import { allBlocks, type Draft, faultsOf, toMission } from "../../state/form/draft";
+import { flownBlocks } from "../../state/form/blocks";
+import { type Draft, faultsOf, toMission } from "../../state/form/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
 import { type Key, say } from "../../words/say";
 import { Button, Choice, FileButton, same, Trouble } from "../parts/Controls";
@@ -69,7 +70,7 @@ export function Keeping({ draft }: { draft: Draft }) {
         onClick={() =>
           saveText(
             fileNameOf(draft.name),
-            missionFile(toMission(draft), draft.tide_table, allBlocks(draft), draft.spacing_m.trim()),
+            missionFile(toMission(draft), draft.tide_table, flownBlocks(draft), draft.spacing_m.trim()),
           )
         }
       >

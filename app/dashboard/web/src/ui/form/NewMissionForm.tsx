@@ -8,7 +8,7 @@ import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
 import { recoveryMarks } from "../../map/marks/recovery";
 import { placeOf } from "../../state/coordinates";
-import { blockTitle, toMissions } from "../../state/form/blocks";
+import { blockTitle, flownBlocks, toMissions } from "../../state/form/blocks";
 import {
   allBlocks,
   copyOf,
@@ -65,7 +65,7 @@ export function NewMissionForm() {
 
   useSignalEffect(() => {
     draftShapes.value = {
-      areas: allBlocks(draft.value)
+      areas: flownBlocks(draft.value)
         .filter(({ ring }) => ring.length > 2)
         .map(({ ring }) => polygonOf(ring)),
       keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
@@ -182,6 +182,11 @@ export function NewMissionForm() {
           </div>
           <FileButton
             accept=".tid,.txt"
+        {draft.value.kind === "search" && draft.value.blocks.length > 0 ? (
+          <p class="hint" role="status" data-testid="blocks-left-out">
+            {say("blocks.leftOut", { others: draft.value.blocks.length })}
+          </p>
+        ) : null}
             id="tide-file"
             onText={(name, text) => set({ tide_table: text, tide_source: name })}
           >
