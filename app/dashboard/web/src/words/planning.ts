@@ -97,6 +97,14 @@ export const PLANNING = {
     en: ". {others} more {others|area lies|areas lie} apart and {others|is|are} left out: a mission has one",
     pt: ". Mais {others} {others|área fica|áreas ficam} à parte e de fora: uma missão tem uma",
   },
+  "area.zonesStay": {
+    en: ". {stay} keep-out {stay|zone that was there stays|zones that were there stay}",
+    pt: ". {stay} {stay|zona interdita que já havia mantém-se|zonas interditas que já havia mantêm-se}",
+  },
+  "area.isNotInDegrees": {
+    en: "{name}: a corner is at {x}, {y}, which is no longitude and latitude in degrees: save it in WGS 84 (EPSG:4326), not in metres of a map's grid",
+    pt: "{name}: um canto está em {x}, {y}, o que não é longitude e latitude em graus: grave-o em WGS 84 (EPSG:4326), não em metros da quadrícula de um mapa",
+  },
   "area.areaOfCorners": {
     en: "{name}: area of {ring} corners{zones}{apart}",
     pt: "{name}: área de {ring} cantos{zones}{apart}",
@@ -461,6 +469,10 @@ export const PLANNING = {
   "missionFile.isNoJsonAMissionS": {
     en: '{fileName} is no JSON: a mission\'s file comes from "Export"',
     pt: "{fileName} não é JSON: um ficheiro de missão vem de «Exportar»",
+  },
+  "missionFile.isBroken": {
+    en: "{fileName} cannot be read: a part of its mission is missing or of another kind than it has to be",
+    pt: "{fileName} não pode ser lido: falta uma parte da missão ou é de outro tipo do que devia",
   },
   "missionFile.holdsNoMissionItNeedsA": {
     en: "{fileName} holds no mission: it needs a name and an area",

@@ -44,11 +44,17 @@ it("what is not said in a file takes the service's defaults", () => {
   expect(draft.chosen.map((vehicle) => vehicle.name)).toEqual(["a"]);
 });
 
+const SQUARE = '{"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}';
+
 it.each([
   ["{", "is no JSON"],
   ["null", "holds no mission"],
   ['{"format": "bathyfleet mission"}', "holds no mission"],
   ['{"name": "x", "area": {"coordinates": [[[0, 0]]]}}', "needs a name and an area"],
+  [`{"name": "x", "area": ${SQUARE}, "vehicles": {}}`, "is missing or of another kind"],
+  [`{"name": "x", "area": ${SQUARE}, "keep_out": [null]}`, "is missing or of another kind"],
+  [`{"name": "x", "area": ${SQUARE}, "recovery": {}}`, "is missing or of another kind"],
+  [`{"name": "x", "area": {"coordinates": [[[0, 0], [524000, 0], [9, 9], [0, 0]]]}}`, "is no longitude"],
 ])("a file of %j is refused in words", (text, words) => {
   expect(() => draftIn("file.json", text)).toThrow(words);
 });

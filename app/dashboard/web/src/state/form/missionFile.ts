@@ -2,9 +2,9 @@
 
 import SPEC from "../../api/mission.json";
 import type { MissionView, NewMission, PolygonGeometry } from "../../api/types";
-import { polygonOf, ringOf } from "../../map/area";
+import { inDegrees, polygonOf, ringOf } from "../../map/area";
 import { say } from "../../words/say";
-import { type Block, copyOf, type Draft } from "./draft";
+import { allBlocks, type Block, copyOf, type Draft } from "./draft";
 
 const FORMAT = "bathyfleet mission";
 
@@ -54,16 +54,31 @@ export function draftIn(fileName: string, text: string): Draft {
   // What was posted to the service by hand is as good.
   const mission = content?.format === FORMAT ? content.mission : (content as NewMission);
   const ring = mission?.area?.coordinates?.[0];
-  if (!mission?.name || !Array.isArray(ring) || ring.length < 4) {
+  if (!mission?.name || typeof mission.name !== "string" || !Array.isArray(ring) || ring.length < 4) {
     throw new Error(say("missionFile.holdsNoMissionItNeedsA", { fileName }));
   }
-  const [first, ...blocks] = (content.blocks ?? []).map(({ name, area }) => ({ name, ring: ringOf(area) }));
-  return {
-    ...draftOf(mission),
-    ...(content.tide_table ? { tide_table: content.tide_table } : {}),
-    ...(content.spacing_m ? { spacing_m: String(content.spacing_m) } : {}),
-    ...(first ? { ring: first.ring, block_name: first.name, blocks } : {}),
-  };
+  try {
+    const [first, ...blocks] = (content.blocks ?? []).map(({ name, area }) => ({
+      name: String(name ?? ""),
+      ring: ringOf(area),
+    }));
+    const draft: Draft = {
+      ...draftOf(mission),
+      ...(content.tide_table ? { tide_table: content.tide_table } : {}),
+      ...(content.spacing_m ? { spacing_m: String(content.spacing_m) } : {}),
+      ...(first ? { ring: first.ring, block_name: first.name, blocks } : {}),
+    };
+    inDegrees(fileName, [
+      ...allBlocks(draft).map((block) => block.ring),
+      ...draft.keepOut,
+      ...draft.obstacles,
+    ]);
+    return draft;
+  } catch (error) {
+    // It stumbled over what is not as it has to be.
+    if (!(error instanceof TypeError)) throw error;
+    throw new Error(say("missionFile.isBroken", { fileName }));
+  }
 }
 
 /** The draft that a description gives, whose defaults are not said. */
