@@ -284,6 +284,8 @@ export const PLANNING = {
   "mission.editAMission": { en: "Edit a mission", pt: "Editar uma missão" },
   "mission.newMission": { en: "New mission", pt: "Nova missão" },
   "mission.cancel": { en: "Cancel", pt: "Cancelar" },
+  "mission.discard": { en: "Discard what was typed", pt: "Descartar o que foi escrito" },
+  "mission.goOn": { en: "Go on", pt: "Continuar" },
   "mission.itKeepsItsNumber": {
     en: "It keeps its number and its log. One that was given depths or a tide table for its area is copied instead.",
     pt: "Mantém o seu número e o seu registo. Se recebeu profundidades ou uma tabela de marés para a sua área, é copiada.",

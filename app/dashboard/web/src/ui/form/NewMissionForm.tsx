@@ -32,7 +32,7 @@ import {
   picking,
 } from "../../state/store";
 import { say } from "../../words/say";
-import { Button, FileButton, useEscape } from "../parts/Controls";
+import { Button, FileButton, sets, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
 import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
@@ -53,9 +53,12 @@ export function NewMissionForm() {
         ? copyOf(original)
         : emptyDraft(mapCentre.peek()),
   );
+  const begun = useRef(JSON.stringify(draft.peek()));
+  const isChanged = () => JSON.stringify(draft.peek()) !== begun.current;
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
-  const sending = useSignal(false);
+  /** What is sent can be withdrawn until it has arrived; null: nothing is. */
+  const sending = useSignal<AbortController | null>(null);
   const form = useRef<HTMLFormElement>(null);
   /** How often it was sent with faults. */
   const faulty = useSignal(0);
@@ -74,14 +77,19 @@ export function NewMissionForm() {
   });
   useEscape(drawing);
   useEscape(picking);
-  useEffect(
-    () => () => {
+  useEffect(() => {
+    const ask = (event: BeforeUnloadEvent) => {
+      if (isChanged()) event.preventDefault();
+    };
+    window.addEventListener("beforeunload", ask);
+    return () => {
+      window.removeEventListener("beforeunload", ask);
       draftShapes.value = null;
-    },
-    [],
-  );
+    };
+  }, []);
 
   const close = () => {
+    sending.peek()?.abort();
     describing.value = false;
     copied.value = null;
     editedMission.value = null;
@@ -106,13 +114,15 @@ export function NewMissionForm() {
   };
   const submit = async (event: SubmitEvent) => {
     event.preventDefault();
+    if (sending.peek()) return;
     faults.value = faultsOf(draft.value);
     refused.value = null;
     if (Object.keys(faults.value).length > 0) {
       faulty.value += 1;
       return;
     }
-    sending.value = true;
+    const sent = new AbortController();
+    sending.value = sent;
     try {
       const { tide_table: table, tide_source } = draft.value;
       const source = tide_source || say("mission.tideTable");
@@ -123,9 +133,10 @@ export function NewMissionForm() {
         // What it follows stays as it is.
         await describeMission(edited.id, { ...toMission(draft.value), after: edited.after });
         await withTide(edited.id);
-      } else await createMissions(toMissions(draft.value), withTide);
-      close();
+      } else await createMissions(toMissions(draft.value), withTide, sent.signal);
+      if (!sent.signal.aborted) close();
     } catch (error) {
+      if (sent.signal.aborted) return;
       if (!(error instanceof ServiceError)) throw error;
       refused.value = error;
       for (const { field, message, expected } of error.faults) {
@@ -137,28 +148,30 @@ export function NewMissionForm() {
           };
       }
     } finally {
-      sending.value = false;
+      sending.value = null;
     }
   };
   return (
     <Form.Provider value={{ draft: draft.value, faults: faults.value, set }}>
+      <header class="panel-head">
+        <h2 tabIndex={-1}>
+          {edited
+            ? say("mission.editAMission")
+            : original
+              ? say("missions.sameAgain")
+              : say("mission.newMission")}
+        </h2>
+        <Cancel isChanged={isChanged} isSaving={edited !== null && sending.value !== null} onCancel={close} />
+      </header>
       <form
         ref={form}
         class="new-mission"
+        // What is being sent stays as it is.
+        inert={sending.value !== null}
         onSubmit={(event) => void submit(event)}
         noValidate
         data-testid="mission-form"
       >
-        <header class="panel-head">
-          <h2>
-            {edited
-              ? say("mission.editAMission")
-              : original
-                ? say("missions.sameAgain")
-                : say("mission.newMission")}
-          </h2>
-          <Button onClick={close}>{say("mission.cancel")}</Button>
-        </header>
         {edited ? (
           <p class="hint">{say("mission.itKeepsItsNumber")}</p>
         ) : (
@@ -169,6 +182,11 @@ export function NewMissionForm() {
         {draft.value.kind === "survey" ? <SurveyFields /> : null}
         <AreaFields />
         {draft.value.kind === "survey" && !edited ? <BlockFields /> : null}
+        {draft.value.kind === "search" && draft.value.blocks.length > 0 ? (
+          <p class="hint" role="status" data-testid="blocks-left-out">
+            {say("blocks.leftOut", { others: draft.value.blocks.length })}
+          </p>
+        ) : null}
         {draft.value.kind === "survey" ? <SiteFields /> : null}
         {draft.value.kind === "search" ? <SearchFields /> : null}
         <VehicleFields />
@@ -182,11 +200,6 @@ export function NewMissionForm() {
           </div>
           <FileButton
             accept=".tid,.txt"
-        {draft.value.kind === "search" && draft.value.blocks.length > 0 ? (
-          <p class="hint" role="status" data-testid="blocks-left-out">
-            {say("blocks.leftOut", { others: draft.value.blocks.length })}
-          </p>
-        ) : null}
             id="tide-file"
             onText={(name, text) => set({ tide_table: text, tide_source: name })}
           >
@@ -204,7 +217,7 @@ export function NewMissionForm() {
         <button
           type="submit"
           class="command primary wide"
-          disabled={sending.value}
+          disabled={sending.value !== null}
           data-testid="create-mission"
         >
           {sending.value
@@ -216,6 +229,34 @@ export function NewMissionForm() {
         <Keeping draft={draft.value} />
       </form>
     </Form.Provider>
+  );
+}
+
+/** Leaves the form; what was typed is lost only after a second click. */
+function Cancel(of: { isChanged: () => boolean; isSaving: boolean; onCancel: () => void }) {
+  const asked = useSignal(false);
+  if (!asked.value)
+    return (
+      <Button
+        id="cancel-mission"
+        disabled={of.isSaving}
+        onClick={() => {
+          if (of.isChanged()) asked.value = true;
+          else of.onCancel();
+        }}
+      >
+        {say("mission.cancel")}
+      </Button>
+    );
+  return (
+    <>
+      <Button id="discard-mission" disabled={of.isSaving} onClick={of.onCancel}>
+        {say("mission.discard")}
+      </Button>
+      <Button id="keep-describing" onClick={sets(asked, false)}>
+        {say("mission.goOn")}
+      </Button>
+    </>
   );
 }
 
