@@ -111,7 +111,7 @@ export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_ou
     Schemas["SearchSpec"],
     "goal" | "goal_radius_m" | "entry" | "window_s" | "safety_m" | "scanner" | "obstacles"
   >;
-  tide?: { level_m: number; source: string };
+  tide?: Partial<Schemas["Tide"]>;
   recovery?: { point: LngLat } & Partial<Schemas["Recovery"]>;
 };
 

@@ -62,6 +62,31 @@ describe("an area from a file", () => {
   });
 });
 
+describe("a file that is not as it should be", () => {
+  it.each([
+    ['{"type":"Polygon","coordinates":null}', "holds no polygon"],
+    ['{"type":"Polygon","coordinates":[null]}', "holds no polygon"],
+    ['{"type":"Polygon","coordinates":[[null,[1,2],[2,2]]]}', "has no numbers"],
+    ['{"type":"LineString"}', "holds no polygon"],
+    ['{"type":"FeatureCollection","features":{}}', "holds no polygon"],
+    ['{"type":"MultiPolygon","coordinates":[5]}', "holds no polygon"],
+  ])("%s is judged in the page's own words", (text, words) => {
+    expect(() => areasIn("bay.geojson", text)).toThrow(words);
+  });
+
+  it("is told that metres are no degrees", () => {
+    const ring = [
+      [524000, 4559000],
+      [524100, 4559000],
+      [524100, 4559100],
+      [524000, 4559000],
+    ];
+    expect(() => areasIn("utm.geojson", JSON.stringify({ type: "Polygon", coordinates: [ring] }))).toThrow(
+      "utm.geojson: a corner is at 524000, 4559000, which is no longitude and latitude",
+    );
+  });
+});
+
 it("ways are measured on the ellipsoid", () => {
   const [sw, se, ne] = square as [LngLat, LngLat, LngLat];
   expect(wayBetween(sw, se)).toMatchObject({

@@ -97,7 +97,11 @@ export interface FoundAreas {
  */
 export function areasIn(name: string, text: string): FoundAreas {
   const json = /\.kml$/i.test(name) || text.trimStart().startsWith("<") ? fromKml(text) : parsed(text);
-  const polygons = polygonsOf(json);
+  const polygons = polygonsOf(json).filter(({ ring }) => ring.length > 0);
+  inDegrees(
+    name,
+    polygons.map(({ ring }) => ring),
+  );
   const [first] = polygons;
   if (!first) throw new Error(say("area.holdsNoPolygonAnAreaIs", { name }));
   const largest = polygons.reduce((a, b) => (sizeOf(b.ring).area_m2 > sizeOf(a.ring).area_m2 ? b : a), first);
@@ -162,40 +166,45 @@ function polygonsOf(value: unknown, keepOut = false): Found[] {
   const { type, features, geometries, geometry, coordinates, properties } = value as Record<string, unknown>;
   switch (type) {
     case "FeatureCollection":
-      return (features as unknown[]).flatMap((one) => polygonsOf(one));
+      return listIn(features).flatMap((one) => polygonsOf(one));
     case "GeometryCollection":
-      return (geometries as unknown[]).flatMap((one) => polygonsOf(one, keepOut));
+      return listIn(geometries).flatMap((one) => polygonsOf(one, keepOut));
     case "Feature": {
       const words = Object.values((properties as Record<string, unknown>) ?? {}).join(" ");
       return polygonsOf(geometry, /keep[\s_-]?out|exclu|forbidden|no[\s_-]?go/i.test(words));
     }
     case "Polygon":
-      return (coordinates as unknown[][]).map((ring, i) => ({
+      return listIn(coordinates).map((ring, i) => ({
         ring: cleaned(ring),
         keepOut: keepOut || i > 0,
       }));
     case "MultiPolygon":
-      return (coordinates as unknown[][][]).flatMap((one) =>
-        polygonsOf({ type: "Polygon", coordinates: one }, keepOut),
-      );
+      return listIn(coordinates).flatMap((one) => polygonsOf({ type: "Polygon", coordinates: one }, keepOut));
     case "LineString": {
       // A closed line is what many chart plotters write for an area.
-      const ring = coordinates as number[][];
-      const [a, b] = [ring[0], ring.at(-1)];
-      const closed = ring.length > 3 && a && b && a[0] === b[0] && a[1] === b[1];
-      return closed ? [{ ring: cleaned(ring), keepOut }] : [];
+      const ring = cleaned(coordinates);
+      return ring.length > 2 && ring.length < listIn(coordinates).length ? [{ ring, keepOut }] : [];
     }
     default:
       return [];
   }
 }
 
-function cleaned(ring: readonly unknown[]): LngLat[] {
-  const corners = ring.map((position) => {
-    const [lng, lat] = position as number[];
+const listIn = (value: unknown): unknown[] => (Array.isArray(value) ? value : []);
+
+/** A ring as a file has it, without its closing corner. */
+function cleaned(ring: unknown): LngLat[] {
+  const corners = listIn(ring).map((position) => {
+    const [lng, lat] = listIn(position);
     if (typeof lng !== "number" || typeof lat !== "number") throw new Error(say("area.aCornerOfTheFileHas"));
     return [lng, lat] as LngLat;
   });
   const [a, b] = [corners[0], corners.at(-1)];
   return a && b && corners.length > 1 && a[0] === b[0] && a[1] === b[1] ? corners.slice(0, -1) : corners;
+}
+
+/** Refuses rings that no map can show: of metres, as in UTM. */
+export function inDegrees(name: string, rings: readonly (readonly LngLat[])[]): void {
+  const off = rings.flat().find(([lng, lat]) => !(Math.abs(lng) <= 180 && Math.abs(lat) <= 90));
+  if (off) throw new Error(say("area.isNotInDegrees", { name, x: off[0], y: off[1] }));
 }

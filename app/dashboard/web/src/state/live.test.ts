@@ -87,6 +87,8 @@ const mission = (id: string): MissionView =>
     state: "running",
     vehicles: [vehicle("a", 1, 1)],
     waypoints: [waypoint("a", 3, "sent")],
+    spec: { budget: { minutes: 60 }, steps: 360 },
+    progress: { budget: { minutes: 60 }, steps: 360 },
   }) as MissionView;
 
 const snapshot = (id: string): LiveMessage => ({
@@ -159,6 +161,14 @@ describe("live messages", () => {
     expect(view.mission?.state).toBe("paused");
     expect(view.mission?.vehicles).toHaveLength(1);
     expect(view.progressAt).toBe(5000);
+  });
+
+  it("change the mission's length in what it is to do, too", () => {
+    const longer = mission("m");
+    longer.progress.budget.minutes = 80;
+    longer.progress.steps = 480;
+    const view = reduce(started, { type: "mission", mission: longer }, 5000);
+    expect(view.mission?.spec).toEqual({ budget: { minutes: 80 }, steps: 480 });
   });
 
   it("keep a long track within bounds and its newest point exact", () => {

@@ -409,12 +409,13 @@ export async function send<T>(what: string, answer: Promise<T>, inDialog = false
 }
 
 /**
- * Creates missions that follow each other, all or none, and shows the first; `complete` gives each what its description
- * does not hold. Returns their ids.
+ * Creates missions that follow each other, all or none, also where that is withdrawn, and shows the first; `complete` gives
+ * each what its description does not hold. Returns their ids.
  */
 export async function createMissions(
   described: readonly NewMission[],
   complete: (id: string) => Promise<unknown> = async () => undefined,
+  withdrawn?: AbortSignal,
 ): Promise<string[]> {
   const ids: string[] = [];
   try {
@@ -422,6 +423,7 @@ export async function createMissions(
       const created: MissionView = await api.create({ ...mission, after: ids.at(-1) ?? null });
       ids.push(created.id);
       await complete(created.id);
+      withdrawn?.throwIfAborted();
     }
   } catch (error) {
     await Promise.allSettled(ids.map(api.deleteMission));

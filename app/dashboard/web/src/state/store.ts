@@ -245,7 +245,7 @@ export const planned = signal<{ plans: readonly PlanView[]; fresh: number } | nu
 /** A place that is to be clicked on the map next. */
 export const picking = signal<{ what: string; onPicked: (at: LngLat) => void } | null>(null);
 export const draftShapes = signal<DraftShapes | null>(null);
-export type Drawing = { shape: "polygon" | "rectangle"; onDrawn: (ring: LngLat[]) => void };
+export type Drawing = { what: string; shape: "polygon" | "rectangle"; onDrawn: (ring: LngLat[]) => void };
 export const drawing = signal<Drawing | null>(null);
 /** Corners that can be dragged; told of every change. */
 export type Editing = { ring: readonly LngLat[]; onChanged: (ring: LngLat[]) => void };

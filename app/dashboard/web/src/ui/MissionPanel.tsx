@@ -1,5 +1,6 @@
 import "./MissionPanel.css";
 import { useSignal } from "@preact/signals";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import type { MissionSummary, NewMission } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { fileNameOf, missionFile } from "../state/form/missionFile";
@@ -33,8 +34,17 @@ import { saveText } from "./parts/download";
 import { Grip } from "./parts/Grip";
 
 export function MissionPanel() {
+  const panel = useRef<HTMLElement>(null);
+  const wasDescribing = useRef(false);
+  // What had the focus goes when the form comes, and with the form: it is on the heading of what is there instead.
+  useLayoutEffect(() => {
+    const isOther = describing.value || wasDescribing.current;
+    wasDescribing.current = describing.value;
+    if (isOther) panel.current?.querySelector("h2")?.focus({ preventScroll: true });
+  }, [describing.value]);
   return (
     <aside
+      ref={panel}
       class="panel missions"
       id="missions"
       aria-label={say("missions.missions")}
@@ -59,7 +69,7 @@ function MissionList() {
   return (
     <>
       <header class="panel-head">
-        <h2>{say("missions.missions")}</h2>
+        <h2 tabIndex={-1}>{say("missions.missions")}</h2>
         <Button id="open-fleet" onClick={sets(fleetOpen, true)}>
           {say("fleet.fleet")}
         </Button>

@@ -8,6 +8,10 @@ export const PLANNING = {
     en: "One mission for each, flown in this order by the same vehicles: each begins by itself when the one before was flown to its end. The fields above describe the one that is marked.",
     pt: "Uma missão por bloco, por esta ordem e com os mesmos veículos: cada uma começa sozinha quando a anterior foi percorrida até ao fim. Os campos acima descrevem o bloco marcado.",
   },
+  "blocks.leftOut": {
+    en: "A search has one area: {others} more {others|block is|blocks are} left out.",
+    pt: "Uma busca tem uma só área: mais {others} {others|bloco fica|blocos ficam} de fora.",
+  },
   "blocks.describe": { en: "{i}: describe {name}", pt: "{i}: descrever {name}" },
   "blocks.nameOf": { en: "Name of block {i}", pt: "Nome do bloco {i}" },
   "blocks.ha": { en: "{area} ha", pt: "{area} ha" },
@@ -92,6 +96,14 @@ export const PLANNING = {
   "area.moreAreaLiesApartAndIs": {
     en: ". {others} more {others|area lies|areas lie} apart and {others|is|are} left out: a mission has one",
     pt: ". Mais {others} {others|área fica|áreas ficam} à parte e de fora: uma missão tem uma",
+  },
+  "area.zonesStay": {
+    en: ". {stay} keep-out {stay|zone that was there stays|zones that were there stay}",
+    pt: ". {stay} {stay|zona interdita que já havia mantém-se|zonas interditas que já havia mantêm-se}",
+  },
+  "area.isNotInDegrees": {
+    en: "{name}: a corner is at {x}, {y}, which is no longitude and latitude in degrees: save it in WGS 84 (EPSG:4326), not in metres of a map's grid",
+    pt: "{name}: um canto está em {x}, {y}, o que não é longitude e latitude em graus: grave-o em WGS 84 (EPSG:4326), não em metros da quadrícula de um mapa",
   },
   "area.areaOfCorners": {
     en: "{name}: area of {ring} corners{zones}{apart}",
@@ -272,6 +284,8 @@ export const PLANNING = {
   "mission.editAMission": { en: "Edit a mission", pt: "Editar uma missão" },
   "mission.newMission": { en: "New mission", pt: "Nova missão" },
   "mission.cancel": { en: "Cancel", pt: "Cancelar" },
+  "mission.discard": { en: "Discard what was typed", pt: "Descartar o que foi escrito" },
+  "mission.goOn": { en: "Go on", pt: "Continuar" },
   "mission.itKeepsItsNumber": {
     en: "It keeps its number and its log. One that was given depths or a tide table for its area is copied instead.",
     pt: "Mantém o seu número e o seu registo. Se recebeu profundidades ou uma tabela de marés para a sua área, é copiada.",
@@ -469,6 +483,10 @@ export const PLANNING = {
   "missionFile.isNoJsonAMissionS": {
     en: '{fileName} is no JSON: a mission\'s file comes from "Export"',
     pt: "{fileName} não é JSON: um ficheiro de missão vem de «Exportar»",
+  },
+  "missionFile.isBroken": {
+    en: "{fileName} cannot be read: a part of its mission is missing or of another kind than it has to be",
+    pt: "{fileName} não pode ser lido: falta uma parte da missão ou é de outro tipo do que devia",
   },
   "missionFile.holdsNoMissionItNeedsA": {
     en: "{fileName} holds no mission: it needs a name and an area",

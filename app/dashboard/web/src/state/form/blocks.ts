@@ -7,6 +7,10 @@ import { allBlocks, type Block, cornersOf, type Draft, toMission } from "./draft
 /** Between a typed rectangle and the next one, as a share of its width. */
 const GAP = 0.1;
 
+/** The areas that are flown: a search has one. */
+export const flownBlocks = (draft: Draft): Block[] =>
+  allBlocks(draft).filter((_, i) => draft.kind === "survey" || i === draft.turn);
+
 export const blockTitle = ({ name }: Pick<Block, "name">, i: number): string =>
   name.trim() || say("blocks.block", { i: i + 1 });
 
@@ -27,9 +31,9 @@ export function atBlock(draft: Draft, turn: number): Partial<Draft> {
 /** One block more, which is to be drawn; typed, it begins beside the last one. */
 export function withAnother(draft: Draft): Partial<Draft> {
   const all = allBlocks(draft);
-  const next = { blocks: all, turn: all.length, block_name: "" };
+  const next = { blocks: all, turn: all.length, block_name: "", ring: [] };
   const lngs = cornersOf(draft).map(([lng]) => lng);
-  if (draft.source === "drawn" || lngs.length === 0) return { ...next, source: "drawn", ring: [] };
+  if (draft.source === "drawn" || lngs.length === 0) return { ...next, source: "drawn" };
   const [west, east] = [Math.min(...lngs), Math.max(...lngs)];
   return { ...next, longitude: (east + GAP * (east - west)).toFixed(6) };
 }
@@ -66,8 +70,8 @@ export function renamed(draft: Draft, i: number, name: string): Partial<Draft> {
 
 /** What to send for each block of a draft without faults, in their order; only at the last one's end vehicles go home. */
 export function toMissions(draft: Draft): NewMission[] {
-  const all = allBlocks(draft);
-  if (all.length === 1 || draft.kind === "search") return [toMission(draft)];
+  const all = flownBlocks(draft);
+  if (all.length === 1) return [toMission(draft)];
   return all.map((block, i) => {
     const one = i === draft.turn ? draft : { ...draft, source: "drawn" as const, ring: block.ring };
     const made = toMission(one);

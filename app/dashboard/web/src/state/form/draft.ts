@@ -7,6 +7,7 @@ import { rectangle, wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
 import { placeOf, placeSample, typedPlace } from "../coordinates";
 import {
+  carriedOver,
   FIELDS,
   type Field,
   type FieldName,
@@ -86,6 +87,8 @@ export interface Draft extends Texts {
   chosen: readonly VehicleSpec[];
   /** By vehicle. */
   own: Readonly<Record<string, Own>>;
+  /** Names that vehicles are to have while others are still called so, by vehicle. */
+  wanted: Readonly<Record<string, string>>;
   /** What a mission that is copied has and the form does not show. */
   base: Partial<NewMission>;
 }
@@ -159,22 +162,28 @@ export function emptyDraft(middle: LngLat): Draft {
     names: "",
     chosen: [],
     own: {},
+    wanted: {},
     base: {},
   };
   return { ...draft, ...centred(draft, middle) };
 }
 
+/** Where the water level of a mission comes from that has none. */
+const NO_TIDE: string = SPEC["tide.source"].default;
+
 /** A draft of a mission like one that there is, its vehicles as they are described there. */
 export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
   const ring = ringOf(spec.area as NewMission["area"]);
-  const { tide, steps: _, after: _after, ...base } = spec;
-  const { search } = base;
+  const { steps: _, after: _after, ...base } = spec;
+  const { search, tide } = base;
   const places = search && {
     goal: typedPlace(search.goal as LngLat),
     entry: typedPlace(search.entry as LngLat),
     obstacles: search.obstacles.map((one) => ringOf(one as NewMission["area"])),
   };
   const texts = textsOf(spec, spec.kind);
+  // A level of nothing is a level where somebody stated it.
+  const isStated = texts.tide_m !== "" || (tide.source ?? NO_TIDE) !== NO_TIDE;
   return {
     ...emptyDraft(ring[0] ?? [0, 0]),
     ...texts,
@@ -186,9 +195,11 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     source: "drawn",
     ring,
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
-    tide_source: texts.tide_m === "" ? "" : tide.source,
-    planner: spec.planner.name,
-    options: optionTexts(spec.planner.options),
+    tide_m: isStated ? String(tide.level_m) : "",
+    tide_source: isStated ? tide.source : "",
+    ...(spec.kind === "survey"
+      ? { planner: spec.planner.name, options: optionTexts(spec.planner.options) }
+      : {}),
     recovery: spec.recovery ? typedPlace(spec.recovery.point as LngLat) : "",
     simulated: "0",
     chosen: spec.vehicles.map(
@@ -222,7 +233,9 @@ export function turnedInto(kind: MissionKind, draft: Draft): Partial<Draft> {
 
 /** Names of the simulated vehicles: those that were given, for the rest such as nobody else has. */
 export function simulatedNames(draft: Draft): string[] {
-  const wanted = Number(draft.simulated);
+  // As many as are asked for while a number is typed, but never more than a mission can have.
+  const asked = Number(draft.simulated);
+  const wanted = Number.isInteger(asked) ? Math.min(asked, SPEC.vehicles.maxItems) : 0;
   const given = draft.names
     .split(",")
     .map((name) => name.trim())
@@ -340,6 +353,9 @@ export function faultsOf(draft: Draft): Faults {
   if (draft.recovery.trim() !== "" && !placeOf(draft.recovery)) {
     faults.recovery = say("draft.pickTheRecoveryPointOnThe", { sample: placeSample() });
   }
+  // A table has its own source.
+  if (draft.tide_source.trim() !== "" && draft.tide_table === "")
+    note("tide_m", numberFault(FIELDS.tide_m.label, draft.tide_m, SPEC["tide.level_m"]));
   note("simulated", numberFault(say("vehicles.simulatedVehicles"), draft.simulated, VEHICLES));
   const cell_m = faults.cell_m ? 0 : Number(draft.cell_m);
   if (draft.source === "drawn" && draft.ring.length === 0) faults.ring = say("draft.drawTheAreaOrReadIt");
@@ -376,7 +392,10 @@ export function faultsOf(draft: Draft): Faults {
     faults.max_depth_m = say("draft.deepestTravelMustNotBeAbove");
   }
   if (!faults.simulated) {
-    const all = vehicleNames(draft);
+    const all = vehicleNames(draft).flatMap((name) => [
+      name,
+      ...(draft.wanted[name] ? [draft.wanted[name]] : []),
+    ]);
     const wrong = all.find((name) => !isVehicleName(name));
     if (wrong !== undefined)
       faults.names = say("draft.isNoNameOfAVehicle", {
@@ -454,13 +473,19 @@ export function toMission(described: Draft): NewMission {
   const draft = resolved(described);
   const area = areaOf(draft);
   if (!area) throw new Error("the draft has faults");
-  const { search, budget: _, recovery: before, site: _site, ...base } = draft.base;
+  const from = draft.base.kind ?? draft.kind;
+  const carried: Partial<NewMission> = carriedOver(draft.base, from, draft.kind);
+  const { search: _s, budget: _b, recovery: before, site: _site, tide, ...base } = carried;
   const point = placeOf(draft.recovery);
   const simulated = simulatedNames(draft).map(
     (name): VehicleSpec => ({ name, kind: "sim", sensor: draft.sensor }),
   );
-  const all = [...draft.chosen, ...simulated];
-  const vehicles = all.map((vehicle) => withOwn(vehicle, draft));
+  // At which depth they travel is another matter in a mission of the other kind.
+  const chosen =
+    from === draft.kind
+      ? draft.chosen
+      : draft.chosen.map(({ depth_m: _, ...vehicle }) => vehicle as VehicleSpec);
+  const vehicles = [...chosen, ...simulated].map((vehicle) => withOwn(vehicle, draft));
   const mission = {
     ...base,
     name: draft.name.trim(),
@@ -469,16 +494,23 @@ export function toMission(described: Draft): NewMission {
     keep_out: draft.keepOut.map(polygonOf),
     vehicles,
     ...(draft.kind === "survey" && draft.site ? { site: draft.site } : {}),
-    ...(draft.tide_m.trim()
-      ? { tide: { source: draft.tide_source.trim() || say("draft.statedByTheOperator") } }
-      : {}),
+    ...tideOf(draft, tide),
     ...(draft.kind === "search"
-      ? searchOf(draft, vehicles)
-      : { planner: { name: draft.planner, options: typedOptions(draft) } }),
+      ? searchOf({ ...draft, base: carried }, vehicles)
+      : { planner: { name: draft.planner, options: typedOptions({ ...draft, base: carried }) } }),
   };
   const { recovery, ...made } = withTexts(mission, draft, fieldsThatCount(draft));
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
   return { ...made, ...homing } as unknown as NewMission;
+}
+
+/** The level's source, and what the form does not show of the tide; the level itself is a plain field. */
+function tideOf({ tide_m, tide_source }: Draft, before: NewMission["tide"]): Pick<NewMission, "tide"> {
+  const { level_m: _l, source: _s, ...others } = before ?? {};
+  const isStated = tide_m.trim() !== "";
+  const source = isStated ? { source: tide_source.trim() || say("draft.statedByTheOperator") } : {};
+  const tide = { ...others, ...source };
+  return Object.keys(tide).length > 0 ? { tide } : {};
 }
 
 function withOwn(vehicle: VehicleSpec, draft: Draft): VehicleSpec {

@@ -114,6 +114,16 @@ it("fields that nobody touched take the defaults of the kind of mission", () => 
   expect({ ...search, ...turnedInto("survey", search) }.speed_mps).toBe("1.3");
 });
 
+it("a value in another unit is shown with few digits and keeps all of them", () => {
+  const search = draftWith({ window_min: "20" }, "search");
+  const made = toMission(search);
+  const spec = { ...made, search: { ...made.search, window_s: 1000 } } as NewMission;
+  const copy = copyOf(shown(spec));
+  expect(copy.window_min).toBe("16.6667");
+  expect(toMission(copy).search?.window_s).toBe(1000);
+  expect(toMission({ ...copy, window_min: "20" }).search?.window_s).toBe(1200);
+});
+
 /** Numbers in a source, also such as stand in texts. */
 function numbersIn(file: string): string[] {
   const source = ts.createSourceFile(file, readFileSync(file, "utf8"), ts.ScriptTarget.ESNext, true);
@@ -128,8 +138,8 @@ function numbersIn(file: string): string[] {
 }
 
 it.each([
-  // Seconds in a minute; without a factor: one.
-  ["state/form/missionFields.ts", ["60", "1"]],
+  // Seconds in a minute; without a factor: one; digits.
+  ["state/form/missionFields.ts", ["60", "1", "6"]],
   // Corners and digits of places; the size of the first rectangle and how many vehicles are simulated at first; seconds
   // in a minute, metres in a kilometre.
   ["state/form/draft.ts", ["1", "2", "3", "6", "60", "100", "1000"]],

@@ -485,8 +485,33 @@ export function fieldsOf(kind: MissionKind, length: LengthUnit, part?: Field["pa
 
 /** What a field begins with: what the service takes where nothing is said, or its example. */
 export function startOf(field: Field, kind: MissionKind): string {
-  const { default: usual, example, inSearch } = schemaOf(field);
-  return textOf(field, kind === "search" && inSearch !== undefined ? inSearch : (usual ?? example));
+  const schema = schemaOf(field);
+  return textOf(field, usualOf(schema, kind) ?? schema.example);
+}
+
+/** What the service takes in this kind of mission where nothing is said. */
+const usualOf = ({ default: usual, inSearch }: Schema, kind: MissionKind): unknown =>
+  kind === "search" && inSearch !== undefined ? inSearch : usual;
+
+/** What a mission of the other kind can give one of this kind: neither what only that one has nor its defaults. */
+export function carriedOver(mission: Tree, from: MissionKind, kind: MissionKind): Tree {
+  if (from === kind) return mission;
+  const fields: Field[] = Object.values(FIELDS);
+  const itsOwn = fields.filter((field) => field.kind === from).map(({ path }) => path);
+  const untouched = Object.entries<Schema>(SPEC).flatMap(([path, schema]) =>
+    schema.inSearch !== undefined && valueAt(mission, path.split(".")) === usualOf(schema, from)
+      ? [path]
+      : [],
+  );
+  const { search: _s, planner: _p, budget: _b, ...others } = mission;
+  return [...itsOwn, ...untouched].reduce((made, path) => without(made, path.split(".")), others as Tree);
+}
+
+function without(tree: Tree, [key = "", ...rest]: string[]): Tree {
+  const { [key]: inner, ...others } = tree;
+  if (inner === undefined || inner === null || rest.length === 0) return others;
+  const left = without(inner as Tree, rest);
+  return Object.keys(left).length > 0 ? { ...others, [key]: left } : others;
 }
 
 /** What all fields begin with. */
@@ -494,17 +519,21 @@ export function startTexts(kind: MissionKind): Texts {
   return textsWith((field) => startOf(field, kind));
 }
 
+/** Of values in other units than the service's. */
+const SHOWN_DIGITS = 6;
+
 /** A value of a mission as it is typed. */
 export function textOf(field: Field, value: unknown): string {
   if (value == null || (field.optional && value === schemaOf(field).default)) return "";
-  return String(typeof value === "number" ? value / (field.factor ?? 1) : value);
+  if (typeof value !== "number" || !field.factor) return String(value);
+  return String(Number((value / field.factor).toPrecision(SHOWN_DIGITS)));
 }
 
-/** The texts of a mission that there is; what it lacks begins as in a new one. */
+/** The texts of a mission that there is; what it lacks, and what its kind does not have, begins as in a new one. */
 export function textsOf(mission: unknown, kind: MissionKind): Texts {
   return textsWith((field) => {
     const value = valueAt(mission, field.path.split("."));
-    return value === undefined ? startOf(field, kind) : textOf(field, value);
+    return value === undefined || (field.kind ?? kind) !== kind ? startOf(field, kind) : textOf(field, value);
   });
 }
 
@@ -526,11 +555,14 @@ export type Tree = { [key: string]: unknown };
 export const valueAt = (tree: unknown, path: readonly string[]): unknown =>
   path.reduce((part, key) => (part as Tree | null | undefined)?.[key], tree);
 
-/** A mission with the values that were typed in these fields. */
+/** A mission with the values that were typed in these fields; one whose text is what it is shown as stays to all its digits. */
 export function withTexts(mission: Tree, texts: Texts, fields: readonly [FieldName, Field][]): Tree {
   return fields.reduce((made, [name, field]) => {
+    const path = field.path.split(".");
+    const now = valueAt(made, path);
     const value = typedValue(field, texts[name]);
-    return value === undefined ? made : put(made, field.path.split("."), value);
+    const stays = value === undefined || (now != null && textOf(field, now) === texts[name]);
+    return stays ? made : put(made, path, value);
   }, mission);
 }
 

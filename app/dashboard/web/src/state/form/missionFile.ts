@@ -2,9 +2,9 @@
 
 import SPEC from "../../api/mission.json";
 import type { MissionView, NewMission, PolygonGeometry } from "../../api/types";
-import { polygonOf, ringOf } from "../../map/area";
+import { inDegrees, polygonOf, ringOf } from "../../map/area";
 import { say } from "../../words/say";
-import { type Block, copyOf, type Draft } from "./draft";
+import { allBlocks, type Block, copyOf, type Draft } from "./draft";
 
 const FORMAT = "bathyfleet mission";
 
@@ -13,6 +13,8 @@ interface MissionFile {
   format: typeof FORMAT;
   mission: NewMission;
   tide_table?: string;
+  /** How far apart lines are to be, where the length is given by that. */
+  spacing_m?: number;
   /** Where there are several areas: all of them in their order. */
   blocks?: readonly { name: string; area: PolygonGeometry }[];
 }
@@ -21,6 +23,7 @@ export function missionFile(
   described: NewMission & { steps?: unknown },
   tide_table = "",
   blocks: readonly Block[] = [],
+  spacing_m = "",
 ): string {
   // As shown by the service it has its steps, which follow from its budget; sites and missions are known to it alone.
   const { steps: _, site: _site, after: _after, ...mission } = described;
@@ -28,6 +31,7 @@ export function missionFile(
     format: FORMAT,
     mission,
     ...(tide_table ? { tide_table } : {}),
+    ...(spacing_m ? { spacing_m: Number(spacing_m) } : {}),
     ...(blocks.length > 1
       ? { blocks: blocks.map(({ name, ring }) => ({ name, area: polygonOf(ring) })) }
       : {}),
@@ -50,15 +54,31 @@ export function draftIn(fileName: string, text: string): Draft {
   // What was posted to the service by hand is as good.
   const mission = content?.format === FORMAT ? content.mission : (content as NewMission);
   const ring = mission?.area?.coordinates?.[0];
-  if (!mission?.name || !Array.isArray(ring) || ring.length < 4) {
+  if (!mission?.name || typeof mission.name !== "string" || !Array.isArray(ring) || ring.length < 4) {
     throw new Error(say("missionFile.holdsNoMissionItNeedsA", { fileName }));
   }
-  const [first, ...blocks] = (content.blocks ?? []).map(({ name, area }) => ({ name, ring: ringOf(area) }));
-  return {
-    ...draftOf(mission),
-    ...(content.tide_table ? { tide_table: content.tide_table } : {}),
-    ...(first ? { ring: first.ring, block_name: first.name, blocks } : {}),
-  };
+  try {
+    const [first, ...blocks] = (content.blocks ?? []).map(({ name, area }) => ({
+      name: String(name ?? ""),
+      ring: ringOf(area),
+    }));
+    const draft: Draft = {
+      ...draftOf(mission),
+      ...(content.tide_table ? { tide_table: content.tide_table } : {}),
+      ...(content.spacing_m ? { spacing_m: String(content.spacing_m) } : {}),
+      ...(first ? { ring: first.ring, block_name: first.name, blocks } : {}),
+    };
+    inDegrees(fileName, [
+      ...allBlocks(draft).map((block) => block.ring),
+      ...draft.keepOut,
+      ...draft.obstacles,
+    ]);
+    return draft;
+  } catch (error) {
+    // It stumbled over what is not as it has to be.
+    if (!(error instanceof TypeError)) throw error;
+    throw new Error(say("missionFile.isBroken", { fileName }));
+  }
 }
 
 /** The draft that a description gives, whose defaults are not said. */
@@ -79,23 +99,28 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
   return { ...copyOf(shown), name: mission.name };
 }
 
-/** What a template says of a mission elsewhere: everything but its name and its places. */
-export function withTemplate(template: NewMission, draft: Draft): Draft {
+/** What a template says of a mission elsewhere: everything but its name, its places and the day's water level. */
+export function withTemplate({ mission, spacing_m = "" }: Omit<Template, "name">, draft: Draft): Draft {
   const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
     draft;
-  const { blocks, turn, block_name, floor_depth_m } = draft;
-  const { own, ...settings } = draftOf(template);
+  const { blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table } = draft;
+  const { own, base, ...settings } = draftOf(mission);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
+  const { sd_m: _, ...tide } = base.tide ?? {};
   return {
     ...settings,
     own: Object.fromEntries(placeless),
+    base: { ...base, tide },
+    spacing_m,
     obstacles: [],
     ...{ name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery },
-    ...{ blocks, turn, block_name, floor_depth_m },
+    ...{ blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table },
   };
 }
 
 export interface Template {
   name: string;
   mission: NewMission;
+  /** How far apart lines are to be, where the length is given by that. */
+  spacing_m?: string;
 }

@@ -23,6 +23,7 @@ export function pickPlaceFor(name: string): void {
 /** Lets an area be drawn that is to be surveyed denser. */
 export function drawDenser(): void {
   drawing.value = {
+    what: "denser",
     shape: "polygon",
     onDrawn: (ring) => {
       denserRing.value = ring;

@@ -5,6 +5,7 @@ import type { LngLat } from "../../api/types";
 import { areasIn, sizeOf } from "../../map/area";
 import { withAreas } from "../../state/form/blocks";
 import { centred, cornersOf } from "../../state/form/draft";
+import { asTyped, withRings } from "../../state/form/places";
 import { distance, fixed } from "../../state/format";
 import {
   type Drawing,
@@ -51,8 +52,9 @@ export function AreaFields() {
     },
     [],
   );
-  const begin = (shape: Drawing["shape"], onDrawn: (ring: LngLat[]) => void) => {
-    drawing.value = { shape, onDrawn };
+  /** Another click on what is being drawn ends that. */
+  const begin = (what: string, shape: Drawing["shape"], onDrawn: (ring: LngLat[]) => void) => {
+    drawing.value = drawing.value?.what === what ? null : { what, shape, onDrawn };
   };
   const take = (ring: LngLat[]) => {
     note.value = "";
@@ -62,8 +64,12 @@ export function AreaFields() {
   const read = (name: string, text: string) => {
     try {
       const found = areasIn(name, text);
-      set({ source: "drawn", ring: found.area, keepOut: [...draft.keepOut, ...found.keepOut] });
-      note.value = found.note;
+      set(({ keepOut }) => {
+        const zones = withRings(keepOut, found.keepOut);
+        const stay = zones.length - found.keepOut.length;
+        note.value = found.note + (stay > 0 ? say("area.zonesStay", { stay }) : "");
+        return { source: "drawn", ring: found.area, keepOut: zones };
+      });
       others.value = found.others;
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
@@ -75,15 +81,15 @@ export function AreaFields() {
       <div class="draw-buttons">
         <Button
           id="draw-polygon"
-          aria-pressed={drawing.value?.shape === "polygon"}
-          onClick={() => begin("polygon", take)}
+          aria-pressed={drawing.value?.what === "corners"}
+          onClick={() => begin("corners", "polygon", take)}
         >
           {say("area.drawCorners")}
         </Button>
         <Button
           id="draw-rectangle"
-          aria-pressed={drawing.value?.shape === "rectangle"}
-          onClick={() => begin("rectangle", take)}
+          aria-pressed={drawing.value?.what === "rectangle"}
+          onClick={() => begin("rectangle", "rectangle", take)}
         >
           {say("area.drawRectangle")}
         </Button>
@@ -148,7 +154,7 @@ export function AreaFields() {
           </Button>
         </>
       ) : (
-        <Button kind="link-button" onClick={() => set({ source: "typed" })}>
+        <Button kind="link-button" onClick={() => set(asTyped)}>
           {say("area.typeARectangleInstead")}
         </Button>
       )}
@@ -167,7 +173,12 @@ export function AreaFields() {
         <Button
           id="draw-keep-out"
           kind="link-button"
-          onClick={() => begin("polygon", (ring) => set({ keepOut: [...draft.keepOut, ring] }))}
+          aria-pressed={drawing.value?.what === "zone"}
+          onClick={() =>
+            begin("zone", "polygon", (ring) =>
+              set(({ keepOut }) => ({ keepOut: withRings(keepOut, [ring]) })),
+            )
+          }
         >
           {say("area.keepOutZone")}
         </Button>
@@ -177,7 +188,7 @@ export function AreaFields() {
             <Button
               kind="tool small"
               aria-label={say("area.removeKeepOutZone", { i: i + 1 })}
-              onClick={() => set({ keepOut: draft.keepOut.filter((_, k) => k !== i) })}
+              onClick={() => set(({ keepOut }) => ({ keepOut: keepOut.filter((one) => one !== zone) }))}
             >
               ✕
             </Button>

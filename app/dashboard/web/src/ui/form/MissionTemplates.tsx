@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
-import type { NewMission } from "../../api/types";
 import { kept } from "../../persistentSignal";
-import { allBlocks, type Draft, faultsOf, toMission, turnedInto, withSensor } from "../../state/form/draft";
+import { flownBlocks } from "../../state/form/blocks";
+import { type Draft, faultsOf, toMission, turnedInto, withSensor } from "../../state/form/draft";
 import { draftIn, fileNameOf, missionFile, type Template, withTemplate } from "../../state/form/missionFile";
 import { withPlanner } from "../../state/form/plannerOptions";
 import { type Key, say } from "../../words/say";
@@ -33,7 +33,7 @@ export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (d
   const choose = (name: string) => {
     const own = templates.value.find((one) => one.name === name);
     const builtIn = BUILT_IN[name as Key];
-    if (own) onBegin(withTemplate(own.mission, draft));
+    if (own) onBegin(withTemplate(own, draft));
     else if (builtIn) {
       onBegin({
         ...draft,
@@ -71,7 +71,6 @@ export function MissionTemplates({ draft, onBegin }: { draft: Draft; onBegin: (d
 export function Keeping({ draft }: { draft: Draft }) {
   const whole = Object.keys(faultsOf(draft)).length === 0;
   const why = whole ? "" : say("beginnings.onlyADescriptionWithout");
-  const described = (): NewMission => toMission(draft);
   const mine = templates.value.find(({ name }) => name === draft.name.trim());
   return (
     <div class="keeping">
@@ -80,7 +79,10 @@ export function Keeping({ draft }: { draft: Draft }) {
         disabled={!whole}
         title={why}
         onClick={() =>
-          saveText(fileNameOf(draft.name), missionFile(described(), draft.tide_table, allBlocks(draft)))
+          saveText(
+            fileNameOf(draft.name),
+            missionFile(toMission(draft), draft.tide_table, flownBlocks(draft), draft.spacing_m.trim()),
+          )
         }
       >
         {say("beginnings.export")}
@@ -91,7 +93,8 @@ export function Keeping({ draft }: { draft: Draft }) {
         title={why || say("beginnings.keepsAllButThePlacesOn")}
         onClick={() => {
           const others = templates.value.filter((one) => one !== mine);
-          templates.value = [...others, { name: draft.name.trim(), mission: described() }];
+          const spacing_m = draft.spacing_m.trim();
+          templates.value = [...others, { name: draft.name.trim(), mission: toMission(draft), spacing_m }];
         }}
       >
         {mine ? say("beginnings.renewTheTemplate") : say("beginnings.keepAsTemplate")}

@@ -8,7 +8,7 @@ import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
 import { recoveryMarks } from "../../map/marks/recovery";
 import { placeOf } from "../../state/coordinates";
-import { blockTitle, toMissions } from "../../state/form/blocks";
+import { blockTitle, flownBlocks, toMissions } from "../../state/form/blocks";
 import {
   allBlocks,
   copyOf,
@@ -35,7 +35,7 @@ import {
   picking,
 } from "../../state/store";
 import { say } from "../../words/say";
-import { Button, FileButton, into, useEscape } from "../parts/Controls";
+import { Button, FileButton, into, sets, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
 import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
@@ -56,9 +56,10 @@ export function NewMissionForm() {
         ? copyOf(original)
         : emptyDraft(mapCentre.peek()),
   );
+  const begun = useRef(JSON.stringify(draft.peek()));
+  const isChanged = () => JSON.stringify(draft.peek()) !== begun.current;
   const faults = useSignal<Faults>({});
   const refused = useSignal<ServiceError | null>(null);
-  const sending = useSignal(false);
   const planners = useSignal<readonly PlannerView[]>([]);
   const plannersFault = useSignal("");
   useEffect(() => {
@@ -66,6 +67,8 @@ export function NewMissionForm() {
       plannersFault.value = said(error);
     });
   }, []);
+  /** What is sent can be withdrawn until it has arrived; null: nothing is. */
+  const sending = useSignal<AbortController | null>(null);
   const form = useRef<HTMLFormElement>(null);
   /** How often it was sent and not taken. */
   const faulty = useSignal(0);
@@ -81,7 +84,7 @@ export function NewMissionForm() {
 
   useSignalEffect(() => {
     draftShapes.value = {
-      areas: allBlocks(draft.value)
+      areas: flownBlocks(draft.value)
         .filter(({ ring }) => ring.length > 2)
         .map(({ ring }) => polygonOf(ring)),
       keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
@@ -90,14 +93,19 @@ export function NewMissionForm() {
   });
   useEscape(drawing);
   useEscape(picking);
-  useEffect(
-    () => () => {
+  useEffect(() => {
+    const ask = (event: BeforeUnloadEvent) => {
+      if (isChanged()) event.preventDefault();
+    };
+    window.addEventListener("beforeunload", ask);
+    return () => {
+      window.removeEventListener("beforeunload", ask);
       draftShapes.value = null;
-    },
-    [],
-  );
+    };
+  }, []);
 
   const close = () => {
+    sending.peek()?.abort();
     describing.value = false;
     copied.value = null;
     editedMission.value = null;
@@ -113,22 +121,25 @@ export function NewMissionForm() {
     draft.value = { ...draft.value, ...change };
     refused.value = null;
     const found = faultsOf(draft.value);
-    // What was drawn is judged at once, typed fields only after the first try.
+    // What was drawn, and vehicles' names, are judged at once, other fields only after the first try.
     if (Object.keys(faults.value).length > 0) faults.value = found;
-    else if (change.ring || change.keepOut) {
-      const { ring, keepOut } = found;
-      faults.value = { ...(ring ? { ring } : {}), ...(keepOut ? { keepOut } : {}) };
+    else if (change.ring || change.keepOut || change.wanted) {
+      const { ring, keepOut, names } = found;
+      const atOnce = Object.entries({ ring, keepOut, names }).filter(([, fault]) => fault);
+      faults.value = Object.fromEntries(atOnce);
     }
   };
   const submit = async (event: SubmitEvent) => {
     event.preventDefault();
+    if (sending.peek()) return;
     faults.value = faultsOf(draft.value);
     refused.value = null;
     if (Object.keys(faults.value).length > 0) {
       faulty.value += 1;
       return;
     }
-    sending.value = true;
+    const sent = new AbortController();
+    sending.value = sent;
     try {
       const { tide_table: table, tide_source, floor_depth_m } = draft.value;
       const source = tide_source || say("mission.tideTable");
@@ -141,11 +152,12 @@ export function NewMissionForm() {
         await withTide(edited.id);
         floorDepth.value = floor_depth_m;
       } else {
-        const made = await createMissions(toMissions(draft.value), withTide);
+        const made = await createMissions(toMissions(draft.value), withTide, sent.signal);
         for (const id of made) describedDepths.set(id, floor_depth_m);
       }
-      close();
+      if (!sent.signal.aborted) close();
     } catch (error) {
+      if (sent.signal.aborted) return;
       if (!(error instanceof ServiceError)) throw error;
       refused.value = error;
       for (const { field, message, expected } of error.faults) {
@@ -154,28 +166,30 @@ export function NewMissionForm() {
       }
       faulty.value += 1;
     } finally {
-      sending.value = false;
+      sending.value = null;
     }
   };
   return (
     <Form.Provider value={{ draft: draft.value, faults: faults.value, planners: planners.value, set }}>
+      <header class="panel-head">
+        <h2 tabIndex={-1}>
+          {edited
+            ? say("mission.editAMission")
+            : original
+              ? say("missions.sameAgain")
+              : say("mission.newMission")}
+        </h2>
+        <Cancel isChanged={isChanged} isSaving={edited !== null && sending.value !== null} onCancel={close} />
+      </header>
       <form
         ref={form}
         class="new-mission"
+        // What is being sent stays as it is.
+        inert={sending.value !== null}
         onSubmit={(event) => void submit(event)}
         noValidate
         data-testid="mission-form"
       >
-        <header class="panel-head">
-          <h2>
-            {edited
-              ? say("mission.editAMission")
-              : original
-                ? say("missions.sameAgain")
-                : say("mission.newMission")}
-          </h2>
-          <Button onClick={close}>{say("mission.cancel")}</Button>
-        </header>
         {edited ? (
           <p class="hint">{say("mission.itKeepsItsNumber")}</p>
         ) : (
@@ -186,6 +200,11 @@ export function NewMissionForm() {
         {draft.value.kind === "survey" ? <SurveyFields /> : null}
         <AreaFields />
         {draft.value.kind === "survey" && !edited ? <BlockFields /> : null}
+        {draft.value.kind === "search" && draft.value.blocks.length > 0 ? (
+          <p class="hint" role="status" data-testid="blocks-left-out">
+            {say("blocks.leftOut", { others: draft.value.blocks.length })}
+          </p>
+        ) : null}
         {draft.value.kind === "survey" ? <SiteFields /> : null}
         {draft.value.kind === "search" ? <SearchFields /> : null}
         <VehicleFields />
@@ -226,7 +245,7 @@ export function NewMissionForm() {
         <button
           type="submit"
           class="command primary wide"
-          disabled={sending.value}
+          disabled={sending.value !== null}
           data-testid="create-mission"
         >
           {sending.value
@@ -247,6 +266,34 @@ function unplacedIn(form: HTMLFormElement, faults: Faults): FaultKey[] {
     [...form.querySelectorAll<HTMLElement>("[data-testid^='fault-']")].map(({ dataset }) => dataset.testid),
   );
   return (Object.keys(faults) as FaultKey[]).filter((field) => !placed.has(`fault-${field}`));
+}
+
+/** Leaves the form; what was typed is lost only after a second click. */
+function Cancel(of: { isChanged: () => boolean; isSaving: boolean; onCancel: () => void }) {
+  const asked = useSignal(false);
+  if (!asked.value)
+    return (
+      <Button
+        id="cancel-mission"
+        disabled={of.isSaving}
+        onClick={() => {
+          if (of.isChanged()) asked.value = true;
+          else of.onCancel();
+        }}
+      >
+        {say("mission.cancel")}
+      </Button>
+    );
+  return (
+    <>
+      <Button id="discard-mission" disabled={of.isSaving} onClick={of.onCancel}>
+        {say("mission.discard")}
+      </Button>
+      <Button id="keep-describing" onClick={sets(asked, false)}>
+        {say("mission.goOn")}
+      </Button>
+    </>
+  );
 }
 
 /** Brings the first fault into sight, whatever it is folded into: the form is longer than the window. */

@@ -1,5 +1,6 @@
 import { useSignal } from "@preact/signals";
 import { areasIn } from "../../map/area";
+import { withRings } from "../../state/form/places";
 import { say } from "../../words/say";
 import { Button, FileButton, Hint } from "../parts/Controls";
 import { Fault, Part, PlaceField, useForm } from "./Fields";
@@ -12,7 +13,7 @@ export function SearchFields() {
     try {
       const { area, keepOut, others } = areasIn(name, text);
       const obstacles = [area, ...keepOut, ...others];
-      set({ obstacles: [...draft.obstacles, ...obstacles] });
+      set((now) => ({ obstacles: withRings(now.obstacles, obstacles) }));
       note.value = say("search.obstacle", { name, obstacles: obstacles.length });
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);

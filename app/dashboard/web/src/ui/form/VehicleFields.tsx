@@ -1,6 +1,7 @@
 import type { Sensor, VehicleSpec, VehicleView } from "../../api/types";
 import { type Own, ownKey, sensorOf, simulatedNames, vehicleNames } from "../../state/form/draft";
 import { SENSORS, schemaOf, vehicleFieldsOf } from "../../state/form/missionFields";
+import { withVehicleCalled } from "../../state/form/vehicles";
 import { pointed } from "../../state/format";
 import { batteryWords, vehicleState } from "../../state/stateNames";
 import { fleet } from "../../state/store";
@@ -37,38 +38,42 @@ export function VehicleFields() {
 
 /** Each simulated vehicle's name, to be changed. */
 function SimulatedNames() {
-  const { draft, set } = useForm();
-  const names = simulatedNames(draft);
-  const rename = (index: number, name: string) => {
-    const before = names[index] ?? "";
-    const clean = name.replaceAll(",", " ").trim();
-    set(({ own }) => {
-      const { [before]: its, ...others } = own;
-      return {
-        names: names.map((one, i) => (i === index ? clean : one)).join(", "),
-        own: its ? { ...others, [clean]: its } : others,
-      };
-    });
-  };
+  const { draft } = useForm();
   return (
     <div class="pair names">
-      {names.map((name, i) => (
+      {simulatedNames(draft).map((_, i) => (
         // The place in the list is what stays while a name is typed.
-        <input
+        <VehicleName
           key={i}
-          type="text"
-          autocomplete="off"
-          aria-label={say("vehicles.nameOfSimulatedVehicle", { i: i + 1 })}
-          value={name}
-          data-testid={`sim-name-${i + 1}`}
-          onChange={(event) => {
-            if (event.currentTarget.value.trim()) rename(i, event.currentTarget.value);
-            else event.currentTarget.value = name;
-          }}
+          place={draft.chosen.length + i}
+          id={`sim-name-${i + 1}`}
+          label={say("vehicles.nameOfSimulatedVehicle", { i: i + 1 })}
         />
       ))}
       <Fault field="names" />
     </div>
+  );
+}
+
+/** What the vehicle at this place is called; it is called otherwise when the whole name was typed. */
+function VehicleName({ place, id, label }: { place: number; id: string; label: string }) {
+  const { draft, set } = useForm();
+  const name = vehicleNames(draft)[place] ?? "";
+  const shown = draft.wanted[name] ?? name;
+  return (
+    <input
+      type="text"
+      autocomplete="off"
+      aria-label={label}
+      aria-invalid={shown === name ? "false" : "true"}
+      value={shown}
+      data-testid={id}
+      onChange={({ currentTarget }) => {
+        const typed = currentTarget.value.replaceAll(",", " ").trim();
+        if (typed) set((now) => withVehicleCalled(now, place, typed));
+        else currentTarget.value = shown;
+      }}
+    />
   );
 }
 
@@ -182,28 +187,18 @@ function FleetChoice() {
 /** A vehicle of the mission that is copied: it can be called otherwise, or left out. */
 function Described({ spec }: { spec: VehicleSpec }) {
   const { draft, set } = useForm();
-  const change = (next: VehicleSpec[]) =>
-    set({
-      chosen: draft.chosen.flatMap((one) => (one === spec ? next : [one])),
-      own: {
-        ...draft.own,
-        ...Object.fromEntries(next.map(({ name }) => [name, draft.own[spec.name] ?? {}])),
-      },
-    });
   return (
     <div class="chosen-vehicle field">
-      <input
-        type="text"
-        aria-label={say("vehicles.nameOf", { spec: spec.name })}
-        value={spec.name}
-        data-testid={`vehicle-${spec.name}`}
-        onInput={(event) => change([{ ...spec, name: event.currentTarget.value.trim() }])}
+      <VehicleName
+        place={draft.chosen.indexOf(spec)}
+        id={`vehicle-${spec.name}`}
+        label={say("vehicles.nameOf", { spec: spec.name })}
       />
       <small>{spec.kind === "imc" ? "IMC" : spec.kind}</small>
       <Button
         kind="tool small"
         aria-label={say("vehicles.leaveOut", { spec: spec.name })}
-        onClick={() => change([])}
+        onClick={() => set(({ chosen }) => ({ chosen: chosen.filter((one) => one !== spec) }))}
       >
         ✕
       </Button>
