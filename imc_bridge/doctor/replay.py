@@ -92,13 +92,14 @@ def replay(
     if not records:
         raise RecordingError(f"{path} holds no packet")
     console, imc_id = _console(records, settings)
+    plan_id = _plan_id(records, console)
     settings = settings.changed(
         id=imc_id,
         port=console[1],
         vehicles=(),
         state_events_per_s=1000.0,
         time_scale=_time_scale(records, console, settings),
-        plan_id=_plan_id(records, console) or settings.plan_id,
+        **({"plan_id": plan_id} if plan_id else {}),
     )
     now = records[0].time_s
     bridge = Bridge(settings, commanding=False, clock=lambda: now, wall_clock=lambda: now)
