@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import imcpy
@@ -14,7 +15,7 @@ from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, wit
 from imc_bridge.network.discovery import Announcement, read_announce
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.admission import Admission
-from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.nodes.vehicle_clock import Tick
@@ -86,8 +87,8 @@ class Receiver:
     ) -> None:
         self.decoder = Decoder(WANTED)
         self.announces = Decoder(("Announce",))
-        self.double = ""
-        """Names of other systems that announce our own id; usually empty."""
+        self._double = ""
+        self._double_at = -math.inf
         self._settings = settings
         self._registry = registry
         self._controls = controls
@@ -99,6 +100,12 @@ class Receiver:
         self._sender = sender
         self._state_reported: dict[int, float] = {}
         self.admission = Admission(settings, registry, clock)
+
+    @property
+    def double(self) -> str:
+        """Another system that announces our own id, while it does; usually empty."""
+        patience = ANNOUNCES_MISSED * self._settings.announce_period_s
+        return self._double if self._now() - self._double_at <= patience else ""
 
     def _now(self) -> float:
         return self._clock() * self._settings.time_scale
@@ -120,7 +127,9 @@ class Receiver:
             return
         announcement = read_announce(message)
         if announcement.imc_id == self._settings.id:
-            self._look_for_double(announcement, address)
+            if announcement.run != self._sender.run:
+                self._double, self._double_at = f"{announcement.name!r} at {address[0]}", self._now()
+                self._answer(self._double_at)
             return
         now = self._now()
         if not self._counts(announcement.imc_id, message.timestamp, address, now):
@@ -171,15 +180,6 @@ class Receiver:
         if self._registry.comes_from_elsewhere(imc_id, address[0], now):
             return self.admission.refuse(Refused.MOVED, address)
         return not self._registry.is_old(imc_id, timestamp, now) or self.admission.refuse(Refused.OLD, address)
-
-    def _look_for_double(self, announcement: Announcement, address: Address) -> None:
-        """Our own announces come back to us; those of another system under our id are trouble."""
-        ours = (*self._sender.transport.own_addresses(), address[0])
-        if announcement.name == self._settings.name and any(
-            host in ours and port == self._settings.port for host, port in announcement.addresses
-        ):
-            return
-        self.double = f"{announcement.name!r} at {address[0]}"
 
     def _reboot(self, node: Node, now: float) -> None:
         self._tell(Restarted(node.name, node.submerged))
