@@ -78,7 +78,10 @@ class Node:
         """Where its last announce, or without one its first packet, came from."""
         self.hosts: frozenset[str] = frozenset()
         """Where its announces may come from: the host of the last one that counted, and those it announced."""
-        self.conflict: str | None = None
+        self.id_conflict: str | None = None
+        """Which systems announce its id, when it is not this one alone."""
+        self.namesake: Node | None = None
+        """Another node that announces its name, while both are heard."""
         self.boots = 0
         """How often it has restarted."""
         self.started_at: float | None = None
@@ -141,6 +144,15 @@ class Node:
     def is_vehicle(self) -> bool:
         """Whether it announced itself as a vehicle, or without a type."""
         return self.announcement is None or self.announcement.is_vehicle
+
+    @property
+    def conflict(self) -> str | None:
+        """Why it is not certain who a command would reach; None when it is."""
+        if self.id_conflict is not None or self.namesake is None or self.announcement is None:
+            return self.id_conflict
+        ids = sorted((self.imc_id, self.namesake.imc_id))
+        both = " and ".join(f"id 0x{imc_id:04X}" for imc_id in ids)
+        return f"{both} announce one name, {self.announcement.name!r}: rename one of them"
 
     # Discovery
 

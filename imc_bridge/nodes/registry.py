@@ -192,7 +192,19 @@ class NodeRegistry:
         for imc_id, until in list(self._conflict_until.items()):
             if now > until:
                 del self._conflict_until[imc_id]
-                self._nodes[imc_id].conflict = None
+                self._nodes[imc_id].id_conflict = None
+        self._look_for_namesakes(now)
+
+    def _look_for_namesakes(self, now: float) -> None:
+        """Note who announces the name of another: after a restart of ours either could be called by it."""
+        named: dict[str, Node] = {}
+        for node in self._nodes.values():
+            node.namesake = None
+            if node.announcement is None or standing_of(node) is not Standing.HEARD or node.given_up(now):
+                continue
+            other = named.setdefault(node.announcement.name, node)
+            if other is not node:
+                node.namesake, other.namesake = other, node
 
     def _contested(self, node: Node, new: Announcement, now: float) -> bool:
         """Note which node claims the id; return whether a second one does, whose announce must not count.
@@ -212,12 +224,12 @@ class NodeRegistry:
         renamed = any(name != new.name for name, _ in rivals)
         if len(claims) < MAX_CLAIMS or mine in claims:
             claims[mine] = now
-        if known is None or not (returned or renamed or (rivals and node.conflict)):
+        if known is None or not (returned or renamed or (rivals and node.id_conflict)):
             return False
         self._conflict_until[node.imc_id] = now + patience
         names = sorted({known.name, new.name, *(name for name, _ in rivals)})
         others = ", ".join(f"{host}:{port}" for host, port in (*known.addresses[:2], *new.addresses[:2]))
-        node.conflict = (
+        node.id_conflict = (
             f"id 0x{node.imc_id:04X} is announced by {' and by '.join(map(repr, names))}: give one another id"
             if len(names) > 1
             else f"two nodes named {names[0]!r} announce id 0x{node.imc_id:04X} ({others}): stop one of them"

@@ -100,3 +100,28 @@ def test_a_service_that_never_led_a_vehicle_gives_way_to_another_under_its_id(*,
     assert (scene.sent_to(HERE, "Heartbeat") > 0) == leads
     scene.live(30.0, (0x1E, HERE))
     assert scene.sent_to(HERE, "Heartbeat") > 0
+
+
+@pytest.mark.parametrize("first", [0x1E, 0x1F])
+async def test_of_two_vehicles_with_one_name_neither_is_engaged(first: int) -> None:
+    scene = Scene()
+    hulls = {first: HERE, 0x1E + 0x1F - first: ("10.0.0.2", 6002)}
+    for imc_id, address in hulls.items():
+        scene.announce(imc_id, address)
+        scene.live(1.0, (imc_id, address))
+    for node in scene.bridge.nodes():
+        with pytest.raises(RefusedError, match="id 0x001E and id 0x001F announce one name, 'lauv-x': rename one"):
+            await scene.bridge.engage(node.name)
+    assert set(judge(scene.bridge, 1.0).causes) == {Cause.SAME_NAME_TWICE}
+    # One of them has gone.
+    scene.live(60.0, (first, HERE), announced=True)
+    assert [node.conflict for node in scene.bridge.nodes()] == [None, None]
+
+
+def test_a_name_that_is_announced_and_under_which_nothing_speaks_blocks_no_vehicle() -> None:
+    scene = Scene()
+    scene.announce()
+    scene.live(1.0, (0x1E, HERE))
+    scene.announce(0x1F, ("10.0.0.2", 6002))
+    scene.live(1.0, (0x1E, HERE))
+    assert [node.conflict for node in scene.bridge.nodes()] == [None, None]
