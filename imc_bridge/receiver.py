@@ -134,6 +134,7 @@ class Receiver:
         now = self._now()
         if not self._counts(announcement.imc_id, message.timestamp, address, now):
             self._registry.note_rival(announcement, now)
+            self._registry.note_move(announcement, address[0])
             if self._registry.may_be_another(announcement.imc_id):
                 self._greet(announcement, address, now)
             return
@@ -204,7 +205,7 @@ class Receiver:
         if header is None:
             return
         now = self._now()
-        node = self._registry.speaker(header.src, address) or self._newcomer(header.src, address, now)
+        node = self._registry.speaker(header.src, address) or self._newcomer(header, address, now)
         if node is None:
             self._pass_on(header, packet, address, now)
             return
@@ -226,8 +227,13 @@ class Receiver:
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(node, message, now, address)
 
-    def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
-        """The system that had no place when it announced itself and now sends, if it gets one."""
+    def _newcomer(self, header: Header, address: Address, now: float) -> Node | None:
+        """The system that had no place when it announced itself and now sends, if it gets one; or one that moved."""
+        imc_id = header.src
+        moved = self._registry.moved(imc_id, address, header.timestamp, now)
+        if moved is not None:
+            self._take_up(*moved, now)
+            return self._registry.speaker(imc_id, address)
         announcement = self._registry.newcomers.answered(imc_id, address)
         if announcement is None:
             return None

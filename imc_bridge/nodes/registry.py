@@ -13,6 +13,8 @@ from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
 from imc_bridge.settings import BridgeSettings
 
 MAX_CLAIMS = 8
+MOVED_SILENT_S = 5.0
+"""A vehicle that announces another address is believed when nothing came from the one before for this long."""
 
 Claim = tuple[str, str]
 """Name and uid (or addresses) that distinguish nodes of the same id."""
@@ -29,6 +31,15 @@ class Arrival:
     first: bool = False
     rebooted: bool = False
     stale: tuple[Address, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Move:
+    """Where a node may be now: its announce, the host of that, how long it must have been silent where it was."""
+
+    announcement: Announcement
+    host: str
+    silent_s: float
 
 
 class NodeRegistry:
@@ -57,6 +68,7 @@ class NodeRegistry:
         self.left: list[Callable[[Node], None]] = []
         self._by_address: dict[Address, Node] = {}
         self._claims: dict[int, dict[Claim, float]] = {}
+        self._moves: dict[int, _Move] = {}
         self._conflict_until: dict[int, float] = {}
 
     def __iter__(self) -> Iterator[Node]:
@@ -119,6 +131,7 @@ class NodeRegistry:
     def _drop(self, node: Node) -> None:
         del self._nodes[node.imc_id]
         self._claims.pop(node.imc_id, None)
+        self._moves.pop(node.imc_id, None)
         self._conflict_until.pop(node.imc_id, None)
         for address in node.addresses:
             if self._by_address.get(address) is node:
@@ -154,6 +167,29 @@ class NodeRegistry:
         node = self._nodes.get(imc_id)
         heard = node is not None and node.heard_at is not None and now - node.heard_at <= self._settings.lost_after_s
         return node is not None and heard and node.clock.is_old(timestamp)
+
+    def note_move(self, announcement: Announcement, host: str) -> None:
+        """Note that a node, by its uid the same that runs on, announces itself from another host, as after DHCP."""
+        node = self._nodes.get(announcement.imc_id)
+        known = node.announcement if node is not None else None
+        if known is not None and announcement.uid is not None and _claim(announcement) == _claim(known):
+            self._moves[announcement.imc_id] = _Move(announcement, host, MOVED_SILENT_S)
+
+    def moved(self, imc_id: int, address: Address, timestamp: float, now: float) -> tuple[Announcement, str] | None:
+        """The announce of a node that speaks on from another address, and its host; None while that is not certain.
+
+        Where it was before it may always return to: what came from elsewhere meanwhile was another system's.
+        """
+        node, move = self._nodes.get(imc_id), self._moves.get(imc_id)
+        if node is None or move is None or node.announcement is None or node.heard_at is None:
+            return None
+        settings = self._settings
+        silent_s = move.silent_s and max(move.silent_s, settings.lost_after_wall_s * settings.time_scale)
+        there = (*move.announcement.addresses, *move.announcement.streams)
+        if address not in there or now - node.heard_at < silent_s or not node.clock.goes_on(timestamp, now):
+            return None
+        self._moves[imc_id] = _Move(node.announcement, node.host, 0.0 if move.silent_s else MOVED_SILENT_S)
+        return move.announcement, move.host
 
     def note_rival(self, announcement: Announcement, now: float) -> None:
         """Note an announce that changes nothing: if it is another node's of the same id, that is for the operator."""

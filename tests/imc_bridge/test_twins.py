@@ -7,13 +7,14 @@ import imcpy
 import pytest
 
 from imc_bridge import Bridge, BridgeSettings, RefusedError
+from imc_bridge.control.control import Phase
 from imc_bridge.doctor.diagnosis import Cause
 from imc_bridge.doctor.doctor import judge
 from imc_bridge.network.discovery import own_announce
 from imc_bridge.network.transport import Address
 
 START_S = 1.7e9
-HERE = ("10.0.0.1", 6002)
+HERE, THERE = ("10.0.0.1", 6002), ("10.0.0.77", 6002)
 
 
 class Scene:
@@ -125,3 +126,46 @@ def test_a_name_that_is_announced_and_under_which_nothing_speaks_blocks_no_vehic
     scene.announce(0x1F, ("10.0.0.2", 6002))
     scene.live(1.0, (0x1E, HERE))
     assert [node.conflict for node in scene.bridge.nodes()] == [None, None]
+
+
+def test_a_vehicle_that_gets_another_address_is_led_on_there() -> None:
+    scene = Scene()
+    scene.announce()
+    scene.live(15.0, (0x1E, HERE), announced=True)
+    node = scene.bridge._registry[0x1E]
+    control = scene.bridge._controls.of(node)
+    assert control.engage(scene.now_s)
+    scene.live(1.0, (0x1E, HERE))
+    scene.plan = "bathyfleet-3F01"
+    scene.live(1.0, (0x1E, HERE))
+    assert control.phase is Phase.FOLLOWING
+    scene.live(11.0, (0x1E, THERE), announced=True)
+    assert node.address == THERE
+    assert control.engaged
+    scene.sent.clear()
+    scene.live(2.0, (0x1E, THERE))
+    assert scene.sent_to(THERE, "Heartbeat") >= 1
+    assert scene.sent_to(HERE, "Heartbeat") == 0
+
+
+def test_a_vehicle_that_speaks_from_its_address_is_not_moved_and_returns_to_it() -> None:
+    scene = Scene()
+    scene.announce()
+    scene.live(15.0, (0x1E, HERE), announced=True)
+    node = scene.bridge._registry[0x1E]
+    scene.live(30.0, (0x1E, HERE), (0x1E, THERE), announced=True)
+    assert node.address == HERE
+    # Somebody speaks in its name as long as it is silent, and no longer.
+    scene.live(11.0, (0x1E, THERE), announced=True)
+    assert node.address == THERE
+    scene.live(1.0, (0x1E, HERE), (0x1E, THERE))
+    assert node.address == HERE
+
+
+def test_a_vehicle_that_began_anew_elsewhere_is_not_taken_for_one_that_moved() -> None:
+    scene = Scene()
+    scene.announce()
+    scene.live(15.0, (0x1E, HERE), announced=True)
+    scene.announce(address=THERE, uid=2)
+    scene.live(8.0, (0x1E, THERE))
+    assert scene.bridge._registry[0x1E].address == HERE
