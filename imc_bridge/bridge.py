@@ -116,6 +116,8 @@ class Bridge:
         """Counts what this machine threw away before we could read it."""
         self._task: asyncio.Task[None] | None = None
         self._started_at: float | None = None
+        self._has_led = False
+        """Whether it was to lead a vehicle: one that was not gives way to another system under its id."""
         self._turn = asyncio.Event()
         self._tick_wall_s = max(TICK_S / settings.time_scale, MIN_TICK_WALL_S)
 
@@ -174,7 +176,7 @@ class Bridge:
 
     @property
     def double(self) -> str:
-        """Names of other systems that announce our own id; usually empty."""
+        """Another system that announces our own id, while it does; usually empty."""
         return self._receiver.double
 
     def on_packet(self, packet: bytes, address: Address) -> None:
@@ -231,8 +233,12 @@ class Bridge:
         self.want(vehicle)
         self._controls.guide(node, guidance)
         control = self._controls.of(node)
+        if self.double and not control.engaged:
+            reason = f"our IMC id 0x{self.settings.id:04X} is announced by {self.double}, too"
+            raise RefusedError(vehicle, reason, "Stop that service, or give one of the two another `imc.id`")
         if guidance is Guidance.ACOUSTIC:
             self._controls.attach_sound(node, gateway, self._registry, self._now)
+        self._has_led = True
         if not control.engaged and control.engage(self._now()):
             self._controls.rates_of(node).begin()
             way_home = self._controls.way_home(node)
@@ -399,6 +405,7 @@ class Bridge:
             self._note_error(error)
 
     def _tick(self, now: float) -> None:
+        self._sender.quiet = bool(self.double) and not self._has_led
         self._sender.tick(now)
         lost = self.drops.look(self._clock())
         if lost:

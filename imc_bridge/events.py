@@ -333,6 +333,8 @@ class NodeView:
     foreign_from: str | None = None
     """Address that packets under its id came from last without being announced."""
     conflict: str | None = None
+    namesake: bool = False
+    """Whether that conflict is about its name."""
     clock_rate: float | None = None
     """Seconds of its clock per second of ours; None until contact has lasted long enough."""
     history: tuple[LinkChange, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import imcpy
@@ -14,7 +15,7 @@ from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, wit
 from imc_bridge.network.discovery import Announcement, read_announce
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.admission import Admission
-from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.registry import NodeRegistry
 from imc_bridge.nodes.vehicle_clock import Tick
@@ -86,8 +87,8 @@ class Receiver:
     ) -> None:
         self.decoder = Decoder(WANTED)
         self.announces = Decoder(("Announce",))
-        self.double = ""
-        """Names of other systems that announce our own id; usually empty."""
+        self._double = ""
+        self._double_at = -math.inf
         self._settings = settings
         self._registry = registry
         self._controls = controls
@@ -99,6 +100,12 @@ class Receiver:
         self._sender = sender
         self._state_reported: dict[int, float] = {}
         self.admission = Admission(settings, registry, clock)
+
+    @property
+    def double(self) -> str:
+        """Another system that announces our own id, while it does; usually empty."""
+        patience = ANNOUNCES_MISSED * self._settings.announce_period_s
+        return self._double if self._now() - self._double_at <= patience else ""
 
     def _now(self) -> float:
         return self._clock() * self._settings.time_scale
@@ -120,11 +127,14 @@ class Receiver:
             return
         announcement = read_announce(message)
         if announcement.imc_id == self._settings.id:
-            self._look_for_double(announcement, address)
+            if announcement.run != self._sender.run:
+                self._double, self._double_at = f"{announcement.name!r} at {address[0]}", self._now()
+                self._answer(self._double_at)
             return
         now = self._now()
         if not self._counts(announcement.imc_id, message.timestamp, address, now):
             self._registry.note_rival(announcement, now)
+            self._registry.note_move(announcement, address[0])
             if self._registry.may_be_another(announcement.imc_id):
                 self._greet(announcement, address, now)
             return
@@ -172,15 +182,6 @@ class Receiver:
             return self.admission.refuse(Refused.MOVED, address)
         return not self._registry.is_old(imc_id, timestamp, now) or self.admission.refuse(Refused.OLD, address)
 
-    def _look_for_double(self, announcement: Announcement, address: Address) -> None:
-        """Our own announces come back to us; those of another system under our id are trouble."""
-        ours = (*self._sender.transport.own_addresses(), address[0])
-        if announcement.name == self._settings.name and any(
-            host in ours and port == self._settings.port for host, port in announcement.addresses
-        ):
-            return
-        self.double = f"{announcement.name!r} at {address[0]}"
-
     def _reboot(self, node: Node, now: float) -> None:
         self._tell(Restarted(node.name, node.submerged))
         control, way_home = self._controls.get(node), self._controls.way_home(node)
@@ -204,7 +205,7 @@ class Receiver:
         if header is None:
             return
         now = self._now()
-        node = self._registry.speaker(header.src, address) or self._newcomer(header.src, address, now)
+        node = self._registry.speaker(header.src, address) or self._newcomer(header, address, now)
         if node is None:
             self._pass_on(header, packet, address, now)
             return
@@ -226,8 +227,13 @@ class Receiver:
         if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(node, message, now, address)
 
-    def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
-        """The system that had no place when it announced itself and now sends, if it gets one."""
+    def _newcomer(self, header: Header, address: Address, now: float) -> Node | None:
+        """The system that had no place when it announced itself and now sends, if it gets one; or one that moved."""
+        imc_id = header.src
+        moved = self._registry.moved(imc_id, address, header.timestamp, now)
+        if moved is not None:
+            self._take_up(*moved, now)
+            return self._registry.speaker(imc_id, address)
         announcement = self._registry.newcomers.answered(imc_id, address)
         if announcement is None:
             return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Callable
 
 import imcpy
@@ -53,6 +54,10 @@ class Sender:
         self.transport = transport
         self.board = Board(settings.name)
         """What other consoles are shown."""
+        self.run = str(secrets.randbits(63))
+        """What our announces are known by when they come back to us."""
+        self.quiet = False
+        """Whether no heartbeat is sent: vehicles send to who spoke last under our id, and another one leads them."""
         self.announced_at = -math.inf
         self._registry = registry
         self._commanding = commanding
@@ -76,7 +81,7 @@ class Sender:
             self._greeted.clear()
             for node in self._registry:
                 # A system that never answered may not exist: its address is not addressed for long.
-                if self.talks_to(node) and (node.packets or not node.given_up(now)):
+                if not self.quiet and self.talks_to(node) and (node.packets or not node.given_up(now)):
                     self._beat(node)
         for node in self._registry:
             if node.is_vehicle and self.talks_to(node):
@@ -116,7 +121,9 @@ class Sender:
         However many systems claim an address, it gets one a period.
         """
         here = next((address for address in announcement.addresses if address[0] == host), None)
-        if here is not None and here not in self._greeted and announcement.system_type != int(imcpy.SystemType.CCU):
+        if self.quiet or here is None or here in self._greeted:
+            return
+        if announcement.system_type != int(imcpy.SystemType.CCU):
             self._greeted.add(here)
             self.transport.send(self._encoded(imcpy.Heartbeat(), announcement.imc_id), here)
 
@@ -128,7 +135,7 @@ class Sender:
         position = self.position_rad()
         self.transport.announce(
             lambda addresses: encode(
-                own_announce(self.settings, addresses, position),
+                own_announce(self.settings, addresses, position, self.run),
                 src=self.settings.id,
                 dst=0,
                 dst_ent=0,

@@ -13,7 +13,15 @@ DEFAULT_RATE_LIMITERS = (
 )
 """Positions and depths often; seldom what makes up nine tenths of 710 packets a second and is of no use here."""
 
+PLAN_NAME = "bathyfleet"
+"""What the names of our plans begin with; earlier versions called every plan so."""
+
 AltimeterGeometry = Literal["vertical", "body"]
+
+
+def plan_name(imc_id: int) -> str:
+    """What a console of this id calls its plans: two services on one network must not take each other's for theirs."""
+    return f"{PLAN_NAME}-{imc_id:04X}"
 
 
 def _multicast(text: str) -> str:
@@ -76,6 +84,11 @@ class ConsoleSettings(BaseModel):
     allowed_ids: tuple[ImcId, ...] = Field(
         default=(), description="IMC ids of the vehicles and gateways to listen to; empty: all"
     )
+    partners: tuple[ImcId, ...] = Field(
+        default=(),
+        description="IMC ids of the other processes on the same database, or of this one before: their plans, too, are "
+        "ended for a mission that needs the vehicle, and by a stop",
+    )
     allowed_addresses: tuple[Network, ...] = Field(
         default=(),
         description="IPv4 addresses or networks (10.0.10.0/24) to take IMC packets from; empty: all. "
@@ -119,7 +132,7 @@ class BridgeSettings(ConsoleSettings):
     lost_after_wall_s: float = 1.0
     """Silence shorter than this on the wall clock is never a loss, whatever ``time_scale`` says."""
 
-    plan_id: str = Field(default="bathyfleet", min_length=1)
+    plan_id: str = Field(default_factory=lambda given: plan_name(given.get("id", 0)), min_length=1)
     """A name that no other console uses."""
     follow_timeout_s: Positive = 30.0
     loiter_radius_m: float = 7.5
@@ -142,5 +155,6 @@ class BridgeSettings(ConsoleSettings):
     guard_window_s: Positive = 30.0
 
     def changed(self, **changes: object) -> Self:
-        """Return other settings. Raises ValueError, naming the field."""
-        return type(self).model_validate(dict(self) | changes)
+        """Return other settings; what follows from a changed one follows again. Raises ValueError, naming the field."""
+        given = {name: getattr(self, name) for name in self.model_fields_set}
+        return type(self).model_validate(given | changes)

@@ -55,6 +55,7 @@ def view_of(
         foreign_address=node.foreign_address,
         foreign_from=f"{node.last_foreign[0]}:{node.last_foreign[1]}" if node.last_foreign else None,
         conflict=node.conflict,
+        namesake=node.id_conflict is None and node.namesake is not None,
         clock_rate=node.clock.rate(scale),
         history=history,
         rate_limiters=rate_limiters,

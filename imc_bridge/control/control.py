@@ -156,12 +156,12 @@ class Control(ABC):
 
     def _ours_or_none(self) -> bool:
         """Whether the plan in execution is ours; one that is still nameless may become ours."""
-        own = self.node.plan_id in ("", self._settings.plan_id) and self.node.foreign_controller is None
-        return own or self.node.home_bound
+        nameless = not self.node.plan_id and self.node.foreign_controller is None
+        return nameless or self._runs_ours()
 
     def _runs_ours(self) -> bool:
-        """Whether what it executes is ours, be it the way home."""
-        return self.node.executing(self._settings.plan_id) or self.node.home_bound
+        """Whether what it executes is ours to end: our plan, the way home, a partner's whose vehicle we have now."""
+        return self.node.ours or self.node.home_bound or self.node.partners
 
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
@@ -188,9 +188,9 @@ class Control(ABC):
         if self.phase is Phase.STOPPING:
             return
         status = status_of(self.node, now)
-        if not self.engaged or self.phase is Phase.WAITING:
-            ours = self._runs_ours()
-            if status.state in (NodeState.IN_PLAN, NodeState.READY, NodeState.ACTIVE) and not ours:
+        if self.phase not in (Phase.STARTING, Phase.FOLLOWING):
+            idle = () if self.phase is Phase.ENDED else (NodeState.READY, NodeState.ACTIVE)
+            if status.state in (NodeState.IN_PLAN, *idle) and not self._runs_ours():
                 self.stop_detail = f"was not following us; {status.reason or 'in service'}"
                 self._enter(Phase.IDLE, now)
                 return
@@ -353,9 +353,9 @@ class Control(ABC):
 
     def _tick_idle(self, now: float) -> None:
         # A vehicle that came back still following after its stop went unanswered must not be left so.
-        node, plan_id = self.node, self._settings.plan_id
-        blocked = node.maneuvering_blocked and node.plan_id == plan_id
-        if self._abandoned and (blocked or node.executing(plan_id)) and now >= self._request_due:
+        node = self.node
+        blocked = node.maneuvering_blocked and node.plan_id == self._settings.plan_id
+        if self._abandoned and (blocked or node.ours) and now >= self._request_due:
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._request_id = self._next_request_id()
             self._send(plan_control(OPERATION_STOP, self._request_id, self._settings))
@@ -389,7 +389,7 @@ class Control(ABC):
             self._enter(Phase.ENDED, now)
 
     def _judge_end(self, now: float) -> None:
-        ending = judge_ending(self._evidence, self.node, self._settings.plan_id, starved=self._starved())
+        ending = judge_ending(self._evidence, self.node, starved=self._starved())
         if ending.remedy:
             self._release(ending.reason, ending.remedy, now, wanted=True)
         else:

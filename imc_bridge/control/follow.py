@@ -91,7 +91,7 @@ class Follower(Control):
             # A vehicle whose DUNE died was not silent for want of radio.
             self.node.radio_gaps += self.node.boots == self._gap_boots
         node = self.node
-        ours = node.executing(self._settings.plan_id)
+        ours = node.ours
         if self.phase is Phase.STARTING and node.plan_state == PlanState.EXECUTING and ours:
             self._running(now)
         elif self.phase is Phase.FOLLOWING and node.maneuvering_blocked and node.plan_id == self._settings.plan_id:

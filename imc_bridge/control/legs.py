@@ -172,7 +172,7 @@ class LegFollower(Control):
             if node.plan_state == PlanState.EXECUTING and not self._ours_or_none():
                 self._plan_ended(now)
             return
-        if node.executing(self._settings.plan_id):
+        if node.ours:
             if node.plan_state == PlanState.EXECUTING:
                 self._acknowledged(now)
         elif node.maneuvering_blocked:

@@ -43,7 +43,7 @@ class Ending:
     own: bool = False
 
 
-def judge_ending(seen: Evidence, node: Node, plan_id: str, *, starved: bool) -> Ending:
+def judge_ending(seen: Evidence, node: Node, *, starved: bool) -> Ending:
     """Say why our plan ended.
 
     Parameters
@@ -51,21 +51,16 @@ def judge_ending(seen: Evidence, node: Node, plan_id: str, *, starved: bool) -> 
     seen
     node
         What the vehicle does now.
-    plan_id
-        Of our plan.
     starved
         Whether echoes were missing long enough to prove that no references reached it.
     """
     if node.home_bound:
         return Ending("it goes home: to its own mind it heard no console for too long", WHEN_DONE)
     words = seen.failure or seen.error or node.error_text or "no reason given"
-    if node.plan_state == PlanState.EXECUTING and node.plan_id not in ("", plan_id):
+    if node.plan_state == PlanState.EXECUTING and node.plan_id not in ("", node.settings.plan_id):
         return Ending(f"another console took over with plan {node.plan_id!r}", WHEN_DONE)
     if seen.taken_by is not None:
-        return Ending(
-            f"console 0x{seen.taken_by:04X} took over with a plan of the same name",
-            f"{WHEN_DONE}; two consoles need different plan ids",
-        )
+        return Ending(f"console 0x{seen.taken_by:04X} took over with a plan of the same name", WHEN_DONE)
     if seen.rebooted:
         return Ending("the vehicle has rebooted")
     if seen.aborted_by is not None:

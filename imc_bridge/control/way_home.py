@@ -28,7 +28,7 @@ from imc_bridge.events import NodeState, Waypoint
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
 from imc_bridge.nodes.lost_comms import DEFAULT_PLAN_NAME
-from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.node import Node, home_prefix
 from imc_bridge.nodes.status import status_of
 from imc_bridge.settings import BridgeSettings
 
@@ -218,7 +218,7 @@ class WayHome:
         task = self._node.lost_comms
         request.plan_id = DEFAULT_PLAN_NAME if task is None else task.plan_name
         if self._step is Step.STORE:
-            request.arg = home_plan(request.plan_id, self._node.home_prefix, self._way)
+            request.arg = home_plan(request.plan_id, home_prefix(self._settings.plan_id), self._way)
         return request
 
 

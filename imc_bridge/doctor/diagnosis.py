@@ -42,6 +42,7 @@ class Cause(StrEnum):
     """Its packets come from an address that it does not announce."""
     WRONG_VERSION = "wrong_version"
     SAME_ID_TWICE = "same_id_twice"
+    SAME_NAME_TWICE = "same_name_twice"
     OUR_ID_TAKEN = "our_id_taken"
     CLOCK_OFF = "clock_off"
     CLOCK_RATE = "clock_rate"

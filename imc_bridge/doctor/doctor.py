@@ -253,6 +253,10 @@ def _node_findings(node: NodeView, bridge: Bridge, answers: Mapping[int, Answer]
     if node.conflict:
         findings.append(
             problem(Cause.SAME_ID_TWICE, node.conflict, "Two systems with one id cannot be told apart, so none is used")
+            if not node.namesake
+            else problem(
+                Cause.SAME_NAME_TWICE, node.conflict, "A mission names its vehicles, so neither is used by this name"
+            )
         )
         # Whatever else is seen of them is a mixture.
         return findings

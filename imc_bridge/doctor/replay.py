@@ -19,6 +19,7 @@ import imcpy
 from imc_bridge.bridge import Bridge
 from imc_bridge.events import BridgeEvent
 from imc_bridge.network.codec import Header, peek
+from imc_bridge.network.discovery import read_announce
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.vehicle_clock import VehicleClock
 from imc_bridge.settings import BridgeSettings
@@ -92,23 +93,25 @@ def replay(
     if not records:
         raise RecordingError(f"{path} holds no packet")
     console, imc_id = _console(records, settings)
+    plan_id = _plan_id(records, console)
     settings = settings.changed(
         id=imc_id,
         port=console[1],
         vehicles=(),
         state_events_per_s=1000.0,
         time_scale=_time_scale(records, console, settings),
-        plan_id=_plan_id(records, console) or settings.plan_id,
+        **({"plan_id": plan_id} if plan_id else {}),
     )
     now = records[0].time_s
     bridge = Bridge(settings, commanding=False, clock=lambda: now, wall_clock=lambda: now)
     bridge.listen(on_event)
+    own_runs = {_run(record) for record in records if record.src == console and _announces(record, imc_id)}
     taken = 0
     for record in records:
         now = record.time_s
         if record.dst[1] in settings.announce_ports:
-            # Our own announces went to every port, each packet once is enough.
-            if record.src != console:
+            # Our own announces went to every port and interface, and taught us nothing.
+            if record.src != console and not (_announces(record, imc_id) and _run(record) in own_runs):
                 bridge.on_announce(record.packet, record.src)
         elif record.dst == console:
             taken += 1
@@ -141,6 +144,20 @@ def _console(records: list[Recorded], settings: BridgeSettings) -> tuple[Address
     address = listeners.most_common(1)[0][0]
     ids = [imc_id for (src, imc_id), _ in speakers.most_common() if src == address]
     return address, ids[0] if ids else settings.id
+
+
+def _announces(record: Recorded, imc_id: int) -> bool:
+    """Whether a packet is an announce of an id."""
+    header = peek(record.packet)
+    return isinstance(header, Header) and header.msg_id == ANNOUNCE and header.src == imc_id
+
+
+def _run(record: Recorded) -> str | None:
+    """Which run of a service like ours an announce is of; None when it does not tell."""
+    try:
+        return read_announce(imcpy.Packet.deserialize(record.packet)).run
+    except RuntimeError:
+        return None
 
 
 def _time_scale(records: list[Recorded], console: Address, settings: BridgeSettings) -> float:

@@ -23,6 +23,7 @@ MAX_NAME = 64
 """Characters kept of a name."""
 _VERSION_SERVICE = re.compile(r"imc\+info://[^/]*/version/([^/;]+)")
 _UID_SERVICE = re.compile(r"dune://[^/]*/uid/(\d+)")
+_RUN_SERVICE = re.compile(r"bathyfleet://[^/]*/uid/(\d+)")
 
 VEHICLE_TYPES = frozenset({2, 3})
 """UUV and USV."""
@@ -42,6 +43,8 @@ class Announcement:
     imc_version: str | None = None
     uid: str | None = None
     """Changes whenever DUNE restarts."""
+    run: str | None = None
+    """Of a service like ours: differs from every other one's, and changes when it restarts."""
     lat_rad: float = 0.0
     lon_rad: float = 0.0
     """Where it is; both 0 when it does not know."""
@@ -65,7 +68,7 @@ def read_announce(message: Message) -> Announcement:
         if 0 < port <= 65535 and not ip.is_unspecified and (host, port) not in addresses:
             addresses.append((host, port))
     version = _VERSION_SERVICE.search(services)
-    uid = _UID_SERVICE.search(services)
+    uid, run = _UID_SERVICE.search(services), _RUN_SERVICE.search(services)
     return Announcement(
         imc_id=int(message.src),
         name=printable(text(message, "sys_name"), most=MAX_NAME),
@@ -74,6 +77,7 @@ def read_announce(message: Message) -> Announcement:
         streams=tuple(found["tcp"][:MAX_ADDRESSES]),
         imc_version=printable(version.group(1), most=MAX_NAME) if version else None,
         uid=uid.group(1)[:MAX_NAME] if uid else None,
+        run=run.group(1)[:MAX_NAME] if run else None,
         lat_rad=_finite(message.lat),
         lon_rad=_finite(message.lon),
     )
@@ -86,9 +90,9 @@ def reachable_first(announcement: Announcement, source_host: str, *, by_tcp: boo
 
 
 def own_announce(
-    settings: BridgeSettings, addresses: Sequence[str], position_rad: tuple[float, float] = (0.0, 0.0)
+    settings: BridgeSettings, addresses: Sequence[str], position_rad: tuple[float, float] = (0.0, 0.0), run: str = ""
 ) -> Message:
-    """Our own Announce: a console reachable by UDP at each of ``addresses``.
+    """Our own Announce: a console reachable by UDP at each of ``addresses``; ``run`` tells it from others of its id.
 
     DUNE's simulation of a limited radio range takes the position of the *first* announce as ours for good: at 0, 0
     we would be out of range for ever.
@@ -98,7 +102,8 @@ def own_announce(
     message.sys_type = imcpy.SystemType.CCU
     message.owner = 0xFFFF
     message.lat, message.lon = position_rad
-    message.services = ";".join(f"imc+udp://{address}:{settings.port}/" for address in addresses)
+    services = [f"imc+udp://{address}:{settings.port}/" for address in addresses]
+    message.services = ";".join(services + [f"bathyfleet://0.0.0.0/uid/{run}/"] * bool(run))
     return message
 
 

@@ -23,7 +23,7 @@ from imc_bridge.nodes.rate_meter import RateMeter
 from imc_bridge.nodes.refusals import Refused
 from imc_bridge.nodes.vehicle_clock import Tick, VehicleClock
 from imc_bridge.printable import printable
-from imc_bridge.settings import BridgeSettings
+from imc_bridge.settings import PLAN_NAME, BridgeSettings, plan_name
 from imc_bridge.telemetry.energy import Energy, read_fuel
 from imc_bridge.telemetry.faults import Faults
 from imc_bridge.telemetry.ranges import RangeIntake
@@ -78,7 +78,10 @@ class Node:
         """Where its last announce, or without one its first packet, came from."""
         self.hosts: frozenset[str] = frozenset()
         """Where its announces may come from: the host of the last one that counted, and those it announced."""
-        self.conflict: str | None = None
+        self.id_conflict: str | None = None
+        """Which systems announce its id, when it is not this one alone."""
+        self.namesake: Node | None = None
+        """Another node that announces its name, while both are heard."""
         self.boots = 0
         """How often it has restarted."""
         self.started_at: float | None = None
@@ -141,6 +144,15 @@ class Node:
     def is_vehicle(self) -> bool:
         """Whether it announced itself as a vehicle, or without a type."""
         return self.announcement is None or self.announcement.is_vehicle
+
+    @property
+    def conflict(self) -> str | None:
+        """Why it is not certain who a command would reach; None when it is."""
+        if self.id_conflict is not None or self.namesake is None or self.announcement is None:
+            return self.id_conflict
+        ids = sorted((self.imc_id, self.namesake.imc_id))
+        both = " and ".join(f"id 0x{imc_id:04X}" for imc_id in ids)
+        return f"{both} announce one name, {self.announcement.name!r}: rename one of them"
 
     # Discovery
 
@@ -322,7 +334,7 @@ class Node:
     def take_plan_state(self, message: Message, now: float) -> bool:
         """PlanControlState; True when it shows a restart: a plan was in execution, and now there never was one."""
         restarted = (
-            self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
+            self.runs_plan
             and bool(self.plan_id)
             and int(message.state) in (PlanState.READY, PlanState.BLOCKED)
             and not text(message, "plan_id")
@@ -334,7 +346,7 @@ class Node:
         self.maneuver_id = printable(text(message, "man_id"), most=MAX_TEXT)
         self.plan_outcome = int(message.last_outcome)
         self.plan_state_time_s = float(message.timestamp)
-        if self.plan_state not in (PlanState.EXECUTING, PlanState.INITIALIZING):
+        if not self.runs_plan:
             self.controller = None
         return restarted
 
@@ -367,7 +379,7 @@ class Node:
     @property
     def references_needed(self) -> bool:
         """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
-        return self.executing(self.settings.plan_id) and self.expected_back is None
+        return self.ours and self.expected_back is None
 
     @property
     def patience_s(self) -> float:
@@ -403,25 +415,38 @@ class Node:
             and _fresh(self.plan_state_at, now, limit)
         )
 
-    def executing(self, plan_id: str) -> bool:
-        """Whether it executes a plan of this name, as far as it says, and not at another console's behest."""
-        running = self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
-        return running and self.plan_id == plan_id and self.foreign_controller is None
+    @property
+    def runs_plan(self) -> bool:
+        """Whether a plan is in execution, or about to be."""
+        return self.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING)
 
     @property
-    def home_prefix(self) -> str:
-        """What the names of the maneuvers of our way home begin with."""
-        return f"{self.settings.plan_id} home"
+    def ours(self) -> bool:
+        """Whether it executes our plan, as far as it says, and not at another console's behest."""
+        named = self.plan_id == self.settings.plan_id
+        # As earlier versions called it, whose ids alone told their plans apart.
+        named = named or (self.plan_id == PLAN_NAME and self.controller == self.settings.id)
+        return self.runs_plan and named and self.foreign_controller is None
 
     @property
     def home_bound(self) -> bool:
         """Whether it goes home by a plan that we left on board, perhaps in an earlier run."""
-        return self.plan_state == PlanState.EXECUTING and self.maneuver_id.startswith(self.home_prefix)
+        ours = self.maneuver_id.startswith(home_prefix(self.settings.plan_id))
+        return self.plan_state == PlanState.EXECUTING and ours
 
     @property
-    def ours(self) -> bool:
-        """Whether it executes our plan."""
-        return self.executing(self.settings.plan_id)
+    def partners(self) -> bool:
+        """Whether it executes a plan of one of our partners, or goes home by one."""
+        return self.runs_plan and any(
+            self.plan_id == name or self.maneuver_id.startswith(home_prefix(name))
+            for name in map(plan_name, self.settings.partners)
+        )
+
+    @property
+    def of_earlier_version(self) -> bool:
+        """Whether it executes a plan of a version whose plans do not tell whose they are."""
+        named = self.plan_id == PLAN_NAME or self.maneuver_id.startswith(home_prefix(PLAN_NAME))
+        return self.runs_plan and named and self.controller is None
 
     def telemetry_overdue(self, now: float) -> bool:
         """Whether it announced itself long ago and nothing else came."""
@@ -437,6 +462,11 @@ class Node:
     def plan_state_name(self) -> str | None:
         """The state of plan control in words."""
         return None if self.plan_state is None else mode_name(PlanState, self.plan_state)
+
+
+def home_prefix(plan_id: str) -> str:
+    """What the names of the maneuvers of a way home begin with, by which a vehicle shows whose plan it executes."""
+    return f"{plan_id} home"
 
 
 def listed_entities(message: Message) -> dict[int, str]:

@@ -13,6 +13,8 @@ from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
 from imc_bridge.settings import BridgeSettings
 
 MAX_CLAIMS = 8
+MOVED_SILENT_S = 5.0
+"""A vehicle that announces another address is believed when nothing came from the one before for this long."""
 
 Claim = tuple[str, str]
 """Name and uid (or addresses) that distinguish nodes of the same id."""
@@ -29,6 +31,15 @@ class Arrival:
     first: bool = False
     rebooted: bool = False
     stale: tuple[Address, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Move:
+    """Where a node may be now: its announce, the host of that, how long it must have been silent where it was."""
+
+    announcement: Announcement
+    host: str
+    silent_s: float
 
 
 class NodeRegistry:
@@ -57,6 +68,7 @@ class NodeRegistry:
         self.left: list[Callable[[Node], None]] = []
         self._by_address: dict[Address, Node] = {}
         self._claims: dict[int, dict[Claim, float]] = {}
+        self._moves: dict[int, _Move] = {}
         self._conflict_until: dict[int, float] = {}
 
     def __iter__(self) -> Iterator[Node]:
@@ -119,6 +131,7 @@ class NodeRegistry:
     def _drop(self, node: Node) -> None:
         del self._nodes[node.imc_id]
         self._claims.pop(node.imc_id, None)
+        self._moves.pop(node.imc_id, None)
         self._conflict_until.pop(node.imc_id, None)
         for address in node.addresses:
             if self._by_address.get(address) is node:
@@ -154,6 +167,29 @@ class NodeRegistry:
         node = self._nodes.get(imc_id)
         heard = node is not None and node.heard_at is not None and now - node.heard_at <= self._settings.lost_after_s
         return node is not None and heard and node.clock.is_old(timestamp)
+
+    def note_move(self, announcement: Announcement, host: str) -> None:
+        """Note that a node, by its uid the same that runs on, announces itself from another host, as after DHCP."""
+        node = self._nodes.get(announcement.imc_id)
+        known = node.announcement if node is not None else None
+        if known is not None and announcement.uid is not None and _claim(announcement) == _claim(known):
+            self._moves[announcement.imc_id] = _Move(announcement, host, MOVED_SILENT_S)
+
+    def moved(self, imc_id: int, address: Address, timestamp: float, now: float) -> tuple[Announcement, str] | None:
+        """The announce of a node that speaks on from another address, and its host; None while that is not certain.
+
+        Where it was before it may always return to: what came from elsewhere meanwhile was another system's.
+        """
+        node, move = self._nodes.get(imc_id), self._moves.get(imc_id)
+        if node is None or move is None or node.announcement is None or node.heard_at is None:
+            return None
+        settings = self._settings
+        silent_s = move.silent_s and max(move.silent_s, settings.lost_after_wall_s * settings.time_scale)
+        there = (*move.announcement.addresses, *move.announcement.streams)
+        if address not in there or now - node.heard_at < silent_s or not node.clock.goes_on(timestamp, now):
+            return None
+        self._moves[imc_id] = _Move(node.announcement, node.host, 0.0 if move.silent_s else MOVED_SILENT_S)
+        return move.announcement, move.host
 
     def note_rival(self, announcement: Announcement, now: float) -> None:
         """Note an announce that changes nothing: if it is another node's of the same id, that is for the operator."""
@@ -192,7 +228,19 @@ class NodeRegistry:
         for imc_id, until in list(self._conflict_until.items()):
             if now > until:
                 del self._conflict_until[imc_id]
-                self._nodes[imc_id].conflict = None
+                self._nodes[imc_id].id_conflict = None
+        self._look_for_namesakes(now)
+
+    def _look_for_namesakes(self, now: float) -> None:
+        """Note who announces the name of another: after a restart of ours either could be called by it."""
+        named: dict[str, Node] = {}
+        for node in self._nodes.values():
+            node.namesake = None
+            if node.announcement is None or standing_of(node) is not Standing.HEARD or node.given_up(now):
+                continue
+            other = named.setdefault(node.announcement.name, node)
+            if other is not node:
+                node.namesake, other.namesake = other, node
 
     def _contested(self, node: Node, new: Announcement, now: float) -> bool:
         """Note which node claims the id; return whether a second one does, whose announce must not count.
@@ -212,12 +260,12 @@ class NodeRegistry:
         renamed = any(name != new.name for name, _ in rivals)
         if len(claims) < MAX_CLAIMS or mine in claims:
             claims[mine] = now
-        if known is None or not (returned or renamed or (rivals and node.conflict)):
+        if known is None or not (returned or renamed or (rivals and node.id_conflict)):
             return False
         self._conflict_until[node.imc_id] = now + patience
         names = sorted({known.name, new.name, *(name for name, _ in rivals)})
         others = ", ".join(f"{host}:{port}" for host, port in (*known.addresses[:2], *new.addresses[:2]))
-        node.conflict = (
+        node.id_conflict = (
             f"id 0x{node.imc_id:04X} is announced by {' and by '.join(map(repr, names))}: give one another id"
             if len(names) > 1
             else f"two nodes named {names[0]!r} announce id 0x{node.imc_id:04X} ({others}): stop one of them"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from imc_bridge.events import NodeState
 from imc_bridge.nodes.modes import OperationMode, PlanState, mode_name
 from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
-from imc_bridge.settings import BridgeSettings
+from imc_bridge.settings import PLAN_NAME, BridgeSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,19 +38,33 @@ def status_of(node: Node, now: float) -> Status:
         return _silent(node, silence, now)
     if node.operation_mode is None or node.plan_state is None:
         return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
-    if node.plan_state in (PlanState.EXECUTING, PlanState.INITIALIZING):
+    if node.runs_plan:
         if node.plan_state == PlanState.INITIALIZING:
             return Status(NodeState.IN_PLAN, "starts a plan")
         if node.home_bound:
             return Status(NodeState.IN_PLAN, "goes home by the plan that it keeps on board for that")
-        whose = "our plan"
-        if node.plan_id != settings.plan_id or node.foreign_controller is not None:
-            controller = f" (0x{node.foreign_controller:04X})" if node.foreign_controller is not None else ""
-            whose = f"plan {node.plan_id!r} of another console{controller}"
-        return Status(NodeState.IN_PLAN, f"executes {whose}")
+        return Status(NodeState.IN_PLAN, f"executes {_whose_plan(node)}")
     if node.operation_mode == OperationMode.SERVICE and node.plan_state == PlanState.READY:
         return Status(NodeState.READY)
     return Status(NodeState.ACTIVE, _why_not_ready(node))
+
+
+def _whose_plan(node: Node) -> str:
+    if node.ours:
+        return "our plan"
+    plan = f"plan {node.plan_id!r}"
+    if node.partners:
+        return f"{plan} of a partner of this service"
+    if node.of_earlier_version:
+        return (
+            f"{plan} of another console, or of an earlier version of this service: wait until it has ended, or stop it "
+            "from another console such as Neptus"
+        )
+    controller = f" (0x{node.foreign_controller:04X})" if node.foreign_controller is not None else ""
+    words = f"{plan} of another console{controller}"
+    if node.plan_id.startswith(f"{PLAN_NAME}-"):
+        words += f"; where that is a service on the same database its id, {node.plan_id[-4:]}, belongs into `imc.partners`"
+    return words
 
 
 def _without_telemetry(settings: BridgeSettings, now: float, announced_at: float, first_announced_at: float) -> Status:
@@ -77,13 +91,13 @@ def _silent(node: Node, silence: float, now: float) -> Status:
         )
     away = node.expected_back is None and node.plan_state == PlanState.EXECUTING
     if away and node.submerged and silence <= node.patience_s:
-        whose = "our plan" if node.executing(settings.plan_id) else f"plan {node.plan_id!r}"
+        whose = "our plan" if node.ours else f"plan {node.plan_id!r}"
         comes_up = "; without references that ends and it comes up" if node.references_needed else ""
         return Status(
             NodeState.EXPECTED_OFFLINE,
             f"silent for {seconds:.0f} s, under water in {whose}: radio ends at the surface{comes_up}",
         )
-    afloat = node.plan_state not in (PlanState.INITIALIZING, PlanState.EXECUTING)
+    afloat = not node.runs_plan
     since_start = math.inf if node.started_at is None else now - node.started_at
     if afloat and node.submerged and min(silence, since_start) <= node.ascent_s:
         words = f"silent for {seconds:.0f} s, under water without a plan: it floats up"

@@ -59,14 +59,12 @@ class VehicleClock:
 
     def take(self, timestamp: float, now: float, wall_time_s: float) -> Tick:
         """Take a message's timestamp in; ``now`` is its arrival by the bridge's clock."""
-        if self.time_s is not None:
-            ahead = timestamp - self.time_s
-            if ahead > LEAP_S + FASTEST * max(now - self._arrived, 0.0) or ahead < -LATE_S:
-                tick = self._odd_time(timestamp, now)
-                if tick is Tick.JUMPED:
-                    self._in_time = now
-                    self._adopt(timestamp, now, wall_time_s)
-                return tick
+        if self.time_s is not None and not self.goes_on(timestamp, now):
+            tick = self._odd_time(timestamp, now)
+            if tick is Tick.JUMPED:
+                self._in_time = now
+                self._adopt(timestamp, now, wall_time_s)
+            return tick
         self._odd.clear()
         self._in_time = now
         if self.time_s is None or timestamp >= self.time_s:
@@ -84,6 +82,12 @@ class VehicleClock:
     def is_old(self, timestamp: float) -> bool:
         """Whether a packet was sent long before others of the vehicle that have arrived."""
         return self.time_s is not None and timestamp < self.time_s - LATE_S
+
+    def goes_on(self, timestamp: float, now: float) -> bool:
+        """Whether a packet's timestamp goes on from those before: neither a recording's nor another clock's."""
+        if self.time_s is None:
+            return False
+        return -LATE_S <= timestamp - self.time_s <= LEAP_S + FASTEST * max(now - self._arrived, 0.0)
 
     def _odd_time(self, timestamp: float, now: float) -> Tick:
         """Whether an odd timestamp is confirmed by those before it, which must lie close by, and by nothing else."""

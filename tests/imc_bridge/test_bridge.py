@@ -348,7 +348,7 @@ def foreign_start(sea: Sea, source: int, plan_id: str, control_src: int) -> byte
     return encode(plan_control(OPERATION_START, 1, settings), src=source, dst=sea.fleet.nodes[0].imc_id, time_s=1.7e9)
 
 
-@pytest.mark.parametrize("plan_id", ["home", "bathyfleet"])
+@pytest.mark.parametrize("plan_id", ["home", "bathyfleet-3F01"])
 async def test_vehicle_that_another_console_takes_over_is_let_go(plan_id: str) -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()

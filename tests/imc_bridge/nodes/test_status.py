@@ -44,7 +44,7 @@ class Listener:
 
 @pytest.mark.parametrize(
     ("plan", "maneuver", "waits_s"),
-    [("bathyfleet", "follow", 80.0), ("lostcomms", "bathyfleet home 1", 3600.0), ("survey", "rows", 3600.0)],
+    [("bathyfleet-3F01", "follow", 80.0), ("lostcomms", "bathyfleet-3F01 home 1", 3600.0), ("survey", "rows", 3600.0)],
     ids=["led by references", "on its way home", "in another console's plan"],
 )
 def test_who_is_silent_under_water_for_longer_than_it_can_be_is_lost(plan: str, maneuver: str, waits_s: float) -> None:

@@ -27,7 +27,7 @@ AlarmState: TypeAlias = Annotated[Literal["open", "acknowledged"], Open]
 BatteryState: TypeAlias = Annotated[Literal["ok", "low", "critical"], Open]
 """What a battery's level is worth."""
 
-Cause: TypeAlias = Annotated[Literal["sound", "switched_off", "port_in_use", "no_interface", "no_vehicle", "not_heard", "no_announce", "no_service", "announces_ceased", "no_traffic", "unreachable", "blocked_port", "stale_port", "foreign_address", "wrong_version", "same_id_twice", "our_id_taken", "clock_off", "clock_rate", "silent", "radio_gaps", "restarted", "packets_dropped", "low_rate", "no_entities", "no_soundings", "soundings_refused", "no_way_home", "foreign_control", "not_ready", "send_errors", "bad_packets", "refused", "unknown_messages", "crowded"], Open]
+Cause: TypeAlias = Annotated[Literal["sound", "switched_off", "port_in_use", "no_interface", "no_vehicle", "not_heard", "no_announce", "no_service", "announces_ceased", "no_traffic", "unreachable", "blocked_port", "stale_port", "foreign_address", "wrong_version", "same_id_twice", "same_name_twice", "our_id_taken", "clock_off", "clock_rate", "silent", "radio_gaps", "restarted", "packets_dropped", "low_rate", "no_entities", "no_soundings", "soundings_refused", "no_way_home", "foreign_control", "not_ready", "send_errors", "bad_packets", "refused", "unknown_messages", "crowded"], Open]
 """What a finding is about; the first of a node's problems is the one to look at."""
 
 CheckStatus: TypeAlias = Annotated[Literal["ok", "note", "warning", "problem"], Open]

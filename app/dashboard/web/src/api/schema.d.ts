@@ -2432,7 +2432,7 @@ export interface components {
          * @description What a finding is about; the first of a node's problems is the one to look at.
          * @enum {string}
          */
-        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "restarted" | "packets_dropped" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "no_way_home" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages" | "crowded";
+        Cause: "sound" | "switched_off" | "port_in_use" | "no_interface" | "no_vehicle" | "not_heard" | "no_announce" | "no_service" | "announces_ceased" | "no_traffic" | "unreachable" | "blocked_port" | "stale_port" | "foreign_address" | "wrong_version" | "same_id_twice" | "same_name_twice" | "our_id_taken" | "clock_off" | "clock_rate" | "silent" | "radio_gaps" | "restarted" | "packets_dropped" | "low_rate" | "no_entities" | "no_soundings" | "soundings_refused" | "no_way_home" | "foreign_control" | "not_ready" | "send_errors" | "bad_packets" | "refused" | "unknown_messages" | "crowded";
         /**
          * ChangesView
          * @description What changed at a site between two of its surveys, over the ground that both know.
