@@ -347,7 +347,7 @@ class Receiver:
                 way_home.replied(message)
 
     def _take_state(self, node: Node, control: Control | None, message: Message, now: float, address: Address) -> None:
-        report = node.take_state(message)
+        report = node.take_state(message, now)
         if isinstance(report, Refused):
             self.admission.refuse(report, address)
         elif report is not None:
