@@ -43,6 +43,8 @@ class Follower(Control):
     _reference_due = 0.0
     _last_sent: SentReference | None = None
     _answered_at = 0.0
+    _echoed_s = -math.inf
+    """When it sent its newest echo, by the vehicle's clock: a timeout from before is over."""
     _unanswered = 0
     _gap_boots = 0
     _gap_open = False
@@ -118,11 +120,13 @@ class Follower(Control):
             self._plan_ended(now)
         if int(message.control_src) != self._settings.id:
             return
+        time_s = float(message.timestamp)
         if int(message.state) == STATE_TIMEOUT:
-            if self.phase is Phase.FOLLOWING:
+            if self.phase is Phase.FOLLOWING and time_s >= max(self._plan_since_s, self._echoed_s):
                 self._evidence.timed_out = True
                 self._plan_ended(now)
             return
+        self._echoed_s = max(self._echoed_s, time_s)
         if self.phase is Phase.STARTING:
             self._running(now)
         if self.phase is not Phase.FOLLOWING or message.reference is None:
@@ -150,6 +154,11 @@ class Follower(Control):
         elif order.missed(report, self._settings.depth_tolerance_m):
             order.turn_back(report)
             self._reference_due = now
+
+    def clock_jumped(self) -> None:
+        """Forget what goes by the vehicle's clock, which was set."""
+        super().clock_jumped()
+        self._echoed_s = -math.inf
 
     # The passing of time
 

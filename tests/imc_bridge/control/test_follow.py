@@ -572,3 +572,21 @@ def test_states_that_are_lost_now_and_then_make_no_vehicle_come_up() -> None:
     script.spoil = lambda _state: next(arrives)
     script.run(20.0)
     assert all(reference.z.value > 0.0 for reference in script.of("Reference")[-15:])
+
+
+def test_a_late_word_of_a_timeout_ends_no_plan_that_began_or_was_answered_since() -> None:
+    script = Script()
+    script.report()
+    script.move()
+    script.follower.engage(script.now)
+    script.follower.tick(script.now)
+    script.reply(ok=True, info="plan loaded", time_s=50.0)
+    script.report(mode=OperationMode.MANEUVER, plan=PlanState.EXECUTING, time_s=51.0)
+    script.follower.order(WAYPOINT, script.now)
+    script.echo(6, time_s=48.0)
+    assert script.follower.phase is Phase.FOLLOWING, "that was another plan"
+    script.echo(time_s=55.0)
+    script.echo(6, time_s=54.0)
+    assert script.follower.phase is Phase.FOLLOWING, "it was answered since"
+    script.echo(6, time_s=61.0)
+    assert script.follower.phase is Phase.ENDED
