@@ -47,7 +47,6 @@ WANTED = (
     *RANGE_MESSAGES,
 )
 ENTITY_STATE = int(imcpy.EntityState().msg_id)
-SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 ANNOUNCE_AGAIN_S = 1.0
 
@@ -208,14 +207,6 @@ class Receiver:
         if node is None:
             self._pass_on(header, packet, address, now)
             return
-        if node.packets == 0:
-            if not self._registry.capacity.may_be_heard(node, address[0]):
-                self.admission.refuse(Refused.CROWDED, address)
-                return
-            self._registry.first_heard(node)
-        if header.msg_id != SIMULATED_STATE and not node.clock.is_old(header.timestamp):
-            # DUNE's simulation lets that one through where radio would not reach.
-            node.heard(now, address)
         if not self.decoder.wants(header):
             return
         if header.msg_id == ENTITY_STATE and not is_leak_sensor(node.entity_name(header.src_ent)):
@@ -223,7 +214,17 @@ class Receiver:
             self.decoder.unwanted["EntityState"] += 1
             return
         message = self.decoder.message(without_argument(packet))
-        if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
+        if message is None:
+            # What is damaged shows no contact.
+            return
+        if node.packets == 0:
+            if not self._registry.capacity.may_be_heard(node, address[0]):
+                self.admission.refuse(Refused.CROWDED, address)
+                return
+            self._registry.first_heard(node)
+        if not node.clock.is_old(message.timestamp):
+            node.heard(now, address)
+        if 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(node, message, now, address)
 
     def _newcomer(self, imc_id: int, address: Address, now: float) -> Node | None:
