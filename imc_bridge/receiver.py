@@ -10,7 +10,7 @@ from imc_bridge.control.control import Control
 from imc_bridge.control.controls import Controls
 from imc_bridge.events import BridgeEvent, Fault, PingRefused, Restarted, Sounding, SoundingRefused, SwathPing
 from imc_bridge.links import Links
-from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
+from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message
 from imc_bridge.network.discovery import Announcement, read_announce
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.admission import Admission
@@ -213,7 +213,7 @@ class Receiver:
             # Dozens of entities tell how they are every second.
             self.decoder.unwanted["EntityState"] += 1
             return
-        message = self.decoder.message(without_argument(packet))
+        message = self.decoder.received(packet)
         if message is None:
             # What is damaged shows no contact.
             return
@@ -269,7 +269,7 @@ class Receiver:
 
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
         control = self._controls.get(via)
-        message = self.decoder.message(without_argument(packet))
+        message = self.decoder.received(packet)
         if isinstance(message, imcpy.EstimatedState):
             self._heard_by_sound(via, message, now)
         if control is None or message is None:
