@@ -305,6 +305,11 @@ class NodeView:
     ours: bool = False
     """Executes a plan of ours, perhaps of an earlier run."""
     age_s: float | None = None
+    """Since its last packet."""
+    position_age_s: float | None = None
+    """Since it last told where it is."""
+    blind: bool = False
+    """It is heard, or was at the last contact, and does not tell where it is."""
     announce_age_s: float | None = None
     telemetry_overdue: bool = False
     """Announced for longer than telemetry needs to begin, and none came."""

@@ -248,7 +248,7 @@ def _take(node: Node, header: Header, message: Message) -> Iterator[LogEvent]:
         return
     match type(message).__name__:
         case "EstimatedState":
-            report = node.take_state(message)
+            report = node.take_state(message, message.timestamp)
             if isinstance(report, StateReport):
                 yield report
             yield from _placed(node)

@@ -11,7 +11,7 @@ from imc_bridge.control.control import Control
 from imc_bridge.control.controls import Controls
 from imc_bridge.events import BridgeEvent, Fault, PingRefused, Restarted, Sounding, SoundingRefused, SwathPing
 from imc_bridge.links import Links
-from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message, without_argument
+from imc_bridge.network.codec import BROADCAST_ID, Decoder, Header, Message
 from imc_bridge.network.discovery import Announcement, read_announce
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.admission import Admission
@@ -48,7 +48,6 @@ WANTED = (
     *RANGE_MESSAGES,
 )
 ENTITY_STATE = int(imcpy.EntityState().msg_id)
-SIMULATED_STATE = int(imcpy.SimulatedState().msg_id)
 MAX_PLAUSIBLE_VEHICLE_TIME_S = 4e9
 ANNOUNCE_AGAIN_S = 1.0
 
@@ -209,22 +208,24 @@ class Receiver:
         if node is None:
             self._pass_on(header, packet, address, now)
             return
-        if node.packets == 0:
-            if not self._registry.capacity.may_be_heard(node, address[0]):
-                self.admission.refuse(Refused.CROWDED, address)
-                return
-            self._registry.first_heard(node)
-        if header.msg_id != SIMULATED_STATE and not node.clock.is_old(header.timestamp):
-            # DUNE's simulation lets that one through where radio would not reach.
-            node.heard(now, address)
         if not self.decoder.wants(header):
             return
         if header.msg_id == ENTITY_STATE and not is_leak_sensor(node.entity_name(header.src_ent)):
             # Dozens of entities tell how they are every second.
             self.decoder.unwanted["EntityState"] += 1
             return
-        message = self.decoder.message(without_argument(packet))
-        if message is not None and 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
+        message = self.decoder.received(packet)
+        if message is None:
+            # What is damaged shows no contact.
+            return
+        if node.packets == 0:
+            if not self._registry.capacity.may_be_heard(node, address[0]):
+                self.admission.refuse(Refused.CROWDED, address)
+                return
+            self._registry.first_heard(node)
+        if not node.clock.is_old(message.timestamp):
+            node.heard(now, address)
+        if 0.0 < message.timestamp < MAX_PLAUSIBLE_VEHICLE_TIME_S:
             self._take_message(node, message, now, address)
 
     def _newcomer(self, header: Header, address: Address, now: float) -> Node | None:
@@ -274,7 +275,7 @@ class Receiver:
 
     def _relayed(self, via: Node, packet: bytes, now: float) -> None:
         control = self._controls.get(via)
-        message = self.decoder.message(without_argument(packet))
+        message = self.decoder.received(packet)
         if isinstance(message, imcpy.EstimatedState):
             self._heard_by_sound(via, message, now)
         if control is None or message is None:
@@ -353,7 +354,7 @@ class Receiver:
                 way_home.replied(message)
 
     def _take_state(self, node: Node, control: Control | None, message: Message, now: float, address: Address) -> None:
-        report = node.take_state(message)
+        report = node.take_state(message, now)
         if isinstance(report, Refused):
             self.admission.refuse(report, address)
         elif report is not None:

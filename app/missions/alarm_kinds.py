@@ -28,6 +28,7 @@ class AlarmKind(StrEnum):
     CRITICAL_ENERGY = "critical_energy"
     TOO_DEEP = "too_deep"
     POSITION_LOST = "position_lost"
+    NO_POSITION = "no_position"
     LOW_ENERGY = "low_energy"
     LINK_LOST = "link_lost"
     TRAFFIC = "traffic"
@@ -89,6 +90,11 @@ ALARMS: Mapping[AlarmKind, AlarmRule] = {
     ),
     AlarmKind.POSITION_LOST: AlarmRule(
         _CRITICAL, "a vehicle does not know where it is", "look for it where it comes up"
+    ),
+    AlarmKind.NO_POSITION: AlarmRule(
+        _CRITICAL,
+        "a vehicle is heard and does not tell where it is",
+        "look for it where it was last; see its navigation",
     ),
     AlarmKind.LOW_ENERGY: AlarmRule(_MAJOR, "a vehicle turns back for its energy", "be at the recovery point in time"),
     AlarmKind.LINK_LOST: AlarmRule(_CRITICAL, "a vehicle was silent for too long", "look for it along its way home"),

@@ -17,6 +17,7 @@ import imcpy
 
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
+from imc_bridge.telemetry.positions import told_place
 
 DEADLINE_S = 20.0
 """After this long the gateway gives a message up, and so do we."""
@@ -155,11 +156,11 @@ class SoundPath:
         return ""
 
     def take_report(self, message: Message) -> SoundReport | None:
-        """Take an EstimatedState that the gateway made of a report; None when it is not plausible."""
-        lat, lon = math.degrees(message.lat), math.degrees(message.lon)
-        if not (math.isfinite(lat) and math.isfinite(lon) and abs(lat) <= 90.0 and math.isfinite(message.depth)):
+        """Take an EstimatedState that the gateway made of a report; None when it holds no position."""
+        place = told_place(message)
+        if place is None:
             return None
-        self.report = SoundReport(lat, lon, float(message.depth))
+        self.report = SoundReport(math.degrees(place[0]), math.degrees(place[1]), float(message.depth))
         return self.report
 
     def ask(self, now: float) -> None:

@@ -31,13 +31,12 @@ from imc_bridge.events import NodeState, StateReport, Waypoint, WaypointChange, 
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
 from imc_bridge.nodes.modes import OperationMode, PlanState
-from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.node import NO_POSITION, Node
 from imc_bridge.nodes.status import status_of
 from imc_bridge.settings import BridgeSettings
 
 STOP_RETRY_S = 0.5
 ABANDONED_STOP_RETRY_S = 2.0
-NO_POSITION = "no state of it holds a position: it has no GPS fix yet, or its navigation has failed"
 EVIDENCE_S = 1.5
 """How long an ended plan is looked into before its cause is judged: an abort shows as ERROR, then BLOCKED."""
 
@@ -321,7 +320,7 @@ class Control(ABC):
 
     def _tick_waiting(self, now: float) -> None:
         node, settings = self.node, self._settings
-        if node.can_start(now) and node.report is not None:
+        if node.can_start(now):
             self._evidence = Evidence()
             self._begin(now)
             return
@@ -329,7 +328,7 @@ class Control(ABC):
         if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now, wanted=True)
         elif now - self._since > self._waiting_limit_s():
-            unready = NO_POSITION if node.report is None else "does not report being in service and ready"
+            unready = NO_POSITION if node.report is None or node.blind else "does not report being in service and ready"
             reason = status.reason or unready
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
         elif self._runs_ours() and now >= self._request_due:
@@ -361,6 +360,15 @@ class Control(ABC):
             self._send(plan_control(OPERATION_STOP, self._request_id, self._settings))
             if blocked:
                 self._send(imcpy.Abort())
+
+    def _blind_too_long(self, patience_s: float, now: float) -> bool:
+        """Let go of a vehicle that has not told where it is for so long, though it is heard."""
+        unplaced_s = self.node.unplaced_s
+        if unplaced_s <= max(patience_s, self._settings.lost_after_wall_s * self._settings.time_scale):
+            return False
+        words = f"heard, and has told no position for {unplaced_s / self._settings.time_scale:.0f} s"
+        self._release(words, "Look at its navigation; engage it again when it tells where it is", now)
+        return True
 
     def excuse(self, seconds: float, now: float) -> None:
         """Subtract from every wait the time in which this process was held up and received nothing."""

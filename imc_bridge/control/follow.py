@@ -17,6 +17,7 @@ from imc_bridge.events import StateReport, WaypointStatus
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
 from imc_bridge.nodes.modes import PlanState
+from imc_bridge.nodes.node import NO_POSITION
 
 START_RETRY_S = 2.0
 BLOCKED_S = 1.0
@@ -38,10 +39,12 @@ class Follower(Control):
     unheard_stop = "references have ceased, so its plan ends by itself"
 
     _hold: SentReference | None = None
-    """Where it stays until the first waypoint comes."""
+    """Where it stays at the surface: until the first waypoint comes, and while it does not tell where it is."""
     _reference_due = 0.0
     _last_sent: SentReference | None = None
     _answered_at = 0.0
+    _echoed_s = -math.inf
+    """When it sent its newest echo, by the vehicle's clock: a timeout from before is over."""
     _unanswered = 0
     _gap_boots = 0
     _gap_open = False
@@ -56,6 +59,7 @@ class Follower(Control):
 
     def _ordered(self, now: float) -> None:
         self._reference_due = now
+        self._hold = None
         if self.phase is Phase.FOLLOWING:
             self._answered(now)
 
@@ -116,11 +120,13 @@ class Follower(Control):
             self._plan_ended(now)
         if int(message.control_src) != self._settings.id:
             return
+        time_s = float(message.timestamp)
         if int(message.state) == STATE_TIMEOUT:
-            if self.phase is Phase.FOLLOWING:
+            if self.phase is Phase.FOLLOWING and time_s >= max(self._plan_since_s, self._echoed_s):
                 self._evidence.timed_out = True
                 self._plan_ended(now)
             return
+        self._echoed_s = max(self._echoed_s, time_s)
         if self.phase is Phase.STARTING:
             self._running(now)
         if self.phase is not Phase.FOLLOWING or message.reference is None:
@@ -148,6 +154,11 @@ class Follower(Control):
         elif order.missed(report, self._settings.depth_tolerance_m):
             order.turn_back(report)
             self._reference_due = now
+
+    def clock_jumped(self) -> None:
+        """Forget what goes by the vehicle's clock, which was set."""
+        super().clock_jumped()
+        self._echoed_s = -math.inf
 
     # The passing of time
 
@@ -185,13 +196,15 @@ class Follower(Control):
         heard_at = self.node.heard_at
         silence = math.inf if heard_at is None else now - heard_at
         if silence > STARVED_S and self.node.submerged:
-            self._note_gap(long=silence > max(settings.lost_after_s, settings.lost_after_wall_s * settings.time_scale))
+            self._note_gap(long=silence > self.node.lost_after_s)
         if silence > max(self.node.patience_s, settings.lost_after_wall_s * settings.time_scale):
             self._release(
                 f"silent for {silence / settings.time_scale:.0f} s: its plan has ended by itself",
                 "Engage it again when it is heard",
                 now,
             )
+            return
+        if self._blind_too_long(self.node.patience_s, now):
             return
         if self._blocked_since is not None and now - self._blocked_since > BLOCKED_S and now >= self._request_due:
             # The maneuver goes on; a plan of its own brings plan control back to it.
@@ -233,12 +246,12 @@ class Follower(Control):
         order = self._order
         report = self.node.report
         if order is None:
-            # Until the first waypoint comes: stay here, at the surface.
-            if self._hold is None and report is not None:
-                self._hold = SentReference(
-                    math.radians(report.lat_deg), math.radians(report.lon_deg), 0.0, HOLD_SPEED_MPS
-                )
-            return self._hold
+            return self._hold_at_surface()
+        if self.node.blind:
+            # Nobody knows the bottom below it. At the surface it receives GPS.
+            order.limited, order.circling_since = f"held at the surface: it {NO_POSITION}", None
+            return self._hold_at_surface()
+        self._hold = None
         waypoint = order.waypoint
         depth, order.limited = waypoint.depth_m, ""
         if order.unseen and order.status is WaypointStatus.REACHED:
@@ -262,6 +275,13 @@ class Follower(Control):
         # At the surface DUNE drifts, motor off, from where it is within its tolerance and the radius on: no circles.
         radius_m = order.radius_m if depth > 0.0 else 0.0
         return SentReference(math.radians(lat_deg), math.radians(lon_deg), depth, waypoint.speed_mps, radius_m)
+
+    def _hold_at_surface(self) -> SentReference | None:
+        """Where it told to be last, at the surface; the same place until it goes on."""
+        report = self.node.report
+        if self._hold is None and report is not None:
+            self._hold = SentReference(math.radians(report.lat_deg), math.radians(report.lon_deg), 0.0, HOLD_SPEED_MPS)
+        return self._hold
 
     def _send_reference(self, reference: SentReference, now: float) -> None:
         self._reference_due = now + self._settings.reference_period_s

@@ -32,6 +32,7 @@ from imc_bridge.events import StateReport, Waypoint, WaypointStatus
 from imc_bridge.network.codec import Message
 from imc_bridge.network.text_fields import text
 from imc_bridge.nodes.modes import PlanState
+from imc_bridge.nodes.node import NO_POSITION
 
 END_WITHIN_M = 25.0
 """A leg that ended farther from its waypoint did not lead there: Goto ends some 7 m before, and the vehicle floats."""
@@ -107,6 +108,7 @@ class LegFollower(Control):
 
     def reported_by_sound(self, report: SoundReport, now: float) -> None:
         """Take a position reported by sound: it shows arrival where radio cannot."""
+        self.node.unplaced_s = 0.0
         leg, order = self._leg, self._order
         if self.phase is not Phase.FOLLOWING or leg is None or not leg.acknowledged or order is None:
             return
@@ -231,7 +233,11 @@ class LegFollower(Control):
 
     def _tick_following(self, now: float) -> None:
         order, leg = self._order, self._leg
-        if order is None or order.status in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
+        if leg is not None and not leg.ended and self.node.unplaced_s > self.node.lost_after_s:
+            # Its plan is stopped, so that it floats up, and begun again when it tells where it is.
+            self._leg = None
+            self._restart(NO_POSITION, now)
+        elif order is None or order.status in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
             self._watch_idle(now)
         elif leg is None:
             if self._reachable(now):
@@ -278,7 +284,12 @@ class LegFollower(Control):
         return self._silence(now) <= max(HEARD_LATELY_S, 0.5 * settings.lost_after_wall_s * settings.time_scale)
 
     def _reachable(self, now: float) -> bool:
-        """Whether a message sent now arrives: contact at the surface, lasting contact under water, or sound."""
+        """Whether a message sent now arrives: contact at the surface, lasting contact under water, or sound.
+
+        A vehicle that does not tell where it is gets none.
+        """
+        if self.node.blind:
+            return False
         if self._by_sound(now):
             return True
         wet = self._wet_since is not None and now - self._wet_since >= HEARD_UNDER_WATER_S
@@ -295,6 +306,8 @@ class LegFollower(Control):
     def _watch_idle(self, now: float) -> None:
         if self.sound is not None and self._by_sound(now):
             self.sound.ask(now)
+            return
+        if self._blind_too_long(self._settings.release_after_s, now):
             return
         silence = self._silence(now)
         if not self._expected_away(now) and silence > max(

@@ -32,15 +32,48 @@ _BIG = struct.Struct(">HHHdHBHB")
 _SYNC_LITTLE = struct.pack("<H", SYNC)
 _SYNC_BIG = struct.pack(">H", SYNC)
 
-PLAN_CONTROL, PLAN_DB = 559, 556
 _TEXT = -1
-_CARRIED = {
-    564: (_TEXT, 2, _TEXT, _TEXT, _TEXT, _TEXT),  # PlanStatistics
-    558: (_TEXT, 12, _TEXT, _TEXT),  # PlanDBInformation; its checksum is written as texts are
+"""A text or raw data: its length, two bytes, and as many."""
+
+
+class _Carried(NamedTuple):
+    """A place for one message of these ids, or with ``many`` for a list of them."""
+
+    ids: frozenset[int]
+    many: bool = False
+
+
+def _one(*ids: int) -> _Carried:
+    return _Carried(frozenset(ids))
+
+
+def _many(*ids: int) -> _Carried:
+    return _Carried(frozenset(ids), many=True)
+
+
+_LAYOUTS: dict[int, tuple[int | _Carried, ...]] = {
+    211: (1, _TEXT, 4, _one()),  # AcousticOperation
+    262: (1, _many(282), _many(283), 4),  # Distance
+    276: (14, _many(283), _TEXT),  # SonarData
+    480: (3, _one(479), 2),  # FollowRefState
+    556: (4, _TEXT, _one(564, 558), _TEXT),  # PlanDB
+    559: (4, _TEXT, 2, _one(564, 558), _TEXT),  # PlanControl
+    802: (_TEXT, _many(801)),  # EntityParameters
 }
-"""What vehicles' plan messages carry: texts, and bytes of other fields between them, by message id."""
-_BEFORE_NAME = 4
-"""Bytes of either plan message before the plan's name: type, operation, number of the request."""
+"""Wanted messages that carry others, by id: bytes of plain fields, texts, and what may be inside."""
+_INNER: dict[int, tuple[int | _Carried, ...]] = {
+    282: (24,),  # DeviceState
+    283: (8,),  # BeamConfig
+    401: (5,),  # DesiredZ
+    402: (9,),  # DesiredSpeed
+    479: (1, _one(402), _one(401), 20),  # Reference
+    558: (_TEXT, 12, _TEXT, _TEXT),  # PlanDBInformation; its checksum is written as texts are
+    564: (_TEXT, 2, _TEXT, _TEXT, _TEXT, _TEXT),  # PlanStatistics
+    801: (_TEXT, _TEXT),  # EntityParameter
+}
+"""What is read of them, in the same way."""
+_AFTER_CARRIED = {211: 0, 556: 2, 559: 2}
+"""Messages that are of use without what they carry: bytes of an empty text after it."""
 NO_MESSAGE = 0xFFFF
 """Stands in a packet where a message could be carried inside."""
 
@@ -131,37 +164,62 @@ def checksum(data: bytes) -> int:
     return crc
 
 
-def without_argument(packet: bytes) -> bytes:
-    """Return a plan message's packet without what it carries inside (and the text after that), unless that is sound.
+def readable(packet: bytes) -> bytes | None:
+    """Return a packet whose messages inside can all be read to their ends; None where there is none.
 
-    What vehicles answer with stays where it can be read to its end (:data:`_CARRIED`). imcpy 1.1.2 loses
-    memory for good with every inner message that it cannot read: a flood of them would bring the service down. All
-    other packets are returned as they are.
+    Plan messages and those of modems are read without what they carry (and the text after that) where that cannot be
+    read. imcpy 1.1.2 loses memory for good with every inner message that it cannot read: a flood of them would bring
+    the service down.
     """
     order: Literal["little", "big"] = "little" if packet[:2] == _SYNC_LITTLE else "big"
     msg_id = int.from_bytes(packet[2:4], order)
-    if msg_id not in (PLAN_CONTROL, PLAN_DB):
+    layout = _LAYOUTS.get(msg_id)
+    if layout is None:
         return packet
-    end = _after_text(packet, HEADER_SIZE + _BEFORE_NAME, order)
-    end += 2 if msg_id == PLAN_CONTROL else 0  # flags
-    carried = int.from_bytes(packet[end : end + 2], order)
-    if end + 2 > len(packet) - FOOTER_SIZE or carried == NO_MESSAGE:
+    content = packet[:-FOOTER_SIZE]
+    if _after(layout, content, HEADER_SIZE, order) is not None:
         return packet
-    if carried in _CARRIED:
-        at = end + 2
-        for size in (*_CARRIED[carried], _TEXT):  # the last one is the text after the inner message
-            at = _after_text(packet, at, order) if size == _TEXT else at + size
-        if at == len(packet) - FOOTER_SIZE:
-            return packet
-    if checksum(packet[:-FOOTER_SIZE]) != int.from_bytes(packet[-FOOTER_SIZE:], order):
-        return packet  # which imcpy notices before it reads further
-    bare = packet[:end] + NO_MESSAGE.to_bytes(2, order) + bytes(2)
+    place = next(index for index, part in enumerate(layout) if isinstance(part, _Carried))
+    at = _after(layout[:place], content, HEADER_SIZE, order)
+    if msg_id not in _AFTER_CARRIED or at is None or content[at : at + 2] in (b"", NO_MESSAGE.to_bytes(2, order)):
+        return None
+    if checksum(content) != int.from_bytes(packet[-FOOTER_SIZE:], order):
+        return None
+    bare = content[:at] + NO_MESSAGE.to_bytes(2, order) + bytes(_AFTER_CARRIED[msg_id])
     bare = bare[:4] + (len(bare) - HEADER_SIZE).to_bytes(2, order) + bare[6:]
     return bare + checksum(bare).to_bytes(2, order)
 
 
-def _after_text(packet: bytes, at: int, order: Literal["little", "big"]) -> int:
-    return at + 2 + int.from_bytes(packet[at : at + 2], order)
+def _after(layout: tuple[int | _Carried, ...], content: bytes, at: int, order: Literal["little", "big"]) -> int | None:
+    """Where what follows a layout begins; None where the content ends before."""
+    for part in layout:
+        if isinstance(part, _Carried):
+            after = _after_carried(part, content, at, order)
+            if after is None:
+                return None
+            at = after
+        elif part == _TEXT:
+            at += 2 + int.from_bytes(content[at : at + 2], order)
+        else:
+            at += part
+        if at > len(content):
+            return None
+    return at
+
+
+def _after_carried(place: _Carried, content: bytes, at: int, order: Literal["little", "big"]) -> int | None:
+    count = 1
+    if place.many:
+        count, at = int.from_bytes(content[at : at + 2], order), at + 2
+    for _ in range(count):
+        msg_id, at = int.from_bytes(content[at : at + 2], order), at + 2
+        if at > len(content) or msg_id not in (NO_MESSAGE, *place.ids):
+            return None
+        after = at if msg_id == NO_MESSAGE else _after(_INNER[msg_id], content, at, order)
+        if after is None:
+            return None
+        at = after
+    return at
 
 
 class Decoder:
@@ -212,6 +270,14 @@ class Decoder:
         else:
             self.unwanted[name] += 1
         return False
+
+    def received(self, packet: bytes) -> Message | None:
+        """Decode a packet from the network, like :meth:`message`, at no cost of memory whatever it carries inside."""
+        sound = readable(packet)
+        if sound is None:
+            self.faults[PacketFault.CHECKSUM] += 1
+            return None
+        return self.message(sound)
 
     def message(self, packet: bytes) -> Message | None:
         """Decode a packet whose header was taken; None (and a count) when its contents are wrong."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-from imcpy.coordinates import toWGS84
-
 from imc_bridge.events import LostComms, StateReport
 from imc_bridge.network.codec import Message
 from imc_bridge.network.discovery import MAX_NAME, Announcement
@@ -26,6 +24,7 @@ from imc_bridge.printable import printable
 from imc_bridge.settings import PLAN_NAME, BridgeSettings, plan_name
 from imc_bridge.telemetry.energy import Energy, read_fuel
 from imc_bridge.telemetry.faults import Faults
+from imc_bridge.telemetry.positions import told_place
 from imc_bridge.telemetry.ranges import RangeIntake
 from imc_bridge.telemetry.soundings import SoundingIntake, StateHistory, StateSample, beam_table
 from imc_bridge.telemetry.swaths import PingIntake
@@ -45,6 +44,10 @@ LONGEST_DIVE_S = 3600.0
 """So long a vehicle may be silent under water in a plan whose length is not known here, as another console's or the way
 home on board; one that was away for longer may come back under another address."""
 STATE_MESSAGES_FRESH_S = 3.0
+"""What was told longer ago need not be so any more: where it is, above all."""
+STEADY_S = 1.0
+"""At most so much of a pause between two packets counts as contact: DUNE's heartbeats are no farther apart."""
+NO_POSITION = "tells no position: it has no GPS fix yet, or its navigation has failed"
 MAX_TEXT = 500
 """Characters kept of what a vehicle says in words."""
 NO_OUTCOME = 0
@@ -131,6 +134,10 @@ class Node:
         self.history = StateHistory()
         self.places = PlausiblePlace()
         self.report: StateReport | None = None
+        self.report_at: float | None = None
+        """When it last told where it is."""
+        self.unplaced_s = 0.0
+        """For how long it has been in contact since without telling that; silence does not count."""
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
         self.pings = PingIntake(name)
         self.ranges = RangeIntake(name)
@@ -212,6 +219,9 @@ class Node:
     def heard(self, now: float, address: Address) -> None:
         """Note that a packet of its own arrived from one of its addresses."""
         self.packets += 1
+        pause_s = math.inf if self.heard_at is None else now - self.heard_at
+        if pause_s <= self.lost_after_s:
+            self.unplaced_s += min(pause_s, STEADY_S)
         self.heard_at = now
         self.address = address
 
@@ -222,6 +232,7 @@ class Node:
             return None if at is None else min(at + seconds, now)
 
         self.heard_at, self.announced_at = later(self.heard_at), later(self.announced_at)
+        self.report_at = later(self.report_at)
         self.operation_mode_at, self.plan_state_at = later(self.operation_mode_at), later(self.plan_state_at)
         if self.expected_back is not None:
             self.expected_back += seconds
@@ -250,15 +261,12 @@ class Node:
 
     # Telemetry
 
-    def take_state(self, message: Message) -> StateReport | Refused | None:
+    def take_state(self, message: Message, now: float) -> StateReport | Refused | None:
         """EstimatedState: None when it is out of order, repeated or holds no position, Refused where it cannot be."""
-        if message.lat == 0.0 and message.lon == 0.0:
-            # It has had no fix yet.
+        place = told_place(message)
+        if place is None or not all(map(math.isfinite, (message.phi, message.theta, message.psi))):
             return None
-        lat, lon, _height = toWGS84(message)
-        values = (lat, lon, message.depth, message.phi, message.theta, message.psi)
-        if not all(map(math.isfinite, values)) or abs(lat) > math.pi / 2:
-            return None
+        lat, lon = place
         time_s = message.timestamp
         sample = StateSample(
             time_s, lat, lon, message.depth, message.phi, message.theta, math.remainder(message.psi, math.tau)
@@ -271,6 +279,7 @@ class Node:
             self.history.clear()
         if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
             return None
+        self.report_at, self.unplaced_s = now, 0.0
         energy = self.energy
         speed = math.hypot(message.vx, message.vy)
         altitude = float(message.alt)
@@ -382,6 +391,21 @@ class Node:
         return self.ours and self.expected_back is None
 
     @property
+    def lost_after_s(self) -> float:
+        """Silence that is longer is a break of contact."""
+        return max(self.settings.lost_after_s, self.settings.lost_after_wall_s * self.settings.time_scale)
+
+    @property
+    def blind(self) -> bool:
+        """Whether it is heard, or was at the last contact, and does not tell where it is: it may be over any bottom."""
+        return self.unplaced_s > self.fresh_s
+
+    @property
+    def fresh_s(self) -> float:
+        """What it told of itself counts for so long, while it is in contact."""
+        return max(STATE_MESSAGES_FRESH_S, self.settings.lost_after_wall_s * self.settings.time_scale)
+
+    @property
     def patience_s(self) -> float:
         """How long it may be silent before its silence means a loss."""
         if not self.submerged:
@@ -406,13 +430,14 @@ class Node:
         return self.plan_state == PlanState.BLOCKED and self.operation_mode == OperationMode.MANEUVER
 
     def can_start(self, now: float) -> bool:
-        """In service and ready for a plan, by messages that are not old."""
-        limit = max(STATE_MESSAGES_FRESH_S, self.settings.lost_after_wall_s * self.settings.time_scale)
+        """In service and ready for a plan, and at a known place, by messages that are not old."""
+        limit = self.fresh_s
         return (
             self.operation_mode == OperationMode.SERVICE
             and self.plan_state == PlanState.READY
             and _fresh(self.operation_mode_at, now, limit)
             and _fresh(self.plan_state_at, now, limit)
+            and _fresh(self.report_at, now, limit)
         )
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from imc_bridge.events import NodeState
 from imc_bridge.nodes.modes import OperationMode, PlanState, mode_name
-from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
+from imc_bridge.nodes.node import ANNOUNCES_MISSED, NO_POSITION, Node
 from imc_bridge.settings import PLAN_NAME, BridgeSettings
 
 
@@ -21,8 +21,14 @@ class Status:
 
 def status_of(node: Node, now: float) -> Status:
     """The link's state and the reason for it."""
+    status = _of_contact(node, now)
+    if node.blind and status.state in (NodeState.READY, NodeState.IN_PLAN):
+        return Status(status.state, "; ".join(filter(None, (status.reason, NO_POSITION))))
+    return status
+
+
+def _of_contact(node: Node, now: float) -> Status:
     settings = node.settings
-    lost_after = max(settings.lost_after_s, settings.lost_after_wall_s * settings.time_scale)
     if node.announcement is None:
         ports = f"{settings.announce_ports[0]}-{settings.announce_ports[-1]}"
         return Status(
@@ -34,7 +40,7 @@ def status_of(node: Node, now: float) -> Status:
     if node.heard_at is None and node.announced_at is not None and node.first_announced_at is not None:
         return _without_telemetry(node.settings, now, node.announced_at, node.first_announced_at)
     silence = math.inf if node.heard_at is None else now - node.heard_at
-    if silence > lost_after:
+    if silence > node.lost_after_s:
         return _silent(node, silence, now)
     if node.operation_mode is None or node.plan_state is None:
         return Status(NodeState.ACTIVE, "waiting for its VehicleState and PlanControlState")
@@ -63,7 +69,9 @@ def _whose_plan(node: Node) -> str:
     controller = f" (0x{node.foreign_controller:04X})" if node.foreign_controller is not None else ""
     words = f"{plan} of another console{controller}"
     if node.plan_id.startswith(f"{PLAN_NAME}-"):
-        words += f"; where that is a service on the same database its id, {node.plan_id[-4:]}, belongs into `imc.partners`"
+        words += (
+            f"; where that is a service on the same database its id, {node.plan_id[-4:]}, belongs into `imc.partners`"
+        )
     return words
 
 

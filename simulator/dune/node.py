@@ -204,17 +204,21 @@ class FakeDune:
             self._report_entities()
 
     def fail(self, what: str) -> None:
-        """Let something break: a leak ("leak"), or what puts the vehicle in error ("error")."""
+        """Let something break: a leak ("leak"), what puts the vehicle in error ("error"), or its "navigation"."""
         if what == "error":
             self.plan.break_down(FAULTY, "motor current too high", self._now_s)
         elif what == "leak":
             self._leak = imcpy.EntityState.StateEnum.FAILURE
+        elif what == "navigation" and self._telemetry is not None:
+            self._telemetry.navigation_failed = True
         else:
-            raise ValueError(f"cannot let {what!r} fail; it must be leak or error")
+            raise ValueError(f"cannot let {what!r} fail; it must be leak, error or navigation")
 
     def mend(self) -> None:
         """Repair everything."""
         self.plan.mend()
+        if self._telemetry is not None:
+            self._telemetry.navigation_failed = False
         if self._leak is not None:
             self._leak = imcpy.EntityState.StateEnum.NORMAL
 

@@ -39,6 +39,8 @@ class Telemetry:
         self._simulated = imcpy.SimulatedState()
         self._simulated.lat, self._simulated.lon = self._lat, self._lon
         self._distances: dict[tuple[str, int], imcpy.Distance] = {}
+        self.navigation_failed = False
+        """Whether the states hold no numbers where the position should be."""
         self._announce = imcpy.Announce()
         self._announce.sys_name = name
         self._announce.sys_type = imcpy.SystemType.UUV
@@ -59,7 +61,8 @@ class Telemetry:
         vehicle = self._vehicle
         m, here = vehicle.vehicle.motion, vehicle.position
         message = self._estimated
-        message.x, message.y, message.z = here.north_m, here.east_m, here.depth_m
+        message.x = math.nan if self.navigation_failed else here.north_m
+        message.y, message.z = here.east_m, here.depth_m
         message.phi, message.theta, message.psi = m.roll_rad, m.pitch_rad, m.heading_rad
         message.u = m.surge_mps
         message.vx, message.vy, message.vz = m.vn_mps, m.ve_mps, m.vd_mps

@@ -286,13 +286,19 @@ EventSink = Callable[[FleetEvent], None]
 
 @dataclass(frozen=True, slots=True)
 class VehicleInfo:
-    """What a link knows of a vehicle now. ``age_s`` is the time since it was last heard, None when never."""
+    """What a link knows of a vehicle now. ``age_s`` is the time since it was last heard, None when never.
+
+    ``position_age_s`` is the time since it last told where it is, None where that is not known apart from ``age_s``.
+    """
 
     name: str
     kind: str
     state: LinkState
     reason: str = ""
     age_s: float | None = None
+    position_age_s: float | None = None
+    blind: bool = False
+    """It is heard, or was at the last contact, and does not tell where it is."""
     address: str | None = None
     imc_id: int | None = None
     report: VehicleReport | None = None
@@ -305,6 +311,11 @@ class VehicleInfo:
     """What the operator should change about how it is used; told once in the mission's log."""
     machine_advice: str = ""
     """What is wrong on this machine with the way to it, and what to do; told once in the log of each mission."""
+
+    @property
+    def report_age_s(self) -> float | None:
+        """How old its report is; without one when it was last heard, None when never."""
+        return self.age_s if self.position_age_s is None else self.position_age_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,6 +79,12 @@ TABLE: Mapping[Failsafe, Rule] = {
         "alarm: it does not know where it is",
         after_s=10.0,
     ),
+    Failsafe.NO_POSITION: Rule(
+        "it is heard and does not tell where it is; IMC vehicles are brought up by then, and go on when they tell",
+        Response.WARN,
+        "alarm: how old its position is",
+        after_s=7.0,
+    ),
     Failsafe.LOW_ENERGY: Rule(
         f"what it has left for sure is less than {LOW_RATIO:g} of its way home, {LOW_RESERVE_S:g} s, and what makes up "
         f"for a drift of {UNHEARD_S:g} s; without a recovery point a battery below {LOW_PCT:g} %",

@@ -88,7 +88,7 @@ def idle_vehicle_view(info: VehicleInfo) -> VehicleView:
         kind=VehicleKind(info.kind),
         link=info.state,
         reason=info.reason,
-        age_s=info.age_s,
+        age_s=info.report_age_s,
         address=info.address,
         imc_id=info.imc_id,
         lat_deg=report.position.lat_deg if report else None,

@@ -10,6 +10,7 @@ class Failsafe(StrEnum):
     CRITICAL_ENERGY = "critical_energy"
     TOO_DEEP = "too_deep"
     POSITION_LOST = "position_lost"
+    NO_POSITION = "no_position"
     LOW_ENERGY = "low_energy"
     LINK_LOST = "link_lost"
     TRAFFIC = "traffic"

@@ -85,7 +85,10 @@ class VehicleView(View):
     reason: str = Field(
         default="", description="What is missing or wrong and what to do, or why it waits; empty: all is well"
     )
-    age_s: float | None = Field(default=None, description="Seconds since last heard; null: never")
+    age_s: float | None = Field(
+        default=None,
+        description="Seconds since it last told where it is; since it was heard where it never did; null: never",
+    )
     address: str | None = None
     imc_id: int | None = None
     lat_deg: float | None = None

@@ -49,7 +49,7 @@ POSTING = {
     "its_neighbour": (200.0, 300.0),
 }
 """Vehicles that post where they are, and where that is, metres from the area's corner."""
-DUNES = ("leak", "vehicle_error", "other_console")
+DUNES = ("leak", "no_position", "vehicle_error", "other_console")
 LOST = ("link_lost", "lost_too")
 EQUIPMENT = Equipment(ping_period_s=2.0, battery=BatterySpec())
 BEGAN_S = 1_795_225_140.0
@@ -236,6 +236,7 @@ TRIGGERS: dict[Failsafe, Callable[[Scene], None]] = {
     Failsafe.CRITICAL_ENERGY: lambda scene: scene.tell("critical_energy", battery_pct=8.0),
     Failsafe.TOO_DEEP: lambda scene: scene.tell("too_deep", depth_m=40.0),
     Failsafe.POSITION_LOST: lambda scene: scene.tell("position_lost", position_sd_m=80.0),
+    Failsafe.NO_POSITION: lambda scene: scene.dunes.do("no_position", lambda node: node.fail("navigation")),
     # So much used is far more than its stated endurance in one minute of this test, and too much still in six.
     Failsafe.LOW_ENERGY: lambda scene: scene.tell("low_energy", battery_pct=25.0),
     Failsafe.LINK_LOST: nothing,
@@ -253,6 +254,7 @@ SHOWN: dict[Failsafe, tuple[str, str]] = {
     Failsafe.CRITICAL_ENERGY: ("Critical energy", "its battery is at 8 %, and it has no way home"),
     Failsafe.TOO_DEEP: ("Too deep", "it is at 40.0 m, and 30 m is the limit"),
     Failsafe.POSITION_LOST: ("Position lost", "it knows where it is to 80 m"),
+    Failsafe.NO_POSITION: ("No position", r"it does not tell where it is: its position is \d+ s old"),
     Failsafe.LOW_ENERGY: ("Low energy", r"its energy lasts \d+ s for sure, and its way home takes \d+ s"),
     Failsafe.LINK_LOST: ("Link lost", "its link is lost: "),
     Failsafe.TRAFFIC: ("Traffic", "the ship MMSI 211000001 .*comes to 0 m now"),

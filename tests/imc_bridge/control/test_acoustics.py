@@ -160,6 +160,17 @@ class Modem(Peer):
             self.sock.sendto(imcpy.Packet.serialize(report), ("127.0.0.1", self.settings.port))
 
 
+def test_a_report_by_sound_that_holds_no_position_counts_for_nothing() -> None:
+    """Each one that counts prolongs the time in which the vehicle is not missed."""
+    path = SoundPath("v", GATEWAY, lambda _message: None, lambda: 1, lambda: 1.7e9)
+    state = imcpy.EstimatedState()
+    assert path.take_report(state) is None, "it has had no fix yet"
+    state.lat, state.lon = math.nan, -0.15
+    assert path.take_report(state) is None
+    state.lat = 0.72
+    assert path.take_report(state) is not None
+
+
 async def test_legs_go_on_by_sound_where_radio_does_not_reach() -> None:
     async with open_sea(radio_range_m=RADIO_M, bridge={"unknown_bottom_depth_m": 3.0}) as sea:
         modem = Modem(sea)

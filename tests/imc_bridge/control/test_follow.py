@@ -11,10 +11,11 @@ import pytest
 from imc_bridge.control.control import Phase
 from imc_bridge.control.follow import Follower
 from imc_bridge.control.legs import LegFollower
-from imc_bridge.events import Waypoint, WaypointStatus
+from imc_bridge.events import StateReport, Waypoint, WaypointStatus
 from imc_bridge.network.discovery import Announcement
 from imc_bridge.nodes.modes import OperationMode, PlanState
 from imc_bridge.nodes.node import Node
+from imc_bridge.nodes.status import status_of
 from imc_bridge.settings import BridgeSettings
 
 ADDRESS = ("127.0.0.1", 6002)
@@ -35,6 +36,9 @@ class Script:
         self.follower = kind(self.node, self.settings, self.sent.append, self.changes.append, itertools.count(7))
         self.mode, self.plan = OperationMode.SERVICE, PlanState.READY
         self.alive = True
+        self.here: tuple[float, float, float] | None = None
+        self.spoil: Callable[[Any], bool] = lambda _state: True
+        """Changes a state that is on its way; False: it does not arrive."""
 
     def report(
         self,
@@ -60,17 +64,27 @@ class Script:
         self.follower.plan_state_changed(self.now)
 
     def move(self, lat_deg: float = 41.185, lon_deg: float = -8.705, depth_m: float = 0.0) -> None:
+        self.here = lat_deg, lon_deg, depth_m
+        self.node.places.clear()  # the script puts it where it wants
+        self.tell_state()
+
+    def tell_state(self) -> None:
+        """Let it tell where it is."""
+        assert self.here is not None
+        lat_deg, lon_deg, depth_m = self.here
         self.time_s += 0.1
         state = imcpy.EstimatedState()
         state.timestamp = self.time_s
         state.lat, state.lon, state.depth = math.radians(lat_deg), math.radians(lon_deg), depth_m
-        self.node.places.clear()  # the script puts it where it wants
-        report = self.node.take_state(state)
-        if report is not None:
+        if not self.spoil(state):
+            return
+        report = self.node.take_state(state, self.now)
+        if isinstance(report, StateReport):
             self.follower.moved(report, self.now)
 
-    def echo(self, state: int = 2, reference: imcpy.Message | None = None) -> None:
+    def echo(self, state: int = 2, reference: imcpy.Message | None = None, *, time_s: float = 0.0) -> None:
         message = imcpy.FollowRefState()
+        message.timestamp = time_s
         message.control_src = self.settings.id
         message.state = imcpy.FollowRefState.StateEnum(state)
         sent = self.of("Reference")
@@ -96,6 +110,8 @@ class Script:
             before = len(self.of("Reference"))
             if self.alive:
                 self.report()
+                if self.here is not None:
+                    self.tell_state()
             self.follower.tick(self.now)
             if self.alive and echoing and len(self.of("Reference")) > before:
                 self.echo()
@@ -162,7 +178,7 @@ def test_vehicle_that_tells_no_position_is_not_engaged(kind: type[Any]) -> None:
     script.follower.engage(script.now)
     script.run(16.0)
     assert script.sent == []
-    assert "holds a position" in script.follower.refusal.reason
+    assert "tells no position" in script.follower.refusal.reason
 
     script.move()
     assert script.follower.engage(script.now)
@@ -407,3 +423,170 @@ def test_guarded_depth_is_raised_at_once_when_the_bottom_rises() -> None:
         script.follower.guard.add(script.time_s, 41.185, -8.705, 9.0)
     script.run(0.2)
     assert script.of("Reference")[-1].z.value == pytest.approx(6.0)
+
+
+# Heard, and telling no position
+
+
+def _without_numbers(state: Any) -> bool:
+    state.x = math.nan
+    return True
+
+
+def _without_fix(state: Any) -> bool:
+    state.lat = state.lon = 0.0
+    return True
+
+
+def _unsent(_state: Any) -> bool:
+    return False
+
+
+class _Elsewhere:
+    """Every state is somewhere else, and none near the last one."""
+
+    def __init__(self) -> None:
+        self._count = itertools.count(1)
+
+    def __call__(self, state: Any) -> bool:
+        state.lat = math.radians(41.185 + 0.1 * next(self._count))
+        return True
+
+
+BLIND = {"NaN": _without_numbers, "0, 0": _without_fix, "no state": _unsent, "never where it can be": _Elsewhere()}
+
+
+def blinded(kind: type[Any], spoil: Callable[[Any], bool], depth_m: float = 1.0) -> Script:
+    """A vehicle on its way, of which nothing but its position is missing from now on."""
+    script = Script(kind).follow()
+    script.run(2.0)
+    if kind is LegFollower:
+        script.report(mode=OperationMode.MANEUVER, plan=PlanState.EXECUTING)
+    script.move(depth_m=depth_m)
+    script.run(1.0)
+    assert script.follower.phase is Phase.FOLLOWING
+    script.spoil = spoil
+    return script
+
+
+@pytest.mark.parametrize("spoil", BLIND.values(), ids=BLIND.keys())
+def test_vehicle_that_tells_no_position_is_held_at_the_surface_and_goes_on_when_it_does(
+    spoil: Callable[[Any], bool],
+) -> None:
+    script = blinded(Follower, spoil)
+    assert script.of("Reference")[-1].z.value > 0.0
+    script.run(5.0)
+    held = script.of("Reference")[-1]
+    assert held.z.value == 0.0
+    assert math.degrees(held.lat) == pytest.approx(41.185)
+    assert script.follower.phase is Phase.FOLLOWING
+    assert "tells no position" in status_of(script.node, script.now).reason
+    # It has a fix again.
+    script.spoil = lambda _state: True
+    script.run(2.0)
+    assert script.of("Reference")[-1].z.value > 0.0
+    assert math.degrees(script.of("Reference")[-1].lat) == pytest.approx(WAYPOINT.lat_deg)
+    assert "tells no position" not in status_of(script.node, script.now).reason
+    assert script.statuses() == [WaypointStatus.SENT, WaypointStatus.ACKNOWLEDGED]
+
+
+@pytest.mark.parametrize("spoil", BLIND.values(), ids=BLIND.keys())
+def test_vehicle_that_tells_no_position_for_longer_than_it_takes_to_come_up_is_let_go(
+    spoil: Callable[[Any], bool],
+) -> None:
+    script = blinded(Follower, spoil)
+    patience_s = script.node.patience_s
+    assert patience_s >= 30.0
+    script.run(patience_s - 2.0)
+    assert script.follower.phase is Phase.FOLLOWING
+    script.run(4.0)
+    assert script.follower.phase is Phase.IDLE
+    assert "told no position for" in script.follower.refusal.reason
+    assert script.statuses()[-1] is WaypointStatus.REFUSED
+    assert script.operations()[-1] == 1, "it is told to stop"
+    # It is not taken over again before it tells where it is.
+    script.report(mode=OperationMode.SERVICE, plan=PlanState.READY)
+    script.follower.engage(script.now)
+    script.run(10.0)
+    assert script.follower.phase is Phase.WAITING
+    script.spoil = lambda _state: True
+    script.run(0.4)
+    assert script.follower.phase is Phase.STARTING
+
+
+@pytest.mark.parametrize("spoil", BLIND.values(), ids=BLIND.keys())
+def test_leg_of_a_vehicle_that_tells_no_position_is_stopped_and_begun_again(spoil: Callable[[Any], bool]) -> None:
+    script = blinded(LegFollower, spoil)
+    assert script.operations() == [0]
+    script.run(15.0)
+    assert script.follower.phase is Phase.WAITING
+    assert script.operations()[-1] == 1
+    assert "tells no position" in status_of(script.node, script.now).reason
+    script.report(mode=OperationMode.SERVICE, plan=PlanState.READY)
+    script.run(5.0)
+    assert script.operations()[-1] == 1, "no leg begins where nobody knows"
+    script.spoil = lambda _state: True
+    script.run(1.0)
+    assert script.follower.phase is Phase.FOLLOWING
+    assert script.operations()[-1] == 0
+
+
+def test_vehicle_between_two_legs_that_tells_no_position_gets_none_and_is_let_go() -> None:
+    script = Script(LegFollower)
+    script.report()
+    script.move()
+    script.follower.engage(script.now)
+    script.run(1.0)
+    script.spoil = _without_numbers
+    script.run(4.0)
+    script.follower.order(WAYPOINT, script.now)
+    script.run(10.0)
+    assert script.sent == []
+    script.run(20.0)
+    assert script.follower.phase is Phase.IDLE
+    assert "told no position" in script.follower.refusal.reason
+
+
+@pytest.mark.parametrize("pause_s", [12.0, 60.0])
+def test_vehicle_that_is_heard_seldom_is_not_taken_for_one_without_position(pause_s: float) -> None:
+    script = Script().follow()
+    for _ in range(20):
+        script.now += pause_s
+        script.report()
+    assert not script.node.blind
+
+
+def test_vehicle_whose_radio_ended_under_water_is_not_taken_for_one_without_position() -> None:
+    script = blinded(Follower, lambda _state: True)
+    script.alive = False
+    script.run(8.0)
+    script.alive = True
+    script.spoil = _unsent  # the first packets after the gap are others
+    script.run(1.0)
+    assert not script.node.blind
+
+
+def test_states_that_are_lost_now_and_then_make_no_vehicle_come_up() -> None:
+    script = blinded(Follower, lambda _state: True)
+    arrives = itertools.cycle([False] * 9 + [True])
+    script.spoil = lambda _state: next(arrives)
+    script.run(20.0)
+    assert all(reference.z.value > 0.0 for reference in script.of("Reference")[-15:])
+
+
+def test_a_late_word_of_a_timeout_ends_no_plan_that_began_or_was_answered_since() -> None:
+    script = Script()
+    script.report()
+    script.move()
+    script.follower.engage(script.now)
+    script.follower.tick(script.now)
+    script.reply(ok=True, info="plan loaded", time_s=50.0)
+    script.report(mode=OperationMode.MANEUVER, plan=PlanState.EXECUTING, time_s=51.0)
+    script.follower.order(WAYPOINT, script.now)
+    script.echo(6, time_s=48.0)
+    assert script.follower.phase is Phase.FOLLOWING, "that was another plan"
+    script.echo(time_s=55.0)
+    script.echo(6, time_s=54.0)
+    assert script.follower.phase is Phase.FOLLOWING, "it was answered since"
+    script.echo(6, time_s=61.0)
+    assert script.follower.phase is Phase.ENDED

@@ -1,8 +1,10 @@
 """Packets in and out."""
 
+import os
 import struct
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import imcpy
 import pytest
@@ -17,7 +19,7 @@ from imc_bridge.network.codec import (
     encode,
     message_name,
     peek,
-    without_argument,
+    readable,
 )
 from imc_bridge.receiver import WANTED
 from tests.support.imc.sea import read_capture
@@ -149,7 +151,7 @@ def statistics() -> imcpy.Message:
 
 def test_sound_statistics_and_the_text_after_them_stay() -> None:
     packet = packet_of(plan_control(statistics()))
-    assert without_argument(packet) == packet
+    assert readable(packet) == packet
     assert imcpy.Packet.deserialize(packet).info == "said the vehicle"
 
 
@@ -158,13 +160,13 @@ def test_what_recorded_vehicles_answer_stays_as_it_is(captures: Path, session: s
     for record in read_capture(captures / f"{session}.jsonl.gz"):
         message = Decoder(WANTED).message(record.packet)
         if isinstance(message, imcpy.PlanControl | imcpy.PlanDB) and int(message.type) != 0:
-            assert without_argument(record.packet) == record.packet
+            assert readable(record.packet) == record.packet
 
 
 def test_what_else_a_plan_message_carries_is_left_out_and_the_rest_stays() -> None:
     plan = imcpy.PlanSpecification()
     plan.plan_id = "survey-7"
-    bare = imcpy.Packet.deserialize(without_argument(packet_of(plan_control(plan))))
+    bare = Decoder(WANTED).received(packet_of(plan_control(plan)))
     assert (bare.type, bare.op, bare.request_id, bare.flags) == (1, 2, 777, 3)
     assert (bare.plan_id, bare.arg, bare.src, bare.timestamp) == ("survey-7", None, 0x1E, 1.5)
 
@@ -176,13 +178,13 @@ def test_statistics_that_end_too_early_are_left_out(cut: int) -> None:
     packet[4:6] = (len(packet) - 22).to_bytes(2, "little")
     packet[-2:] = checksum(bytes(packet[:-2])).to_bytes(2, "little")
     decoder = Decoder(WANTED)
-    message = decoder.message(without_argument(bytes(packet)))
+    message = decoder.received(bytes(packet))
     assert message is None or message.arg is None
 
 
 @pytest.mark.parametrize("message", [plan_control(), imcpy.PlanDB(), imcpy.Heartbeat(), imcpy.VehicleState()])
 def test_packets_that_carry_nothing_stay_as_they_are(message: imcpy.Message) -> None:
-    assert without_argument(packet_of(message)) == packet_of(message)
+    assert readable(packet_of(message)) == packet_of(message)
 
 
 @given(st.binary(max_size=40), st.integers(0, 30), st.booleans())
@@ -195,5 +197,71 @@ def test_whatever_is_carried_imcpy_never_reads_it(rubbish: bytes, cut: int, righ
     packet[4:6] = (len(packet) - 22).to_bytes(2, "little")
     packet[-2:] = checksum(bytes(packet[:-2])).to_bytes(2, "little") if right else b"??"
     decoder = Decoder(WANTED)
-    message = decoder.message(without_argument(bytes(packet)))
+    message = decoder.received(bytes(packet))
     assert message is None or (message.arg is None and message.plan_id == "survey-7")
+
+
+def _whole(message: imcpy.Message) -> imcpy.Message:
+    """A message with something in each place where it can carry a message."""
+    if isinstance(message, imcpy.FollowRefState):
+        message.reference = imcpy.Reference()
+        message.reference.speed, message.reference.z = imcpy.DesiredSpeed(), imcpy.DesiredZ()
+    if isinstance(message, imcpy.Distance):
+        message.location.append(imcpy.DeviceState())
+    if isinstance(message, imcpy.Distance | imcpy.SonarData):
+        message.beam_config.append(imcpy.BeamConfig())
+        message.beam_config.append(imcpy.BeamConfig())
+    if isinstance(message, imcpy.SonarData):
+        message.data = b"ranges"
+    if isinstance(message, imcpy.EntityParameters):
+        parameter = imcpy.EntityParameter()
+        parameter.name, parameter.value = "Rate Limiters", "Distance:5"
+        message.name = "UDP"
+        message.params.append(parameter)
+    if isinstance(message, imcpy.AcousticOperation):
+        message.system = "manta-1"
+    return message
+
+
+CARRIERS = [imcpy.FollowRefState, imcpy.Distance, imcpy.SonarData, imcpy.EntityParameters, imcpy.AcousticOperation]
+
+
+def _cut(packet: bytes, by: int) -> bytes:
+    """A packet that ends early, with the length and the checksum of one that is whole."""
+    cut = bytearray(packet[: len(packet) - 2 - by] + bytes(2))
+    cut[4:6] = (len(cut) - 22).to_bytes(2, "little")
+    cut[-2:] = checksum(bytes(cut[:-2])).to_bytes(2, "little")
+    return bytes(cut)
+
+
+@pytest.mark.parametrize("kind", CARRIERS[:-1])
+def test_messages_that_carry_others_are_read_when_whole_and_refused_wherever_they_end_early(kind: type[Any]) -> None:
+    packet = packet_of(_whole(kind()))
+    assert imcpy.Packet.serialize(Decoder(WANTED).received(packet)) == packet
+    for by in range(1, len(packet) - 22):
+        decoder = Decoder(WANTED)
+        assert decoder.received(_cut(packet, by)) is None
+        assert decoder.faults == {PacketFault.CHECKSUM: 1}
+
+
+def test_a_modem_that_tells_of_what_it_carries_is_heard_without_that() -> None:
+    message = imcpy.AcousticOperation()
+    message.system, message.range, message.msg = "manta-1", 120.0, imcpy.Heartbeat()
+    heard = Decoder(WANTED).received(packet_of(message))
+    assert (heard.system, heard.range, heard.msg) == ("manta-1", 120.0, None)
+
+
+def _memory_bytes() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.parametrize("kind", CARRIERS)
+def test_a_flood_of_messages_that_carry_what_cannot_be_read_costs_no_memory(kind: type[Any]) -> None:
+    packet = _cut(packet_of(_whole(kind())), 7)
+    decoder = Decoder(WANTED)
+    for _ in range(2000):
+        decoder.received(packet)
+    before = _memory_bytes()
+    for _ in range(30_000):
+        decoder.received(packet)
+    assert _memory_bytes() - before < 1e6

@@ -20,7 +20,7 @@ class Listener:
         )
         announce = imcpy.Announce()
         announce.sys_name, announce.sys_type, announce.services = "a", imcpy.SystemType.UUV, "imc+udp://127.0.0.1:6002/"
-        self.bridge.on_announce(self._packet(announce), ADDRESS)
+        self.bridge.on_announce(self.packet(announce), ADDRESS)
         mode = imcpy.VehicleState()
         mode.op_mode = imcpy.VehicleState.OperationModeEnum.MANEUVER
         doing = imcpy.PlanControlState()
@@ -29,9 +29,9 @@ class Listener:
         place = imcpy.EstimatedState()
         place.lat, place.lon, place.depth = math.radians(41.0), math.radians(-8.7), 3.0
         for message in (mode, doing, place):
-            self.bridge.on_packet(self._packet(message), ADDRESS)
+            self.bridge.on_packet(self.packet(message), ADDRESS)
 
-    def _packet(self, message: imcpy.Message) -> bytes:
+    def packet(self, message: imcpy.Message) -> bytes:
         message.src, message.dst, message.timestamp = 0x15, 0xFFFF, 1.7e9 + self.now_s
         return bytes(imcpy.Packet.serialize(message))
 
@@ -52,3 +52,15 @@ def test_who_is_silent_under_water_for_longer_than_it_can_be_is_lost(plan: str, 
     assert listener.after(0.0) is NodeState.IN_PLAN
     assert listener.after(waits_s - 5.0) is NodeState.EXPECTED_OFFLINE
     assert listener.after(10.0) is NodeState.LOST
+
+
+@pytest.mark.parametrize("message", [imcpy.EstimatedState(), imcpy.EulerAngles()], ids=["wanted", "of no use"])
+def test_damaged_packets_are_no_contact(message: imcpy.Message) -> None:
+    listener = Listener("", "")
+    for _ in range(40):
+        listener.now_s += 1.0
+        packet = bytearray(listener.packet(message))
+        packet[-1] ^= 0xFF
+        listener.bridge.on_packet(bytes(packet), ADDRESS)
+    [node] = listener.bridge.nodes()
+    assert node.age_s == 40.0

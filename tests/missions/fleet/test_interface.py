@@ -464,6 +464,28 @@ async def test_a_time_ahead_tells_nothing_of_how_far_a_vehicle_came() -> None:
     await link.close()
 
 
+async def test_a_vehicle_that_posts_no_place_where_it_can_be_is_heard_and_blind() -> None:
+    link = RestFleetLink(lost_after_s=0.2)
+    await link.start(lambda _event: None)
+    times_s = itertools.count(1000.0)
+
+    def post(north_deg: float) -> VehicleInfo:
+        report = VehicleReport("r", next(times_s), Position(LAT + north_deg, LON, 1.0))
+        if not link.doubt(report):
+            link.heard(report)
+        return link.vehicles()[0]
+
+    assert not post(0.0).blind
+    places = itertools.count(1)
+    await until(lambda: post(0.1 * next(places)).blind, "it never tells where it can be")
+    told = link.vehicles()[0]
+    assert told.age_s is not None
+    assert told.position_age_s is not None
+    assert told.report_age_s == told.position_age_s > 0.2 > told.age_s
+    assert not post(0.0).blind
+    await link.close()
+
+
 async def test_a_clock_that_is_always_ahead_is_the_vehicles_own() -> None:
     link = RestFleetLink(lost_after_s=0.2)
     await link.start(lambda _event: None)

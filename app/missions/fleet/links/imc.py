@@ -369,6 +369,8 @@ def _info(node: NodeView) -> VehicleInfo:
         state=_link_state(node.state, node.engaged, node.ours),
         reason=node.reason,
         age_s=node.age_s,
+        position_age_s=node.position_age_s,
+        blind=node.blind,
         address=node.address,
         imc_id=node.imc_id,
         report=None if node.report is None else vehicle_report(node.report),

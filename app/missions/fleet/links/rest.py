@@ -37,6 +37,10 @@ AHEAD_S = 5.0
 @dataclass
 class _Poller(Visitor):
     heard_s: float = 0.0
+    placed_s: float | None = None
+    """When it last told where it is, the event loop's time."""
+    doubtful_since_s: float | None = None
+    """Since when it has told only of places where it cannot be, the event loop's time; None: it has not."""
     newest_s: float = -math.inf
     """The newest time by its clock: what is older was kept until now."""
     newest_heard_s: float = 0.0
@@ -96,6 +100,8 @@ class RestFleetLink(VisitedLink):
                 state=p.state,
                 reason=self._reason(p.state),
                 age_s=now_s - p.heard_s,
+                position_age_s=None if p.placed_s is None else now_s - p.placed_s,
+                blind=p.doubtful_since_s is not None and p.heard_s - p.doubtful_since_s > self._lost_after_s,
                 report=p.report,
             )
             for p in self._pollers.values()
@@ -154,7 +160,9 @@ class RestFleetLink(VisitedLink):
         sample = self._sample(report)
         if places.take(sample) is not Step.DOUBTFUL or (last := places.last) is None:
             return ""
-        self._touch(report.vehicle)
+        poller = self._touch(report.vehicle)
+        if poller.doubtful_since_s is None:
+            poller.doubtful_since_s = poller.heard_s
         passed_s = abs(sample.time_s - last.time_s) / self._time_scale
         away_m, most_m = moved_m(last, sample), reach_m(last, sample)
         return (
@@ -180,6 +188,7 @@ class RestFleetLink(VisitedLink):
         """
         poller = self._touch(report.vehicle)
         now_s = asyncio.get_running_loop().time()
+        poller.doubtful_since_s = None
         older_s = poller.newest_s - report.time_s
         if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
@@ -193,7 +202,7 @@ class RestFleetLink(VisitedLink):
             poller.ahead_since_s = now_s
         if poller.ahead_since_s is None or now_s - poller.ahead_since_s >= self._lost_after_s:
             poller.newest_s, poller.newest_heard_s = report.time_s, now_s
-        poller.report = report
+        poller.report, poller.placed_s = report, now_s
         self._sink(report)
         self._check_arrival(poller)
 

@@ -161,10 +161,10 @@ class OtherVehicles:
 
     def _moving(self, info: VehicleInfo, now_s: float, before: _Unled | None) -> _Unled | None:
         """Return a vehicle that was heard a moment ago and moves; None for any other."""
-        report = info.report
-        if info.age_s is None or report is None or report.speed_mps is None or report.heading_rad is None:
+        report, report_age_s = info.report, info.report_age_s
+        if report_age_s is None or report is None or report.speed_mps is None or report.heading_rad is None:
             return None
-        age_s = info.age_s * self._time_scale
+        age_s = report_age_s * self._time_scale
         if report.speed_mps < STANDS_MPS or age_s > UNHEARD_S:
             return None
         heard_s = now_s * self._time_scale - age_s

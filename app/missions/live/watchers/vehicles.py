@@ -116,12 +116,13 @@ class VehicleViews:
         )
 
     def _last_heard(self, member: Member, info: VehicleInfo) -> tuple[VehicleReport | None, float | None]:
-        """Return what a vehicle reported last, as far as this is to be shown, and when it was heard, Unix seconds."""
+        """Return what a vehicle reported last, as far as this is to be shown, and when that was, Unix seconds."""
         owner = self._hub.claimed_by(member.key)
         if owner not in (None, self._mission_id) and member.left_at is None:
             # It is in another mission by now: here it stays where it was when this one ended.
             return member.report, member.heard_s
-        heard_s = member.heard_s if info.age_s is None else now().timestamp() - info.age_s
+        age_s = info.report_age_s
+        heard_s = member.heard_s if age_s is None else now().timestamp() - age_s
         if owner == self._mission_id and member.left_at is None:
             return member.report or info.report, heard_s
         # The mission does not hear it any more, but perhaps its link does: it comes up, and drifts.

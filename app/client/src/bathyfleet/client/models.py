@@ -15,7 +15,7 @@ from bathyfleet.client.model import Model, Open
 Action: TypeAlias = Annotated[Literal["start", "pause", "resume", "abort", "finish"], Open]
 """What operators and consoles may ask of a mission."""
 
-AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "not_begun", "test"], Open]
+AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "no_position", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "not_begun", "test"], Open]
 """What is raised as an alarm. Those of failsafes have the failsafes' names."""
 
 AlarmSeverity: TypeAlias = Annotated[Literal["minor", "major", "critical"], Open]
@@ -39,7 +39,7 @@ DeliveryState: TypeAlias = Annotated[Literal["waiting", "delivered", "failed", "
 ErrorKind: TypeAlias = Annotated[Literal["depth", "water_level", "roll_offset", "sound_speed"], Open]
 """What may be wrong."""
 
-Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "low_energy", "link_lost", "traffic", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
+Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "no_position", "low_energy", "link_lost", "traffic", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
 """What may go wrong with a vehicle, or with all of them."""
 
 Fit: TypeAlias = Annotated[Literal["data", "from_zero", "about_zero"], Open]
@@ -2523,7 +2523,7 @@ class VehicleView(Model):
     reason: str
     """What is missing or wrong and what to do, or why it waits; empty: all is well"""
     age_s: float | None
-    """Seconds since last heard; null: never"""
+    """Seconds since it last told where it is; since it was heard where it never did; null: never"""
     address: str | None
     imc_id: int | None
     lat_deg: float | None

@@ -2120,7 +2120,7 @@ export interface components {
          * @description What is raised as an alarm. Those of failsafes have the failsafes' names.
          * @enum {string}
          */
-        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "not_begun" | "test";
+        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "no_position" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "not_begun" | "test";
         /**
          * AlarmMessage
          * @description An alarm was raised or acknowledged; by its id the page knows whether it has it already.
@@ -3053,7 +3053,7 @@ export interface components {
          * @description What may go wrong with a vehicle, or with all of them.
          * @enum {string}
          */
-        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
+        Failsafe: "leak" | "critical_energy" | "too_deep" | "position_lost" | "no_position" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "separation_lost" | "vehicle_error" | "other_console" | "all_links_lost" | "service_restarted";
         /**
          * FailsafeView
          * @description A failsafe in force for a vehicle.
@@ -7420,7 +7420,7 @@ export interface components {
             reason: string;
             /**
              * Age S
-             * @description Seconds since last heard; null: never
+             * @description Seconds since it last told where it is; since it was heard where it never did; null: never
              */
             age_s: number | null;
             /** Address */

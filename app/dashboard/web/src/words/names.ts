@@ -5,6 +5,7 @@ export const NAMES = {
   "failsafe.critical_energy": { en: "Critical energy", pt: "Energia crítica" },
   "failsafe.too_deep": { en: "Too deep", pt: "Demasiado fundo" },
   "failsafe.position_lost": { en: "Position lost", pt: "Posição perdida" },
+  "failsafe.no_position": { en: "No position", pt: "Sem posição" },
   "failsafe.low_energy": { en: "Low energy", pt: "Energia baixa" },
   "failsafe.link_lost": { en: "Link lost", pt: "Ligação perdida" },
   "failsafe.traffic": { en: "Traffic", pt: "Navio próximo" },
