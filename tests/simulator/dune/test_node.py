@@ -354,5 +354,5 @@ class TestFaults:
         assert bench.states() == (3, 3)
 
     def test_only_what_is_known_can_fail(self, bench: Bench) -> None:
-        with pytest.raises(ValueError, match="leak or error"):
+        with pytest.raises(ValueError, match="leak, error or navigation"):
             bench.node.fail("radio")
