@@ -7,7 +7,7 @@ import contextlib
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from imc_bridge.control.control import Phase
@@ -173,6 +173,13 @@ class Bridge:
         await self.close()
 
     # Packets
+
+    def know_partners(self, imc_ids: Iterable[int]) -> None:
+        """Learn the ids of services that share their missions with us: their plans, too, are ended for ours.
+
+        Only where one of our missions needs the vehicle, and by an explicit stop.
+        """
+        self._registry.partners |= set(imc_ids) - {self.settings.id}
 
     @property
     def double(self) -> str:

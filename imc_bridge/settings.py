@@ -84,11 +84,6 @@ class ConsoleSettings(BaseModel):
     allowed_ids: tuple[ImcId, ...] = Field(
         default=(), description="IMC ids of the vehicles and gateways to listen to; empty: all"
     )
-    partners: tuple[ImcId, ...] = Field(
-        default=(),
-        description="IMC ids of the other processes on the same database, or of this one before: their plans, too, are "
-        "ended for a mission that needs the vehicle, and by a stop",
-    )
     allowed_addresses: tuple[Network, ...] = Field(
         default=(),
         description="IPv4 addresses or networks (10.0.10.0/24) to take IMC packets from; empty: all. "

@@ -8,6 +8,7 @@ timestamps order its messages.
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 
 from imc_bridge.events import LostComms, StateReport
 from imc_bridge.network.codec import Message
@@ -69,9 +70,12 @@ class Node:
         Time of the first packet.
     """
 
-    def __init__(self, imc_id: int, name: str, settings: BridgeSettings, now: float) -> None:
+    def __init__(
+        self, imc_id: int, name: str, settings: BridgeSettings, now: float, partners: Set[int] = frozenset()
+    ) -> None:
         self.imc_id = imc_id
         self.name = name
+        self._partners = partners
         self.announcement: Announcement | None = None
         self.announced_at: float | None = None
         self.first_announced_at: float | None = None
@@ -461,10 +465,10 @@ class Node:
 
     @property
     def partners(self) -> bool:
-        """Whether it executes a plan of one of our partners, or goes home by one."""
+        """Whether it executes a plan of a service that shares its missions with us, or goes home by one."""
         return self.runs_plan and any(
             self.plan_id == name or self.maneuver_id.startswith(home_prefix(name))
-            for name in map(plan_name, self.settings.partners)
+            for name in map(plan_name, self._partners)
         )
 
     @property

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from imc_bridge.events import NodeState
 from imc_bridge.nodes.modes import OperationMode, PlanState, mode_name
 from imc_bridge.nodes.node import ANNOUNCES_MISSED, NO_POSITION, Node
-from imc_bridge.settings import PLAN_NAME, BridgeSettings
+from imc_bridge.settings import BridgeSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +67,7 @@ def _whose_plan(node: Node) -> str:
             "from another console such as Neptus"
         )
     controller = f" (0x{node.foreign_controller:04X})" if node.foreign_controller is not None else ""
-    words = f"{plan} of another console{controller}"
-    if node.plan_id.startswith(f"{PLAN_NAME}-"):
-        words += (
-            f"; where that is a service on the same database its id, {node.plan_id[-4:]}, belongs into `imc.partners`"
-        )
-    return words
+    return f"{plan} of another console{controller}"
 
 
 def _without_telemetry(settings: BridgeSettings, now: float, announced_at: float, first_announced_at: float) -> Status:

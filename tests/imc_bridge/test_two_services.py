@@ -78,7 +78,8 @@ async def test_a_partner_of_a_service_that_died_ends_its_plan_and_leads_on() -> 
         await until(lambda: plan.maneuver is not None, "the vehicle is under way")
         sea.bridge._task.cancel()  # as kill -9 does
         sea.bridge.transport.close()
-        async with second(sea, partners=(sea.settings.id,)) as other:
+        async with second(sea) as other:
+            other.bridge.know_partners([sea.settings.id])
             await until(lambda: other.state(name) is NodeState.IN_PLAN, "its partner sees it in a plan")
             assert "of a partner" in other.bridge.nodes()[0].reason
             await other.bridge.engage(name)

@@ -414,6 +414,14 @@ class FleetLink(ABC):
     capabilities: ClassVar[LinkCapabilities] = LinkCapabilities()
 
     @property
+    def console_id(self) -> int | None:
+        """What plans of its vehicles are called by; None where they have none."""
+        return None
+
+    def know_partners(self, console_ids: frozenset[int]) -> None:  # noqa: B027 - most have none
+        """Learn by which ids processes on our database have led vehicles: what those were given is ours to end."""
+
+    @property
     def polled_vehicles(self) -> PolledVehicles | None:
         """Who is told of its vehicles' requests; None when they send none."""
         return None

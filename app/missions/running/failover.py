@@ -22,6 +22,7 @@ from app.missions.views.mission import Level
 from app.storage.database import Database
 from app.storage.models import MissionRow
 from app.storage.processes.membership import MembershipLostError
+from app.storage.queries import consoles as console_queries
 from app.storage.queries import missions as mission_queries
 
 AGAIN_S = 60.0
@@ -72,6 +73,8 @@ class Failover:
     async def begin(self) -> None:
         """Take up what nobody has, and keep watch from now on."""
         await self._ownership.enter()
+        await self._note_consoles()
+        await self._know_partners()
         taking = asyncio.create_task(self._take_up(await self._ownership.look()), name="taking up")
         self._taking = taking
         self._trouble = ""
@@ -125,6 +128,7 @@ class Failover:
         """Go on with a mission that was at sea when it was taken up, unless the service ends."""
         if live.header.state not in AT_SEA:
             return
+        await self._know_partners()
         try:
             self._claims.claim_team(live)
         except ConflictError as error:
@@ -138,6 +142,18 @@ class Failover:
             words = "the service was started anew: the mission goes on with what was committed"
             facts = {"failsafe": Failsafe.SERVICE_RESTARTED, "response": Response.WARN}
             await live.journal.log(Level.WARNING, "failsafe", words, **facts)
+
+    async def _note_consoles(self) -> None:
+        """Keep what our vehicles' plans are called by, for whoever takes our missions up."""
+        async with self._database.writing() as session:
+            for imc_id in self._hub.console_ids:
+                await console_queries.note(session, imc_id)
+
+    async def _know_partners(self) -> None:
+        """Learn what plans are called by that vehicles may have from the process that had their mission before."""
+        if self._hub.console_ids:
+            async with self._database.reading() as session:
+                self._hub.know_partners(await console_queries.ids(session))
 
     async def _keep(self) -> None:
         while True:

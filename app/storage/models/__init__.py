@@ -18,7 +18,7 @@ from app.storage.models.missions import (
     WaypointRow,
 )
 from app.storage.models.pings import PingBlockRow, PingChunkRow
-from app.storage.models.processes import MissionOwnerRow, ProcessRow
+from app.storage.models.processes import ConsoleRow, MissionOwnerRow, ProcessRow
 from app.storage.models.sites import SiteMissionRow, SiteRow, SiteSurveyRow
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "AuditRow",
     "Base",
     "BatchRow",
+    "ConsoleRow",
     "EventRow",
     "ImportRow",
     "MissionOwnerRow",

@@ -31,3 +31,11 @@ class MissionOwnerRow(Base):
     mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"), primary_key=True)
     process_id: Mapped[int] = mapped_column(ForeignKey("processes.id", ondelete="CASCADE"), index=True)
     since: Mapped[datetime]
+
+
+class ConsoleRow(Base):
+    """An IMC id that a process on this database has led vehicles by: plans are called by it, also when it is gone."""
+
+    __tablename__ = "consoles"
+
+    imc_id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)

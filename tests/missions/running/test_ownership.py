@@ -10,6 +10,7 @@ import pytest
 from sqlalchemy import text
 
 from app.missions.errors import ConflictError, MissionElsewhereError, NotAMemberError
+from app.missions.fleet.links.sim import SimFleetLink
 from app.missions.live.load import take_up
 from app.missions.operations.history import events_after
 from app.missions.running import failover, registry
@@ -77,6 +78,34 @@ async def test_running_missions_go_to_whoever_is_left(two: tuple[Harbour, Harbou
         await until(taken_up, "the other process has it")
         await until_step(other, mission, before[mission] + 1)
         assert (await act(other, mission, "abort", actor="Ben")).mission.state is MissionState.ABORTED
+
+
+async def test_a_process_knows_the_ids_by_which_others_on_its_database_led_vehicles(
+    two: tuple[Harbour, Harbour], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plans are called by them: who takes a mission up ends those of a process that is gone."""
+    ids: dict[SimFleetLink, int] = {}
+    told: list[tuple[int, set[int]]] = []
+
+    def console_id(link: SimFleetLink) -> int:
+        return ids.setdefault(link, 0x3F01 + len(ids))
+
+    def know_partners(link: SimFleetLink, known: frozenset[int]) -> None:
+        told.append((console_id(link), set(known)))
+
+    monkeypatch.setattr(SimFleetLink, "console_id", property(console_id))
+    monkeypatch.setattr(SimFleetLink, "know_partners", know_partners)
+    for harbour in two:
+        await harbour.open()
+    assert told == [(0x3F01, {0x3F01}), (0x3F02, {0x3F01, 0x3F02})]
+    await two[0].reopen()
+    assert told[2:] == [(0x3F03, {0x3F01, 0x3F02, 0x3F03})], "as after another id in the settings"
+    mission = (await two[0].service.create(sim_spec(steps=500))).id
+    await act(two[0].service, mission, "start")
+    await until_step(two[0].service, mission, 1)
+    await two[0].close()
+    await until(lambda: len(told) > 3, "the other process takes the mission up")
+    assert told[3] == (0x3F02, {0x3F01, 0x3F02, 0x3F03})
 
 
 def told_of(summary: MissionSummary) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from app.storage.models import (
     AlarmRow,
     AuditRow,
     BatchRow,
+    ConsoleRow,
     EventRow,
     ImportRow,
     MissionOwnerRow,
@@ -235,7 +236,11 @@ def alarm(**changes: Any) -> AlarmRow:
 def one_of_each() -> list[list[Any]]:
     """Rows in the order in which foreign keys allow them."""
     return [
-        [mission(), ProcessRow(id=1, url="http://10.0.0.5", secret="e" * 64, certificate=None, began_at=TIME)],
+        [
+            mission(),
+            ProcessRow(id=1, url="http://10.0.0.5", secret="e" * 64, certificate=None, began_at=TIME),
+            ConsoleRow(imc_id=0x3F01),
+        ],
         [vehicle(), step(), MissionOwnerRow(mission_id="m1", process_id=1, since=TIME)],
         [waypoint()],
         [

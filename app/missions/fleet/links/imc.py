@@ -93,6 +93,15 @@ class ImcFleetLink(FleetLink):
         self._sink: EventSink = lambda _event: None
         self._led: dict[str, tuple[Guidance, str]] = {}
 
+    @property
+    def console_id(self) -> int:
+        """Our IMC id."""
+        return self._bridge.settings.id
+
+    def know_partners(self, console_ids: frozenset[int]) -> None:
+        """See :meth:`app.missions.fleet.interface.FleetLink.know_partners`."""
+        self._bridge.know_partners(console_ids)
+
     async def start(self, sink: EventSink) -> None:
         """Bind the ports and listen.
 
