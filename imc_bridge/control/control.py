@@ -120,6 +120,8 @@ class Control(ABC):
         self._restarts = 0
         self._evidence = Evidence()
         self._abandoned = False
+        self._partners_plan = False
+        """Whether what it is to be stopped in is a partner's plan."""
         self._abort = False
         self._gap = False
         """Whether radio ended under water, which ends plans that need it and is no fault."""
@@ -213,8 +215,12 @@ class Control(ABC):
     def give_up_stop(self, now: float) -> None:
         """Stop waiting for the acknowledgement. STOP is still sent whenever the plan shows up again."""
         if self.phase is Phase.STOPPING:
-            self._abandoned = True
+            self._abandon()
             self._enter(Phase.IDLE, now)
+
+    def _abandon(self) -> None:
+        """Have the vehicle stopped wherever it shows up in the plan that it has: ours, or a partner's that it had."""
+        self._abandoned, self._partners_plan = True, self.node.partners
 
     # What the vehicle says
 
@@ -331,11 +337,13 @@ class Control(ABC):
             unready = NO_POSITION if node.report is None or node.blind else "does not report being in service and ready"
             reason = status.reason or unready
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
-        elif self._runs_ours() and now >= self._request_due:
+        elif now >= self._request_due and (self._runs_ours() or (node.blind and self._blocked_in_our_plan())):
             # The way home, or our plan of an earlier run, whose references have ceased: it is ended before a new one
-            # starts.
+            # starts. So is the plan of one that does not tell where it is.
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._send(plan_control(OPERATION_STOP, self._next_request_id(), settings))
+            if not self._runs_ours():
+                self._send(imcpy.Abort())
 
     def _waiting_limit_s(self) -> float:
         """How long to wait for service: longer for one that was following, which may have to come up first."""
@@ -350,11 +358,17 @@ class Control(ABC):
             if self._abort:
                 self._send(imcpy.Abort())
 
+    def _blocked_in_our_plan(self) -> bool:
+        """Whether it goes on with our plan and says that none runs: it takes no STOP, and takes an Abort."""
+        return self.node.maneuvering_blocked and self.node.plan_id == self._settings.plan_id
+
     def _tick_idle(self, now: float) -> None:
         # A vehicle that came back still following after its stop went unanswered must not be left so.
         node = self.node
-        blocked = node.maneuvering_blocked and node.plan_id == self._settings.plan_id
-        if self._abandoned and (blocked or node.ours) and now >= self._request_due:
+        # One that was seen without it may be in a mission of that partner by now.
+        self._partners_plan = self._partners_plan and node.partners
+        blocked = self._blocked_in_our_plan()
+        if self._abandoned and (blocked or node.ours or self._partners_plan) and now >= self._request_due:
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._request_id = self._next_request_id()
             self._send(plan_control(OPERATION_STOP, self._request_id, self._settings))
@@ -434,7 +448,9 @@ class Control(ABC):
         """
         self.refusal = Refusal(reason, remedy)
         self.intervention = reason if wanted else ""
-        self._abandoned = not wanted
+        self._abandoned = False
+        if not wanted:
+            self._abandon()
         self._enter(Phase.IDLE, now)
         order = self._order
         if order is not None and order.status not in (WaypointStatus.REACHED, WaypointStatus.REFUSED):

@@ -98,7 +98,7 @@ class Follower(Control):
         ours = node.ours
         if self.phase is Phase.STARTING and node.plan_state == PlanState.EXECUTING and ours:
             self._running(now)
-        elif self.phase is Phase.FOLLOWING and node.maneuvering_blocked and node.plan_id == self._settings.plan_id:
+        elif self.phase is Phase.FOLLOWING and self._blocked_in_our_plan():
             self._blocked_since = now if self._blocked_since is None else self._blocked_since
         elif self.phase is Phase.FOLLOWING and not ours:
             self._evidence.blocked = node.plan_state == PlanState.BLOCKED
@@ -148,6 +148,8 @@ class Follower(Control):
         order = self._order
         if self.phase is not Phase.FOLLOWING or order is None or order.status is not WaypointStatus.ACKNOWLEDGED:
             return
+        if self._hold is not None:
+            return  # It is held at the surface, perhaps over its waypoint, and was not told to go on yet.
         way = order.arrival(report, self._settings.depth_tolerance_m, now)
         if way is not None:
             self._advance(order, WaypointStatus.REACHED, "; ".join(filter(None, (way, order.limited))))

@@ -235,7 +235,7 @@ class LegFollower(Control):
         order, leg = self._order, self._leg
         if leg is not None and not leg.ended and self.node.unplaced_s > self.node.lost_after_s:
             # Its plan is stopped, so that it floats up, and begun again when it tells where it is.
-            self._leg = None
+            self._leg = self.node.expected_back = None
             self._restart(NO_POSITION, now)
         elif order is None or order.status in (WaypointStatus.REACHED, WaypointStatus.REFUSED):
             self._watch_idle(now)

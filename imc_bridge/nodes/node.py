@@ -391,8 +391,11 @@ class Node:
 
     @property
     def references_needed(self) -> bool:
-        """Whether what it executes is our FollowReference plan, which ends by itself when references cease."""
-        return self.ours and self.expected_back is None
+        """Whether what it executes is our FollowReference plan, which ends by itself when references cease.
+
+        A partner's is taken for one, too: it is not waited for longer than for ours.
+        """
+        return (self.ours or self.partners) and self.expected_back is None
 
     @property
     def lost_after_s(self) -> float:

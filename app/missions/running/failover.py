@@ -116,7 +116,11 @@ class Failover:
 
         It is left to them where this process ends, or cannot reach the mission's vehicles.
         """
-        if row.state not in AT_SEA or not self._ownership.peers:
+        if row.state not in AT_SEA:
+            return True
+        # Here, since nothing may be waited for between its being taken and its vehicles' flight.
+        await self._know_partners()
+        if not self._ownership.peers:
             return True
         if self._supervisor.begins_no_more:
             return False
@@ -128,7 +132,6 @@ class Failover:
         """Go on with a mission that was at sea when it was taken up, unless the service ends."""
         if live.header.state not in AT_SEA:
             return
-        await self._know_partners()
         try:
             self._claims.claim_team(live)
         except ConflictError as error:

@@ -24,6 +24,28 @@ def test_a_vehicle_that_was_released_is_stopped_in_our_plan_and_in_no_other(*, o
     assert script.operations() == [1] * ours
 
 
+def test_a_partners_plan_whose_stop_went_unanswered_is_stopped_when_it_shows_up_again_and_a_later_one_is_not() -> None:
+    script = Script()
+    script.node._partners = {0x3F02}
+    script.move()
+
+    def seen(mode: OperationMode, plan: PlanState) -> list[int]:
+        """What it is asked while it is seen like this for 4 s."""
+        script.sent.clear()
+        for _ in range(20):
+            script.now += 0.2
+            script.report(mode=mode, plan=plan, plan_id="bathyfleet-3F02")
+            script.follower.tick(script.now)
+        return script.operations()
+
+    seen(OperationMode.MANEUVER, PlanState.EXECUTING)
+    script.follower.begin_stop(script.now)
+    script.follower.give_up_stop(script.now)
+    assert seen(OperationMode.MANEUVER, PlanState.EXECUTING) == [1, 1]
+    assert seen(OperationMode.SERVICE, PlanState.READY) == []
+    assert seen(OperationMode.MANEUVER, PlanState.EXECUTING) == []
+
+
 @pytest.mark.parametrize(("controller", "ours"), [(None, False), (0x3F01, True), (0x3F02, False)])
 def test_a_plan_of_an_earlier_version_is_ours_where_its_controller_is_known_to_be_us(
     controller: int | None, *, ours: bool

@@ -8,6 +8,7 @@ from unittest.mock import Mock
 
 import pytest
 from sqlalchemy import text
+from sqlalchemy.exc import OperationalError
 
 from app.missions.errors import ConflictError, MissionElsewhereError, NotAMemberError
 from app.missions.fleet.links.sim import SimFleetLink
@@ -21,6 +22,7 @@ from app.missions.views.mission import Level, MissionSummary
 from app.storage.database import CONNECTIONS, Database
 from app.storage.models import MissionRow
 from app.storage.processes.membership import HEARD
+from app.storage.queries import consoles
 from app.storage.upkeep import migrate
 from tests.support.missions.harbour import Harbour, act, sim_spec, until_state, until_step, view_of
 from tests.support.missions.specs import make_spec
@@ -106,6 +108,30 @@ async def test_a_process_knows_the_ids_by_which_others_on_its_database_led_vehic
     await two[0].close()
     await until(lambda: len(told) > 3, "the other process takes the mission up")
     assert told[3] == (0x3F02, {0x3F01, 0x3F02, 0x3F03})
+
+
+async def test_a_mission_is_taken_up_later_where_the_ids_of_others_cannot_be_read(
+    two: tuple[Harbour, Harbour], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = two
+    monkeypatch.setattr(SimFleetLink, "console_id", 0x3F01)
+    one, other = await first.open(), await second.open()
+    mission = (await one.create(sim_spec(steps=500))).id
+    await act(one, mission, "start")
+    await until_step(one, mission, 1)
+    read = consoles.ids
+    refused: list[bool] = []
+
+    async def once_in_trouble(session: Any) -> frozenset[int]:
+        if not refused:
+            refused.append(True)
+            raise OperationalError("select", {}, Exception("the connection was lost"))
+        return await read(session)
+
+    monkeypatch.setattr(consoles, "ids", once_in_trouble)
+    await first.close()
+    await until(lambda: refused != [], "the other process tries to take it up")
+    await until_step(other, mission, 2)
 
 
 def told_of(summary: MissionSummary) -> dict[str, Any]:

@@ -28,7 +28,6 @@ NEVER_DONE = frozenset(
         "overloaded",
         "import-unavailable",
         "not-ready",
-        "database-unavailable",
     }
 )
 """Kinds of problems with which the service says that nothing of a request was done: it may be sent again."""

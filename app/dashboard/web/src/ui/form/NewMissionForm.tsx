@@ -10,7 +10,6 @@ import { recoveryMarks } from "../../map/marks/recovery";
 import { placeOf } from "../../state/coordinates";
 import { blockTitle, flownBlocks, toMissions } from "../../state/form/blocks";
 import {
-  allBlocks,
   copyOf,
   type Draft,
   emptyDraft,
@@ -361,8 +360,9 @@ function draftMarks(draft: Draft): PlaceMark[] {
 
 /** The names of several blocks, each in its middle. */
 function blockMarks(draft: Draft): PlaceMark[] {
-  if (draft.blocks.length === 0) return [];
-  return allBlocks(draft).flatMap((block, i) => {
+  const blocks = flownBlocks(draft);
+  if (blocks.length === 1) return [];
+  return blocks.flatMap((block, i) => {
     const bounds = boundsOf(block.ring);
     if (!bounds) return [];
     const [west, south, east, north] = bounds;

@@ -58,8 +58,11 @@ function SimulatedNames() {
 /** What the vehicle at this place is called; it is called otherwise when the whole name was typed. */
 function VehicleName({ place, id, label }: { place: number; id: string; label: string }) {
   const { draft, set } = useForm();
-  const name = vehicleNames(draft)[place] ?? "";
-  const shown = draft.wanted[name] ?? name;
+  const names = vehicleNames(draft);
+  const name = names[place] ?? "";
+  const asked = draft.wanted[name];
+  // A name that waits is shown while another vehicle has it; after that, what is sent is shown again.
+  const shown = asked && names.some((other, i) => i !== place && other === asked) ? asked : name;
   return (
     <input
       type="text"
