@@ -38,8 +38,6 @@ export function withPlanner(
   { options }: Pick<Draft, "options">,
   planners: readonly PlannerView[],
 ): Pick<Draft, "planner" | "options"> {
-  // As long as nobody knows what planners read, all of them stay, in sight.
-  if (planners.length === 0) return { planner, options };
   const read = optionsOf(planner, planners);
   return {
     planner,
