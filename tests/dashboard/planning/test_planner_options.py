@@ -73,6 +73,8 @@ def test_a_refusal_of_a_setting_stands_beside_it(page: Page) -> None:
         "**/api/v1/missions",
         lambda route: route.fulfill(status=422, json=answer) if route.request.method == "POST" else route.fallback(),
     )
+    # Which settings there are is the service's to say.
+    expect(page.locator("#option-degree")).to_be_visible()
     by_id(page, "create-mission").click()
     expect(by_id(page, "fault-options.degree")).to_contain_text("2 is too much here")
     expect(page.locator("#option-degree")).to_be_focused()
