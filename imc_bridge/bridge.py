@@ -174,12 +174,12 @@ class Bridge:
 
     # Packets
 
-    def know_partners(self, imc_ids: Iterable[int]) -> None:
+    def know_peers(self, imc_ids: Iterable[int]) -> None:
         """Learn the ids of services that share their missions with us: their plans, too, are ended for ours.
 
         Only where one of our missions needs the vehicle, and by an explicit stop.
         """
-        self._registry.partners |= set(imc_ids) - {self.settings.id}
+        self._registry.peers |= set(imc_ids) - {self.settings.id}
 
     @property
     def double(self) -> str:

@@ -308,7 +308,7 @@ class NodeView:
     """Since its last packet."""
     position_age_s: float | None = None
     """Since it last told where it is."""
-    blind: bool = False
+    without_position: bool = False
     """It is heard, or was at the last contact, and does not tell where it is."""
     announce_age_s: float | None = None
     telemetry_overdue: bool = False

@@ -33,7 +33,7 @@ def view_of(
         ours=node.ours,
         age_s=age(node.heard_at),
         position_age_s=age(node.report_at),
-        blind=node.blind,
+        without_position=node.without_position,
         announce_age_s=age(node.announced_at),
         telemetry_overdue=node.telemetry_overdue(now),
         address=f"{node.address[0]}:{node.address[1]}" if node.address else None,

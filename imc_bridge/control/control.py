@@ -120,8 +120,8 @@ class Control(ABC):
         self._restarts = 0
         self._evidence = Evidence()
         self._abandoned = False
-        self._partners_plan = False
-        """Whether what it is to be stopped in is a partner's plan."""
+        self._peers_plan = False
+        """Whether what it is to be stopped in is a peer's plan."""
         self._abort = False
         self._gap = False
         """Whether radio ended under water, which ends plans that need it and is no fault."""
@@ -161,8 +161,8 @@ class Control(ABC):
         return nameless or self._runs_ours()
 
     def _runs_ours(self) -> bool:
-        """Whether what it executes is ours to end: our plan, the way home, a partner's whose vehicle we have now."""
-        return self.node.ours or self.node.home_bound or self.node.partners
+        """Whether what it executes is ours to end: our plan, the way home, a peer's whose vehicle we have now."""
+        return self.node.ours or self.node.home_bound or self.node.runs_peers_plan
 
     def order(self, waypoint: Waypoint, now: float) -> None:
         """Replace the current waypoint. Repeating one is harmless unless it had been refused."""
@@ -219,8 +219,8 @@ class Control(ABC):
             self._enter(Phase.IDLE, now)
 
     def _abandon(self) -> None:
-        """Have the vehicle stopped wherever it shows up in the plan that it has: ours, or a partner's that it had."""
-        self._abandoned, self._partners_plan = True, self.node.partners
+        """Have the vehicle stopped wherever it shows up in the plan that it has: ours, or a peer's that it had."""
+        self._abandoned, self._peers_plan = True, self.node.runs_peers_plan
 
     # What the vehicle says
 
@@ -334,10 +334,16 @@ class Control(ABC):
         if status.state is NodeState.IN_PLAN and not self._ours_or_none():
             self._release(status.reason, "Stop that plan on its console, then engage again", now, wanted=True)
         elif now - self._since > self._waiting_limit_s():
-            unready = NO_POSITION if node.report is None or node.blind else "does not report being in service and ready"
+            unready = (
+                NO_POSITION
+                if node.report is None or node.without_position
+                else "does not report being in service and ready"
+            )
             reason = status.reason or unready
             self._release(f"not ready within {now - self._since:.0f} s: {reason}", "Clear that, then engage again", now)
-        elif now >= self._request_due and (self._runs_ours() or (node.blind and self._blocked_in_our_plan())):
+        elif now >= self._request_due and (
+            self._runs_ours() or (node.without_position and self._blocked_in_our_plan())
+        ):
             # The way home, or our plan of an earlier run, whose references have ceased: it is ended before a new one
             # starts. So is the plan of one that does not tell where it is.
             self._request_due = now + ABANDONED_STOP_RETRY_S
@@ -365,22 +371,22 @@ class Control(ABC):
     def _tick_idle(self, now: float) -> None:
         # A vehicle that came back still following after its stop went unanswered must not be left so.
         node = self.node
-        # One that was seen without it may be in a mission of that partner by now.
-        self._partners_plan = self._partners_plan and node.partners
+        # One that was seen without it may be in a mission of that peer by now.
+        self._peers_plan = self._peers_plan and node.runs_peers_plan
         blocked = self._blocked_in_our_plan()
-        if self._abandoned and (blocked or node.ours or self._partners_plan) and now >= self._request_due:
+        if self._abandoned and (blocked or node.ours or self._peers_plan) and now >= self._request_due:
             self._request_due = now + ABANDONED_STOP_RETRY_S
             self._request_id = self._next_request_id()
             self._send(plan_control(OPERATION_STOP, self._request_id, self._settings))
             if blocked:
                 self._send(imcpy.Abort())
 
-    def _blind_too_long(self, patience_s: float, now: float) -> bool:
+    def _without_position_too_long(self, patience_s: float, now: float) -> bool:
         """Let go of a vehicle that has not told where it is for so long, though it is heard."""
-        unplaced_s = self.node.unplaced_s
-        if unplaced_s <= max(patience_s, self._settings.lost_after_wall_s * self._settings.time_scale):
+        without_position_s = self.node.without_position_s
+        if without_position_s <= max(patience_s, self._settings.lost_after_wall_s * self._settings.time_scale):
             return False
-        words = f"heard, and has told no position for {unplaced_s / self._settings.time_scale:.0f} s"
+        words = f"heard, and has told no position for {without_position_s / self._settings.time_scale:.0f} s"
         self._release(words, "Look at its navigation; engage it again when it tells where it is", now)
         return True
 

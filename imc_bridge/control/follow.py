@@ -206,7 +206,7 @@ class Follower(Control):
                 now,
             )
             return
-        if self._blind_too_long(self.node.patience_s, now):
+        if self._without_position_too_long(self.node.patience_s, now):
             return
         if self._blocked_since is not None and now - self._blocked_since > BLOCKED_S and now >= self._request_due:
             # The maneuver goes on; a plan of its own brings plan control back to it.
@@ -249,7 +249,7 @@ class Follower(Control):
         report = self.node.report
         if order is None:
             return self._hold_at_surface()
-        if self.node.blind:
+        if self.node.without_position:
             # Nobody knows the bottom below it. At the surface it receives GPS.
             order.limited, order.circling_since = f"held at the surface: it {NO_POSITION}", None
             return self._hold_at_surface()

@@ -108,7 +108,7 @@ class LegFollower(Control):
 
     def reported_by_sound(self, report: SoundReport, now: float) -> None:
         """Take a position reported by sound: it shows arrival where radio cannot."""
-        self.node.unplaced_s = 0.0
+        self.node.without_position_s = 0.0
         leg, order = self._leg, self._order
         if self.phase is not Phase.FOLLOWING or leg is None or not leg.acknowledged or order is None:
             return
@@ -233,7 +233,7 @@ class LegFollower(Control):
 
     def _tick_following(self, now: float) -> None:
         order, leg = self._order, self._leg
-        if leg is not None and not leg.ended and self.node.unplaced_s > self.node.lost_after_s:
+        if leg is not None and not leg.ended and self.node.without_position_s > self.node.lost_after_s:
             # Its plan is stopped, so that it floats up, and begun again when it tells where it is.
             self._leg = self.node.expected_back = None
             self._restart(NO_POSITION, now)
@@ -288,7 +288,7 @@ class LegFollower(Control):
 
         A vehicle that does not tell where it is gets none.
         """
-        if self.node.blind:
+        if self.node.without_position:
             return False
         if self._by_sound(now):
             return True
@@ -307,7 +307,7 @@ class LegFollower(Control):
         if self.sound is not None and self._by_sound(now):
             self.sound.ask(now)
             return
-        if self._blind_too_long(self._settings.release_after_s, now):
+        if self._without_position_too_long(self._settings.release_after_s, now):
             return
         silence = self._silence(now)
         if not self._expected_away(now) and silence > max(

@@ -363,7 +363,7 @@ def _addresses(node: NodeView) -> str:
 
 def _state_findings(node: NodeView, dropped: int) -> list[Finding]:
     rate = node.rates_hz.get("EstimatedState", 0.0)
-    if rate >= MIN_STATE_RATE_HZ and (node.position_age_s is None or node.blind):
+    if rate >= MIN_STATE_RATE_HZ and (node.position_age_s is None or node.without_position):
         since = "" if node.position_age_s is None else f" for {node.position_age_s:.0f} s"
         text = f"EstimatedState at {rate:.1f} Hz from {node.address}, and no position in any{since}"
         return [problem(Cause.LOW_RATE, text, "Wait for its GPS fix; where it has one its navigation has failed")]
@@ -457,7 +457,7 @@ def _duration(seconds: float) -> str:
 
 
 def _plan_findings(node: NodeView, settings: BridgeSettings) -> list[Finding]:
-    if node.state is NodeState.READY and not node.blind:
+    if node.state is NodeState.READY and not node.without_position:
         return [ok("in service and ready for a plan")]
     if node.state is NodeState.LOST:
         return []

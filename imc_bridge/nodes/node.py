@@ -71,11 +71,11 @@ class Node:
     """
 
     def __init__(
-        self, imc_id: int, name: str, settings: BridgeSettings, now: float, partners: Set[int] = frozenset()
+        self, imc_id: int, name: str, settings: BridgeSettings, now: float, peers: Set[int] = frozenset()
     ) -> None:
         self.imc_id = imc_id
         self.name = name
-        self._partners = partners
+        self._peers = peers
         self.announcement: Announcement | None = None
         self.announced_at: float | None = None
         self.first_announced_at: float | None = None
@@ -140,7 +140,7 @@ class Node:
         self.report: StateReport | None = None
         self.report_at: float | None = None
         """When it last told where it is."""
-        self.unplaced_s = 0.0
+        self.without_position_s = 0.0
         """For how long it has been in contact since without telling that; silence does not count."""
         self.intake = SoundingIntake(name, beam_table(settings.altimeter), settings.max_range_m)
         self.pings = PingIntake(name)
@@ -225,7 +225,7 @@ class Node:
         self.packets += 1
         pause_s = math.inf if self.heard_at is None else now - self.heard_at
         if pause_s <= self.lost_after_s:
-            self.unplaced_s += min(pause_s, STEADY_S)
+            self.without_position_s += min(pause_s, STEADY_S)
         self.heard_at = now
         self.address = address
 
@@ -283,7 +283,7 @@ class Node:
             self.history.clear()
         if not self.history.add(sample) or not self.in_order("EstimatedState", time_s):
             return None
-        self.report_at, self.unplaced_s = now, 0.0
+        self.report_at, self.without_position_s = now, 0.0
         energy = self.energy
         speed = math.hypot(message.vx, message.vy)
         altitude = float(message.alt)
@@ -393,9 +393,9 @@ class Node:
     def references_needed(self) -> bool:
         """Whether what it executes is our FollowReference plan, which ends by itself when references cease.
 
-        A partner's is taken for one, too: it is not waited for longer than for ours.
+        A peer's is taken for one, too: it is not waited for longer than for ours.
         """
-        return (self.ours or self.partners) and self.expected_back is None
+        return (self.ours or self.runs_peers_plan) and self.expected_back is None
 
     @property
     def lost_after_s(self) -> float:
@@ -403,9 +403,9 @@ class Node:
         return max(self.settings.lost_after_s, self.settings.lost_after_wall_s * self.settings.time_scale)
 
     @property
-    def blind(self) -> bool:
+    def without_position(self) -> bool:
         """Whether it is heard, or was at the last contact, and does not tell where it is: it may be over any bottom."""
-        return self.unplaced_s > self.fresh_s
+        return self.without_position_s > self.fresh_s
 
     @property
     def fresh_s(self) -> float:
@@ -467,11 +467,11 @@ class Node:
         return self.plan_state == PlanState.EXECUTING and ours
 
     @property
-    def partners(self) -> bool:
+    def runs_peers_plan(self) -> bool:
         """Whether it executes a plan of a service that shares its missions with us, or goes home by one."""
         return self.runs_plan and any(
             self.plan_id == name or self.maneuver_id.startswith(home_prefix(name))
-            for name in map(plan_name, self._partners)
+            for name in map(plan_name, self._peers)
         )
 
     @property

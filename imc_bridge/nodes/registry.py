@@ -62,7 +62,7 @@ class NodeRegistry:
     def __init__(self, settings: BridgeSettings) -> None:
         self._settings = settings
         self._nodes: dict[int, Node] = {}
-        self.partners: set[int] = set()
+        self.peers: set[int] = set()
         """Ids of services that share their missions with us."""
         self.capacity = Capacity(self._nodes)
         self.capacity.wanted.update(settings.vehicles)
@@ -125,7 +125,7 @@ class NodeRegistry:
         return there_is
 
     def _add(self, imc_id: int, name: str, host: str, now: float) -> Node:
-        node = self._nodes[imc_id] = Node(imc_id, name, self._settings, now, self.partners)
+        node = self._nodes[imc_id] = Node(imc_id, name, self._settings, now, self.peers)
         node.host = host
         self._name(node, name)
         return node

@@ -22,7 +22,7 @@ class Status:
 def status_of(node: Node, now: float) -> Status:
     """The link's state and the reason for it."""
     status = _of_contact(node, now)
-    if node.blind and status.state in (NodeState.READY, NodeState.IN_PLAN):
+    if node.without_position and status.state in (NodeState.READY, NodeState.IN_PLAN):
         return Status(status.state, "; ".join(filter(None, (status.reason, NO_POSITION))))
     return status
 
@@ -59,8 +59,8 @@ def _whose_plan(node: Node) -> str:
     if node.ours:
         return "our plan"
     plan = f"plan {node.plan_id!r}"
-    if node.partners:
-        return f"{plan} of a partner of this service"
+    if node.runs_peers_plan:
+        return f"{plan} of a peer of this service"
     if node.of_earlier_version:
         return (
             f"{plan} of another console, or of an earlier version of this service: wait until it has ended, or stop it "

@@ -69,7 +69,7 @@ async def test_a_second_service_neither_engages_nor_stops_a_vehicle_of_the_first
         await sea.reached(name, 0)
 
 
-async def test_a_partner_of_a_service_that_died_ends_its_plan_and_leads_on() -> None:
+async def test_a_peer_of_a_service_that_died_ends_its_plan_and_leads_on() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
         await sea.bridge.engage(name, Guidance.LEGS)
@@ -79,8 +79,8 @@ async def test_a_partner_of_a_service_that_died_ends_its_plan_and_leads_on() -> 
         sea.bridge._task.cancel()  # as kill -9 does
         sea.bridge.transport.close()
         async with second(sea) as other:
-            other.bridge.know_partners([sea.settings.id])
-            await until(lambda: other.state(name) is NodeState.IN_PLAN, "its partner sees it in a plan")
-            assert "of a partner" in other.bridge.nodes()[0].reason
+            other.bridge.know_peers([sea.settings.id])
+            await until(lambda: other.state(name) is NodeState.IN_PLAN, "its peer sees it in a plan")
+            assert "of a peer" in other.bridge.nodes()[0].reason
             await other.bridge.engage(name)
             assert plan.plan_control_state().plan_id == "bathyfleet-3F02"

@@ -64,10 +64,10 @@ class FleetHub:
         """What plans of our vehicles are called by."""
         return frozenset(link.console_id for link in self._links.values() if link.console_id is not None)
 
-    def know_partners(self, console_ids: frozenset[int]) -> None:
+    def know_peers(self, console_ids: frozenset[int]) -> None:
         """Learn by which ids processes on our database have led vehicles: what those were given is ours to end."""
         for link in self._links.values():
-            link.know_partners(console_ids)
+            link.know_peers(console_ids)
 
     @property
     def kinds(self) -> tuple[VehicleKind, ...]:

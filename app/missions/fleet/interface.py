@@ -297,7 +297,7 @@ class VehicleInfo:
     reason: str = ""
     age_s: float | None = None
     position_age_s: float | None = None
-    blind: bool = False
+    without_position: bool = False
     """It is heard, or was at the last contact, and does not tell where it is."""
     address: str | None = None
     imc_id: int | None = None
@@ -418,7 +418,7 @@ class FleetLink(ABC):
         """What plans of its vehicles are called by; None where they have none."""
         return None
 
-    def know_partners(self, console_ids: frozenset[int]) -> None:  # noqa: B027 - most have none
+    def know_peers(self, console_ids: frozenset[int]) -> None:  # noqa: B027 - most have none
         """Learn by which ids processes on our database have led vehicles: what those were given is ours to end."""
 
     @property

@@ -74,7 +74,7 @@ class Failover:
         """Take up what nobody has, and keep watch from now on."""
         await self._ownership.enter()
         await self._note_consoles()
-        await self._know_partners()
+        await self._know_peers()
         taking = asyncio.create_task(self._take_up(await self._ownership.look()), name="taking up")
         self._taking = taking
         self._trouble = ""
@@ -119,7 +119,7 @@ class Failover:
         if row.state not in AT_SEA:
             return True
         # Here, since nothing may be waited for between its being taken and its vehicles' flight.
-        await self._know_partners()
+        await self._know_peers()
         if not self._ownership.peers:
             return True
         if self._supervisor.begins_no_more:
@@ -152,11 +152,11 @@ class Failover:
             for imc_id in self._hub.console_ids:
                 await console_queries.note(session, imc_id)
 
-    async def _know_partners(self) -> None:
+    async def _know_peers(self) -> None:
         """Learn what plans are called by that vehicles may have from the process that had their mission before."""
         if self._hub.console_ids:
             async with self._database.reading() as session:
-                self._hub.know_partners(await console_queries.ids(session))
+                self._hub.know_peers(await console_queries.ids(session))
 
     async def _keep(self) -> None:
         while True:

@@ -553,7 +553,7 @@ def test_vehicle_that_is_heard_seldom_is_not_taken_for_one_without_position(paus
     for _ in range(20):
         script.now += pause_s
         script.report()
-    assert not script.node.blind
+    assert not script.node.without_position
 
 
 def test_vehicle_whose_radio_ended_under_water_is_not_taken_for_one_without_position() -> None:
@@ -563,7 +563,7 @@ def test_vehicle_whose_radio_ended_under_water_is_not_taken_for_one_without_posi
     script.alive = True
     script.spoil = _unsent  # the first packets after the gap are others
     script.run(1.0)
-    assert not script.node.blind
+    assert not script.node.without_position
 
 
 def test_states_that_are_lost_now_and_then_make_no_vehicle_come_up() -> None:

@@ -475,14 +475,14 @@ async def test_a_vehicle_that_posts_no_place_where_it_can_be_is_heard_and_blind(
             link.heard(report)
         return link.vehicles()[0]
 
-    assert not post(0.0).blind
+    assert not post(0.0).without_position
     places = itertools.count(1)
-    await until(lambda: post(0.1 * next(places)).blind, "it never tells where it can be")
+    await until(lambda: post(0.1 * next(places)).without_position, "it never tells where it can be")
     told = link.vehicles()[0]
     assert told.age_s is not None
     assert told.position_age_s is not None
     assert told.report_age_s == told.position_age_s > 0.2 > told.age_s
-    assert not post(0.0).blind
+    assert not post(0.0).without_position
     await link.close()
 
 

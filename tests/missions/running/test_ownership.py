@@ -92,11 +92,11 @@ async def test_a_process_knows_the_ids_by_which_others_on_its_database_led_vehic
     def console_id(link: SimFleetLink) -> int:
         return ids.setdefault(link, 0x3F01 + len(ids))
 
-    def know_partners(link: SimFleetLink, known: frozenset[int]) -> None:
+    def know_peers(link: SimFleetLink, known: frozenset[int]) -> None:
         told.append((console_id(link), set(known)))
 
     monkeypatch.setattr(SimFleetLink, "console_id", property(console_id))
-    monkeypatch.setattr(SimFleetLink, "know_partners", know_partners)
+    monkeypatch.setattr(SimFleetLink, "know_peers", know_peers)
     for harbour in two:
         await harbour.open()
     assert told == [(0x3F01, {0x3F01}), (0x3F02, {0x3F01, 0x3F02})]
@@ -132,6 +132,8 @@ async def test_a_mission_is_taken_up_later_where_the_ids_of_others_cannot_be_rea
     await first.close()
     await until(lambda: refused != [], "the other process tries to take it up")
     await until_step(other, mission, 2)
+    assert query_owner(second, mission) == {other.process.number}
+    assert (await view_of(other, mission)).state is MissionState.RUNNING
 
 
 def told_of(summary: MissionSummary) -> dict[str, Any]:

@@ -98,9 +98,9 @@ class ImcFleetLink(FleetLink):
         """Our IMC id."""
         return self._bridge.settings.id
 
-    def know_partners(self, console_ids: frozenset[int]) -> None:
-        """See :meth:`app.missions.fleet.interface.FleetLink.know_partners`."""
-        self._bridge.know_partners(console_ids)
+    def know_peers(self, console_ids: frozenset[int]) -> None:
+        """See :meth:`app.missions.fleet.interface.FleetLink.know_peers`."""
+        self._bridge.know_peers(console_ids)
 
     async def start(self, sink: EventSink) -> None:
         """Bind the ports and listen.
@@ -379,7 +379,7 @@ def _info(node: NodeView) -> VehicleInfo:
         reason=node.reason,
         age_s=node.age_s,
         position_age_s=node.position_age_s,
-        blind=node.blind,
+        without_position=node.without_position,
         address=node.address,
         imc_id=node.imc_id,
         report=None if node.report is None else vehicle_report(node.report),

@@ -101,7 +101,7 @@ class RestFleetLink(VisitedLink):
                 reason=self._reason(p.state),
                 age_s=now_s - p.heard_s,
                 position_age_s=None if p.placed_s is None else now_s - p.placed_s,
-                blind=p.doubtful_since_s is not None and p.heard_s - p.doubtful_since_s > self._lost_after_s,
+                without_position=p.doubtful_since_s is not None and p.heard_s - p.doubtful_since_s > self._lost_after_s,
                 report=p.report,
             )
             for p in self._pollers.values()

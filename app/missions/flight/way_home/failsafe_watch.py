@@ -184,7 +184,7 @@ class FailsafeWatch:
         found = {FAULTS[fault.kind]: f"it reports: {fault.reason}" for fault in link.faults}
         if link.state is LinkState.LOST and member.followed:
             return found | {Failsafe.LINK_LOST: f"its link is lost: {link.reason or 'silent'}"}
-        if link.blind and member.followed:
+        if link.without_position and member.followed:
             found[Failsafe.NO_POSITION] = f"it does not tell where it is: its position is {link.report_age_s:.0f} s old"
         if report is None:
             return found
@@ -202,7 +202,7 @@ class FailsafeWatch:
         if breach and member.legs and member.withdrawal is None:
             found[Failsafe.GEOFENCE_LEFT] = f"it is {breach}"
         is_heard = link.age_s is not None and link.age_s <= HEARD_S
-        if member.followed and not member.engaged and member.refusal and is_heard and not link.blind:
+        if member.followed and not member.engaged and member.refusal and is_heard and not link.without_position:
             found[Failsafe.OTHER_CONSOLE] = member.refusal.removeprefix(f"{member.name}: ")
         return found
 

@@ -24,9 +24,9 @@ def test_a_vehicle_that_was_released_is_stopped_in_our_plan_and_in_no_other(*, o
     assert script.operations() == [1] * ours
 
 
-def test_a_partners_plan_whose_stop_went_unanswered_is_stopped_when_it_shows_up_again_and_a_later_one_is_not() -> None:
+def test_a_peers_plan_whose_stop_went_unanswered_is_stopped_when_it_shows_up_again_and_a_later_one_is_not() -> None:
     script = Script()
-    script.node._partners = {0x3F02}
+    script.node._peers = {0x3F02}
     script.move()
 
     def seen(mode: OperationMode, plan: PlanState) -> list[int]:

@@ -33,7 +33,7 @@ async def test_vehicle_that_loses_its_position_over_a_slope_comes_up_and_goes_on
         (view,) = sea.bridge.nodes()
         assert view.engaged
         assert "tells no position" in view.reason
-        assert view.blind
+        assert view.without_position
         assert view.age_s is not None
         assert view.position_age_s is not None
         assert view.position_age_s > view.age_s
