@@ -71,14 +71,20 @@ export function LengthDialog() {
         {present ? say("length.countsFromTheBeginning", { progress: lengthWords(present.progress) }) : ""}
       </p>
       <form class="length-form" onSubmit={(event) => void change(event)}>
-        <Typed text={text} label={say("length.length")} id="length-value" />
-        <Choice
-          value={unit.value}
-          options={units()}
-          onChoose={into(unit)}
-          label={say("length.unit")}
-          id="length-unit"
-        />
+        <label class="field">
+          {say("length.length")}
+          <Typed text={text} label={say("length.length")} id="length-value" />
+        </label>
+        <label class="field">
+          {say("length.unit")}
+          <Choice
+            value={unit.value}
+            options={units()}
+            onChoose={into(unit)}
+            label={say("length.unit")}
+            id="length-unit"
+          />
+        </label>
       </form>
     </Dialog>
   );
