@@ -16,6 +16,7 @@ export function ExpertFields({ fault }: { fault: string }) {
         <Part of="limits" explained />
         {draft.kind === "survey" ? (
           <>
+            <Part of="shoals" explained />
             <Algorithm fault={fault} />
             <h3>{say("expert.uncertaintyOfSwathSonars")}</h3>
             <Part of="uncertainty" explained />

@@ -31,7 +31,6 @@ export function SurveyFields() {
     <fieldset class="asked">
       <legend>{say("asked.whatIsAsked")}</legend>
       <Quality />
-      <Part of="shoals" explained />
       <Coverage />
       <Length />
       <Expected />
