@@ -1,5 +1,6 @@
 """The service is asked to end: whatever it is doing, its vehicles are stopped first, and the process ends well."""
 
+import asyncio
 import signal
 from pathlib import Path
 
@@ -10,6 +11,15 @@ from tests.support.faults.service import Service, service_in
 from tests.support.waiting import until
 
 MISSIONS = 5
+
+
+async def leave(api: httpx.AsyncClient, tasks: list[asyncio.Task[None]]) -> None:
+    """Have vehicles poll no more, and the service notice it: of whom it answers it takes the stop for acknowledged."""
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+    for _ in range(3):  # what was closed before them is seen before they are answered
+        assert (await api.get("/health/live")).status_code == httpx.codes.OK
 
 
 def told(service: Service, words: str, before: str = "") -> list[str]:
@@ -49,8 +59,7 @@ async def test_asked_again_it_stops_its_vehicles_all_the_same(tmp_path: Path) ->
     vehicles = pollers()
     async with service_in(tmp_path) as (service, api), flying(api, vehicles, steps=500) as (mission_id, tasks):
         await steps_more(service, mission_id, 1)
-        for task in tasks:
-            task.cancel()  # they poll no more: each stop is waited for
+        await leave(api, tasks)  # each stop is waited for
         assert service.process is not None
         service.process.send_signal(signal.SIGTERM)
         await until(lambda: told(service, "asked to end: stopping the vehicles"), "it begins to end")
@@ -65,8 +74,7 @@ async def test_while_it_ends_no_flight_begins(tmp_path: Path) -> None:
     async with service_in(tmp_path) as (service, api), flying(api, vehicles, steps=500) as (mission_id, tasks):
         waiting = (await api.post("/missions", json=mission_of([{"name": "sim-1", "kind": "sim"}]))).json()["id"]
         await steps_more(service, mission_id, 1)
-        for task in tasks:
-            task.cancel()
+        await leave(api, tasks)
         assert service.process is not None
         service.process.send_signal(signal.SIGTERM)
         await until(lambda: told(service, "asked to end"), "it begins to end")

@@ -1,7 +1,7 @@
 """The one table of failsafes: what is detected, what is done then, and how long it must last before and after."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from app.missions.recovery.way_home import LEAST_SHARE
@@ -134,6 +134,21 @@ TABLE: Mapping[Failsafe, Rule] = {
 }
 """In order of priority: of two with the same response the first is told."""
 
+TOLD_BY_VEHICLES = frozenset(
+    {
+        Failsafe.LEAK,
+        Failsafe.CRITICAL_ENERGY,
+        Failsafe.TOO_DEEP,
+        Failsafe.POSITION_LOST,
+        Failsafe.NO_POSITION,
+        Failsafe.LOW_ENERGY,
+        Failsafe.GEOFENCE_LEFT,
+        Failsafe.VEHICLE_ERROR,
+        Failsafe.OTHER_CONSOLE,
+    }
+)
+"""What is known of a vehicle by what it sends only: of one that is silent nobody knows whether they are over."""
+
 
 @dataclass(frozen=True, slots=True)
 class Active:
@@ -160,7 +175,9 @@ class FailsafeJudge:
     _messages: dict[Failsafe, str] = field(default_factory=dict)
     _active: set[Failsafe] = field(default_factory=set)
 
-    def judge(self, detected: Mapping[Failsafe, str], now_s: float) -> list[Active]:
+    def judge(
+        self, detected: Mapping[Failsafe, str], now_s: float, unknown: Collection[Failsafe] = frozenset()
+    ) -> list[Active]:
         """Return what is in force now, the strongest response first.
 
         Parameters
@@ -169,6 +186,8 @@ class FailsafeJudge:
             What is the case now, with the words for the operator.
         now_s
             Vehicles' time, which only grows.
+        unknown
+            What cannot be told now. Of these what is in force stays so, and what was the case counts from then.
         """
         for failsafe, message in detected.items():
             self._since_s.setdefault(failsafe, now_s)
@@ -177,7 +196,9 @@ class FailsafeJudge:
             if now_s - self._since_s[failsafe] >= TABLE[failsafe].after_s:
                 self._active.add(failsafe)
         for failsafe in [f for f in self._since_s if f not in detected]:
-            if failsafe not in self._active:
+            if failsafe in unknown:
+                self._seen_s[failsafe] = now_s
+            elif failsafe not in self._active:
                 del self._since_s[failsafe]
             elif now_s - self._seen_s[failsafe] >= TABLE[failsafe].over_s:
                 self._active.discard(failsafe)

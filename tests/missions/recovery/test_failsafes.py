@@ -38,7 +38,7 @@ def test_of_two_events_the_stronger_response_is_told_first(first: Failsafe, seco
     assert judge.judge({}, 3000.0) == []
 
 
-def account(history: list[tuple[float, set[Failsafe]]]) -> set[Failsafe]:
+def account(history: list[tuple[float, set[Failsafe], set[Failsafe]]]) -> set[Failsafe]:
     """Return what is in force after a history, from its beginning each time."""
     active: set[Failsafe] = set()
     for failsafe in Failsafe:
@@ -46,11 +46,13 @@ def account(history: list[tuple[float, set[Failsafe]]]) -> set[Failsafe]:
         since: float | None = None
         seen = 0.0
         on = False
-        for time_s, detected in history:
+        for time_s, detected, unknown in history:
             if failsafe in detected:
                 since = time_s if since is None else since
                 seen = time_s
                 on = on or time_s - since >= rule.after_s
+            elif failsafe in unknown:
+                seen = time_s
             elif since is not None and (not on or time_s - seen >= rule.over_s):
                 since, on = None, False
         if on:
@@ -61,16 +63,22 @@ def account(history: list[tuple[float, set[Failsafe]]]) -> set[Failsafe]:
 @settings(deadline=None)
 @given(
     st.lists(
-        st.tuples(st.floats(0.5, 200.0), st.sets(st.sampled_from(list(Failsafe)), max_size=4)), min_size=1, max_size=25
+        st.tuples(
+            st.floats(0.5, 200.0),
+            st.sets(st.sampled_from(list(Failsafe)), max_size=4),
+            st.sets(st.sampled_from(list(Failsafe)), max_size=4),
+        ),
+        min_size=1,
+        max_size=25,
     )
 )
-def test_what_is_in_force_follows_the_table(moves: list[tuple[float, set[Failsafe]]]) -> None:
+def test_what_is_in_force_follows_the_table(moves: list[tuple[float, set[Failsafe], set[Failsafe]]]) -> None:
     judge, now_s = FailsafeJudge(), 0.0
-    history: list[tuple[float, set[Failsafe]]] = []
-    for passed_s, detected in moves:
+    history: list[tuple[float, set[Failsafe], set[Failsafe]]] = []
+    for passed_s, detected, unknown in moves:
         now_s += passed_s
-        history.append((now_s, detected))
-        found = judge.judge(dict.fromkeys(detected, "words"), now_s)
+        history.append((now_s, detected, unknown))
+        found = judge.judge(dict.fromkeys(detected, "words"), now_s, unknown)
         assert {one.failsafe for one in found} == account(history)
         strengths = [STRENGTH[one.response] for one in found]
         assert strengths == sorted(strengths, reverse=True)

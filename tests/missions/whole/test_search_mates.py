@@ -23,6 +23,9 @@ WIDE_M = 0.5
 """Half of what a boat is wide to a scanner."""
 SHORT_M = 0.3
 """How far before its position a boat is met."""
+EVERY_S = 20.0
+"""Between two posts by a boat's clock: how far clocks are apart is told by when posts come, and a busy machine holds
+some of them up for seconds."""
 
 
 class SeeingBoat:
@@ -35,7 +38,7 @@ class SeeingBoat:
         self._step: int | None = None
 
     async def post(self, **changes: float) -> None:
-        self._time_s += 1.0
+        self._time_s += EVERY_S
         lon, lat = lon_lat(*self.place_m)
         values = {"vehicle": self.name, "time_s": self._time_s, "lat_deg": lat, "lon_deg": lon, "depth_m": 0.0}
         await measure(self.live, [Measurement.model_validate(values | changes)])
@@ -115,7 +118,7 @@ async def test_a_boat_hides_what_is_behind_it_and_a_wall_beside_it_is_seen(harbo
 async def test_a_late_scan_knows_where_the_others_were_when_it_was_taken(service: MissionService) -> None:
     live = await service.get((await service.create(two_boats())).id)
     a, b = SeeingBoat(live, "a", 12.5, 5.5), SeeingBoat(live, "b", 17.5, 5.5)
-    taken_s = CLOCK_S + 1.0
+    taken_s = CLOCK_S + 2 * EVERY_S
     for boat in (a, b):
         await boat.post()
     await act(service, live.id, "start")

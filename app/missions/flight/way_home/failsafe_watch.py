@@ -24,6 +24,7 @@ from app.missions.recovery.failsafes import (
     POSITION_LOST_M,
     STRENGTH,
     TABLE,
+    TOLD_BY_VEHICLES,
     Active,
     FailsafeJudge,
     with_reserve_s,
@@ -81,12 +82,12 @@ class FailsafeWatch:
         """Go on until cancelled."""
         while True:
             try:
-                await self.look()
+                self.look()
             except Exception:
                 log.exception("the failsafes could not be looked at")
             await until_next_look(self._time_scale)
 
-    async def look(self) -> None:
+    def look(self) -> None:
         """Look once at everybody."""
         now_s = asyncio.get_running_loop().time() * self._time_scale
         too_close = self._too_close()
@@ -101,13 +102,15 @@ class FailsafeWatch:
             news.append((member.name, member.failsafes))
         lost = self._all_lost()
         news.append((TEAM, self._judges.setdefault(TEAM, FailsafeJudge()).judge(lost, now_s)))
-        # What is done waits for no line of the log: the database may be slow, or full.
+        # Lines of the log are noted: neither this look nor the next waits for a database that is slow, or full.
         words_of_ships, self._words_of_ships = self._words_of_ships, []
+        journal = self._live.journal
         for name, words in words_of_ships:
-            await self._live.journal.alarm(AlarmKind(Failsafe.TRAFFIC), words, failsafe=Failsafe.TRAFFIC, vehicle=name)
+            facts = {"failsafe": Failsafe.TRAFFIC, "vehicle": name}
+            journal.note_line(journal.alarm_line(AlarmKind(Failsafe.TRAFFIC), words, **facts))
         for name, found in news:
-            await self._tell(name, found, now_s)
-        await self._tell_of_deafness()
+            self._tell(name, found, now_s)
+        self._tell_of_deafness()
 
     def _look_at(self, member: Member, now_s: float, too_close: dict[Failsafe, str]) -> None:
         """Tell what a vehicle's way home takes, and do what its failsafes ask for."""
@@ -127,7 +130,8 @@ class FailsafeWatch:
         judge = self._judges.get(member.name)
         if judge is None:
             judge = self._judges[member.name] = FailsafeJudge(overrides(self._live.spec, member))
-        found = judge.judge(detected, now_s)
+        unknown = TOLD_BY_VEHICLES if Failsafe.LINK_LOST in detected else frozenset()
+        found = judge.judge(detected, now_s, unknown)
         if self._live.spec.recovery_of(member.spec) is not None:
             return found
         # Nobody can be sent home who has none.
@@ -256,41 +260,41 @@ class FailsafeWatch:
             return {}
         return {Failsafe.ALL_LINKS_LOST: f"none of {len(followed)} vehicles is heard any more"}
 
-    async def _tell_of_deafness(self) -> None:
+    def _tell_of_deafness(self) -> None:
         """Write down when no ship is heard any more, and when one is again: no ships about looks the same."""
         traffic = self._live.ships.traffic
         why = "" if traffic is None else traffic.deaf
         if bool(why) == self._deaf:
             return
         self._deaf = bool(why)
+        level, words = Level.INFO, "AIS is heard again"
         if why:
+            level = Level.WARNING
             words = f"no ship is heard by AIS any more ({why}): nobody is warned of any, and nobody waits for any"
-            await self._live.journal.log(Level.WARNING, "traffic", words)
-        else:
-            await self._live.journal.log(Level.INFO, "traffic", "AIS is heard again")
+        self._live.journal.note_line(self._live.journal.line(level, "traffic", words))
 
-    async def _tell(self, name: str, found: list[Active], now_s: float) -> None:
+    def _tell(self, name: str, found: list[Active], now_s: float) -> None:
         """Write down what begins and what is over."""
         before = self._told.get(name, frozenset())
         now = {one.failsafe: one for one in found}
         undecided = self._undecided(name, before, frozenset(now), now_s)
         self._told[name] = stay = undecided | self._still_low(name, before, frozenset(now)) | now.keys()
-        who = f"{name}: " if name else ""
+        who, journal = f"{name}: " if name else "", self._live.journal
         for failsafe, one in now.items():
             if failsafe not in before:
                 words = f"{who}{one.message}"
                 facts = {"failsafe": failsafe, "response": one.response} | ({"vehicle": name} if name else {})
                 if failsafe is Failsafe.SEPARATION_LOST:
-                    await self._live.journal.log(Level.WARNING, "failsafe", words, **facts)
+                    journal.note_line(journal.line(Level.WARNING, "failsafe", words, **facts))
                 else:
-                    await self._live.journal.alarm(AlarmKind(failsafe.value), words, **facts)
+                    journal.note_line(journal.alarm_line(AlarmKind(failsafe.value), words, **facts))
         for failsafe in before - stay:
             words = f"{who}{failsafe.replace('_', ' ')} is over"
             facts = {"failsafe": failsafe} | ({"vehicle": name} if name else {})
             if failsafe is Failsafe.SEPARATION_LOST:
-                await self._live.journal.log(Level.INFO, "failsafe", words, **facts)
+                journal.note_line(journal.line(Level.INFO, "failsafe", words, **facts))
             else:
-                await self._live.journal.end([AlarmKind(failsafe.value)], words, **facts)
+                journal.note_line(journal.end_line([AlarmKind(failsafe.value)], words, **facts))
         if before != stay:
             self._live.publish_summary()
 

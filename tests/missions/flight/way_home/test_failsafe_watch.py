@@ -15,6 +15,7 @@ from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
 from app.missions.live.mission import LiveMission
 from app.missions.operations.history import events_after
 from app.missions.recovery import failsafes
+from app.missions.recovery.failsafes import TABLE
 from app.missions.service import MissionService
 from app.missions.settings import AisSettings
 from app.missions.spec.failsafes import Failsafe
@@ -43,7 +44,7 @@ async def test_one_whose_way_home_cannot_be_told_keeps_nobody_from_looking_after
         member.report = VehicleReport(member.name, 0.0, Position(lat, lon, 2.0))
     # As a description of before this was checked has it.
     a.spec = a.spec.model_copy(update={"recovery_point": (lat, lon)})
-    await watch_of(live, service).look()
+    watch_of(live, service).look()
     assert a.way_home_m is None
     assert b.way_home_m is not None
 
@@ -77,6 +78,30 @@ async def test_only_who_is_heard_can_follow_another_console(
     await act(service, mission.id, "abort")
 
 
+async def test_what_a_silent_vehicle_told_last_is_not_over_until_it_tells_otherwise(
+    service: MissionService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(failsafes.TABLE, Failsafe.TOO_DEEP, replace(TABLE[Failsafe.TOO_DEEP], after_s=0.0, over_s=0.0))
+    info, state = FleetHub.info, LinkState.ENGAGED
+    monkeypatch.setattr(FleetHub, "info", lambda hub, key: replace(info(hub, key), state=state))
+    live = await service.get((await service.create(sim_spec("a"))).id)
+    watch, a = watch_of(live, service), live.team.members["a"]
+    a.followed = True
+
+    def in_force(depth_m: float) -> set[Failsafe]:
+        lon, lat = lon_lat(20, 20)
+        a.report = VehicleReport("a", 0.0, Position(lat, lon, depth_m))
+        watch.look()
+        return {one.failsafe for one in a.failsafes}
+
+    assert in_force(40.0) == {Failsafe.TOO_DEEP}
+    state = LinkState.LOST
+    for _ in range(3):
+        assert in_force(40.0) == {Failsafe.TOO_DEEP}
+    state = LinkState.ENGAGED
+    assert in_force(2.0) == set()
+
+
 @pytest.mark.parametrize(
     ("ahead_s", "silent_s", "told"),
     [(0.0, 0.0, ["a", "b"]), (30.0, 0.0, ["a", "b"]), (0.0, 30.0, [])],
@@ -96,7 +121,7 @@ async def test_vehicles_are_too_close_by_when_they_were_heard_whatever_their_clo
             with told_by(lambda at_s=at_s: 1.7e9 + at_s):  # type: ignore[misc]
                 report = VehicleReport(name, 1.7e9 + at_s + clock_s, Position(float(lat), float(lon), 2.0))
                 live.reports.take(report, live.spec, running=True)
-        await watch.look()
+        watch.look()
 
     for member in live.team:
         member.engaged, member.link, member.legs = True, LinkState.ENGAGED, 1
@@ -114,8 +139,9 @@ async def test_that_no_ship_is_heard_any_more_is_a_line_of_the_log(service: Miss
 
     async def told(silent_s: float, trouble: str) -> list[tuple[Level, str]]:
         source.heard_s, source.trouble = heard_s - silent_s, trouble
-        await watch.look()
-        await watch.look()
+        watch.look()
+        watch.look()
+        await live.journal.flush()
         return [(one.level, one.message) for one in await events_after(live, 0, 1000) if one.kind == "traffic"]
 
     assert await told(0.5 * SILENCE_S, "Connection refused") == []
@@ -146,7 +172,8 @@ async def test_low_energy_is_over_once_the_battery_is_charged(
         a.energy.take_level(level_pct)
         for _ in range(3):
             wait_s += 61.0
-            await watch.look()
+            watch.look()
+        await live.journal.flush()
         return [one.message for one in await events_after(live, 0, 1000) if "energy" in one.message]
 
     began_s = loop.time()
