@@ -213,6 +213,7 @@ def test_an_interrupt_that_compiled_code_turned_into_an_error_ends_as_any_other(
     assert (ended.code, ended.stdout, ended.stderr) == (130, "", "")
 
 
+@pytest.mark.slow
 def test_whatever_is_listed_ends_alike_when_nobody_reads_it(
     bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -446,6 +447,7 @@ def test_a_backup_brings_an_older_database_up_to_nothing(bathyfleet: Run, tmp_pa
     assert "from revision 0018 to" in bathyfleet("migrate").stdout
 
 
+@pytest.mark.slow
 def test_a_mission_is_served_exported_and_found_again(
     bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -510,6 +512,7 @@ def test_a_mission_is_served_exported_and_found_again(
         assert process.wait(60) == 0  # a first start may still be compiling
 
 
+@pytest.mark.slow
 def test_logs_are_json_lines_with_the_requests_id(tmp_path: Path, environment: dict[str, str]) -> None:
     with serving(tmp_path, environment, "--log-format", "json") as (process, url):
         httpx.get(f"{url}/api/v1/missions")  # nothing to tell of
@@ -561,6 +564,7 @@ def test_the_doctor_says_when_the_service_holds_the_port(bathyfleet: Run) -> Non
     assert "Traceback" not in ended.stderr
 
 
+@pytest.mark.slow
 def test_missions_are_listed_paused_and_aborted_where_there_is_no_browser(
     bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -600,6 +604,7 @@ def test_missions_are_listed_paused_and_aborted_where_there_is_no_browser(
     assert (gone.code, "does not answer" in gone.stderr) == (1, True)
 
 
+@pytest.mark.slow
 def test_missions_of_a_service_that_asks_for_a_token_are_reached_by_that_of_its_first_start(
     bathyfleet: Run, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -613,6 +618,7 @@ def test_missions_of_a_service_that_asks_for_a_token_are_reached_by_that_of_its_
         assert bathyfleet("missions", "list", "--url", url, "--token", "wrong").code == 1
 
 
+@pytest.mark.slow
 def test_missions_of_this_machine_are_reached_whatever_name_the_certificate_has_and_by_no_proxy(
     bathyfleet: Run,
     tmp_path: Path,

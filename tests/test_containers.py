@@ -89,6 +89,7 @@ def test_ports_of_the_image_are_those_of_the_settings() -> None:
     assert line.split() == [f"{Settings().port}/tcp", f"{imc.port}/udp", announces]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encrypted", [False, True])
 def test_the_health_check_asks_what_there_is(
     database_url: str, tmp_path: Path, certificate: tuple[Path, Path], encrypted: bool

@@ -252,6 +252,7 @@ def test_the_table_of_settings_is_complete_and_true() -> None:
     assert rows == list(settings_rows())
 
 
+@pytest.mark.slow
 def test_the_polling_vehicle_of_the_guide_completes_a_mission(tmp_path: Path) -> None:
     guide = PROJECT / "docs" / "rest.md"
     [program] = [block.text for block in blocks(guide, "python") if "def post(" in block.text]

@@ -65,6 +65,7 @@ def ours() -> list[Facts]:
     return list(functions())
 
 
+@pytest.mark.slow
 def test_no_function_has_more_parameters_than_can_be_remembered(ours: list[Facts]) -> None:
     assert len(ours) > 3000
     assert [one.name for one in ours if one.parameters > MOST_PARAMETERS] == []

@@ -55,6 +55,7 @@ def variables(packages: Path, tmp_path: Path) -> dict[str, str]:
     return settings | {"PYTHONPATH": f"{settings['PYTHONPATH']}:{packages}"}
 
 
+@pytest.mark.slow
 def test_it_is_listed_flies_a_mission_and_is_missed_by_name_when_it_is_gone(
     variables: dict[str, str], tmp_path: Path
 ) -> None:
@@ -84,6 +85,7 @@ def test_it_is_listed_flies_a_mission_and_is_missed_by_name_when_it_is_gone(
         assert client.get_mission(mission.id).state == "finished"
 
 
+@pytest.mark.slow
 def test_it_can_be_compared_with_others(variables: dict[str, str], tmp_path: Path) -> None:
     terrain = tmp_path / "floor.npz"
     np.savez(terrain, z=np.add.outer(np.linspace(8.0, 10.0, 30), np.linspace(0.0, 3.0, 30)), cell_m=1.0)

@@ -131,12 +131,14 @@ def beside_another(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path,
         return port, folder, *start(folder, BATHYFLEET_IMC__PORT=str(port), **own)
 
 
+@pytest.mark.slow
 def test_a_udp_port_that_is_taken(beside_another: tuple[int, Path, int, str]) -> None:
     port, _, code, said = beside_another
     assert code == 1
     check_one_line(said, f"UDP port {port} cannot be bound", "stop it or set another port")
 
 
+@pytest.mark.slow
 def test_an_interface_that_this_machine_has_not(tmp_path: Path) -> None:
     own = {"BATHYFLEET_IMC__ENABLED": "true", "BATHYFLEET_IMC__INTERFACES": '["192.0.2.7"]'}
     code, said = start(tmp_path, BATHYFLEET_IMC__PORT=str(free_ports(1)[0]), **own)

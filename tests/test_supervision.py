@@ -37,6 +37,7 @@ def waiting(sock: socket.socket) -> list[str]:
             return found
 
 
+@pytest.mark.slow
 def test_the_service_is_ready_lives_and_ends(listening: socket.socket, tmp_path: Path) -> None:
     words: Queue[str] = Queue()
 
@@ -82,6 +83,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_a_service_whose_loop_hangs_is_silent_and_says_where_it_hung_when_it_is_ended(
     listening: socket.socket, tmp_path: Path
 ) -> None:

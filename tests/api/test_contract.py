@@ -144,6 +144,7 @@ def _without_waiting(case: Case[Any]) -> None:
         case.query["timeout_s"] = 0
 
 
+@pytest.mark.slow
 def test_missions_are_dealt_with_in_any_order(service: Service) -> None:
     """Walks from answer to request: what one returned is asked about, changed, started, ended and taken back."""
     machine = service.document.as_state_machine()

@@ -126,6 +126,7 @@ async def test_another_user_of_this_machine_is_not_the_local_operator(make_setti
         assert " 403 " in done.stdout, done
 
 
+@pytest.mark.slow
 async def test_every_answer_tells_browsers_to_be_careful(make_settings: Callable[..., Settings]) -> None:
     app = create_app(make_settings())
     wanted: dict[str, Any] = {

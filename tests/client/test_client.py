@@ -185,6 +185,7 @@ def test_a_token_that_no_header_can_show_is_refused_without_telling_it(token: st
         assert "secret" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_command_that_was_one_too_many_is_given_again_when_there_is_room(databases: Databases) -> None:
     settings = Settings(port=0, database_url=databases.fresh(), imc=ImcSettings(enabled=False), max_requests_per_s=0.5)
     with running_in_thread(settings) as server, Client(server.url) as client:

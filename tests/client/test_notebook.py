@@ -30,6 +30,7 @@ def flown(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Any:
     return notebook
 
 
+@pytest.mark.slow
 def test_it_ends_with_a_picture_of_the_map(flown: Any) -> None:
     pictures = [o for cell in flown.cells for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
     assert len(pictures) == 1

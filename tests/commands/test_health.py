@@ -23,6 +23,7 @@ def asked(folder: Path, *words: str, **variables: str) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("host", ["0.0.0.0", "::1", "localhost"])
 def test_a_service_that_is_well_is_found_at_any_address(database_url: str, tmp_path: Path, host: str) -> None:
     imc = ImcSettings(enabled=False)
@@ -51,6 +52,7 @@ def test_a_service_with_https_is_found_whatever_name_its_certificate_is_for(
         assert (code, said) == (0, f"https://[::1]:{port} is well\n")
 
 
+@pytest.mark.slow
 def test_where_no_service_answers_is_said(tmp_path: Path) -> None:
     code, said = asked(tmp_path, "--port", "9")
     assert code == 1

@@ -128,6 +128,7 @@ def test_missions_follow_from_their_seed() -> None:
     assert [drawn(seed, still=False)[1].consumption_factor for seed in range(5)] == [1.0, 1.0, 1.0, 1.0, 1.3]
 
 
+@pytest.mark.slow
 def test_everybody_comes_home_although_links_are_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(home, "WITHIN_REACH_S", (15.0, 40.0))
     monkeypatch.setattr(home, "OUT_OF_REACH_S", (5.0, 30.0))
@@ -140,6 +141,7 @@ def test_everybody_comes_home_although_links_are_lost(monkeypatch: pytest.Monkey
     assert all(vehicle["from_point_m"] <= 25.0 for vehicle in flown["vehicles"].values())
 
 
+@pytest.mark.slow
 def test_who_has_energy_for_the_legs_it_has_and_no_further_one_keeps_nobody_busy() -> None:
     """It was looked at and decided for without a pause meanwhile: here time stood still, elsewhere others waited."""
     vehicles = [{"name": "a", "kind": "sim", "endurance_min": 5.0}, {"name": "b", "kind": "sim", "endurance_min": 7.0}]

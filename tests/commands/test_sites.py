@@ -41,6 +41,7 @@ async def fill(url: str) -> tuple[str, list[str]]:
         await database.close()
 
 
+@pytest.mark.slow
 def test_sites_are_listed_and_written_to_files(
     database_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

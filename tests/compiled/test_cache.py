@@ -49,6 +49,7 @@ def test_a_folder_of_the_user_is_used() -> None:
         assert imported(home) == ["None", "-"]
 
 
+@pytest.mark.slow
 def test_what_an_earlier_start_compiled_is_not_compiled_again() -> None:
     folder = Path(os.environ["NUMBA_CACHE_DIR"])
     for mark in folder.glob("bathyfleet-*.compiled"):
@@ -107,6 +108,7 @@ class {name}(NamedTuple):
 """
 
 
+@pytest.mark.slow
 def test_code_compiled_for_names_of_an_earlier_version_is_compiled_again(tmp_path: Path) -> None:
     for name in ("Size", "Extent"):  # the class has another name in the next version, the function is as it was
         (tmp_path / "sizes.py").write_text(SIZES.format(name=name))
@@ -140,6 +142,7 @@ REPORT = (
 )
 
 
+@pytest.mark.slow
 def test_a_function_is_compiled_again_when_one_that_it_calls_or_a_constant_of_that_changed(tmp_path: Path) -> None:
     package = tmp_path / "app"
     package.mkdir()

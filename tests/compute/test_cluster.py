@@ -80,6 +80,7 @@ async def begun(folder: Path, work: "asyncio.Task[int]") -> int:
     return begun_by(folder)[0]
 
 
+@pytest.mark.slow
 async def test_workers_return_and_refuse_what_this_process_would(compute: Compute, dask: DaskCluster) -> None:
     table = np.arange(12.0).reshape(4, 3)
     made, writable = await compute.run(heavy_work.doubled, table)
@@ -190,6 +191,7 @@ async def test_a_worker_with_other_versions_is_told_and_nothing_is_given_to_it(
     assert await compute.run(heavy_work.process) != os.getpid()
 
 
+@pytest.mark.slow
 async def test_a_cluster_that_is_gone_in_the_middle_costs_a_repetition_and_is_used_when_it_is_back(
     compute: Compute, dask: DaskCluster, tmp_path: Path
 ) -> None:

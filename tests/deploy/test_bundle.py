@@ -91,6 +91,7 @@ def install(files: Path, folder: Path, **more: str) -> "subprocess.CompletedProc
     )
 
 
+@pytest.mark.slow
 def test_it_installs_upgrades_and_keeps_the_version_before(boat: Path, index: Path, tmp_path: Path) -> None:
     file = made(boat, index)
     assert file.name == f"boat-1.0-python{PYTHON}-linux-{MACHINE}.tar"
@@ -115,6 +116,7 @@ def main() -> None:
 """
 
 
+@pytest.mark.slow
 def test_an_upgrade_that_lacks_what_was_put_in_is_refused(index: Path, tmp_path: Path) -> None:
     boat = make_wheel(tmp_path, "boat", "1.0", needs=NEEDS, code="def main() -> None: ...")
     make_wheel(index, "sail", "1.0", needs="rope")
@@ -137,6 +139,7 @@ def test_an_upgrade_that_lacks_what_was_put_in_is_refused(index: Path, tmp_path:
     assert left_out.returncode == 0, left_out.stderr
 
 
+@pytest.mark.slow
 def test_what_a_version_no_longer_needs_itself_is_not_missed(boat: Path, index: Path, tmp_path: Path) -> None:
     folder = tmp_path / "opt" / "boat"
     assert install(unpacked(made(boat, index), tmp_path / "one"), folder).returncode == 0
@@ -145,6 +148,7 @@ def test_what_a_version_no_longer_needs_itself_is_not_missed(boat: Path, index: 
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_an_upgrade_that_cannot_use_the_settings_is_refused(boat: Path, index: Path, tmp_path: Path) -> None:
     folder, state, defaults = tmp_path / "opt" / "boat", tmp_path / "state", tmp_path / "defaults"
     assert install(unpacked(made(boat, index), tmp_path / "one"), folder).returncode == 0
@@ -173,6 +177,7 @@ def test_a_damaged_file_is_not_installed(boat: Path, index: Path, tmp_path: Path
     assert not folder.exists()
 
 
+@pytest.mark.slow
 def test_a_wheel_that_was_added_is_not_taken(boat: Path, index: Path, tmp_path: Path) -> None:
     files, folder = unpacked(made(boat, index), tmp_path / "stick"), tmp_path / "boat"
     make_wheel(files / "wheels", "sounder", "2.0", PLAIN, code="def told() -> str:\n    return 'a lie'\n")

@@ -188,6 +188,7 @@ def close_by(low: Any = (-500, -500, 0), high: Any = (1500, 1500, 30)) -> Target
     return TargetEstimator(RangeSensor(np.inf, 0.01), 0.0, 5.0, low, high, 0.01, 0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [3.0, 8.0, 20.0])
 def test_ranges_from_close_by_tell_as_much_as_they_can(depth: float) -> None:
     """Beside them the water is wide: the filter says what evenly drawn places say that are weighed by them."""

@@ -69,6 +69,7 @@ def test_where_there_is_little_room_no_name_of_a_column_is_cut_off(
     assert "…" not in result.stdout
 
 
+@pytest.mark.slow
 def test_any_number_of_processes_gives_the_same_runs_in_the_same_order(terrain: Terrain) -> None:
     arguments = ("explore", "--terrain", terrain, "--landmarks", "60", "--steps", "3", "--planner", "random,lawnmower",
                  "--seeds", "0:2", "--json")  # fmt: skip
@@ -103,6 +104,7 @@ def test_explore_under_limited_communication(terrain: Terrain) -> None:
     assert 0 < document["message_bytes"] <= 6 * 3 * (64 + 64 + 20)
 
 
+@pytest.mark.slow
 def test_survey_prints_the_planner_beside_its_yardsticks(terrain: Terrain) -> None:
     result = call(
         "survey", "--terrain", terrain, "--steps", "6", "--max-step", "8", "--sampling", "continuous", "--json"

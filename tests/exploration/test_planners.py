@@ -220,6 +220,7 @@ def test_the_lawnmower_spends_its_budget_on_even_lines() -> None:
         assert 400.0 < length <= 600.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_cao_goes_where_the_bottom_is_rough() -> None:
     belief = make_belief(known=False, cell=2.5)
     rough = (belief.xy_m > 60.0).all(axis=1)
@@ -250,6 +251,7 @@ def test_surveying_vehicles_keep_their_depths_and_the_clearance() -> None:
     assert 0.9 < min(reached) < 1.51
 
 
+@pytest.mark.slow
 def test_a_team_in_formation_keeps_in_touch() -> None:
     cube = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
     axis = np.linspace(-0.95, 0.95, 20)

@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 
 import httpx
+import pytest
 
 from tests.support.faults.missions import flying, mission_of, pollers, started, steps_more
 from tests.support.faults.service import Service, service_in
@@ -27,6 +28,7 @@ def told(service: Service, words: str, before: str = "") -> list[str]:
     return [line for line in service.said.removeprefix(before).splitlines() if words in line]
 
 
+@pytest.mark.slow
 async def test_a_service_that_is_ended_while_it_starts_stops_what_it_has_taken_up(tmp_path: Path) -> None:
     async with service_in(tmp_path) as (service, api):
         for number in range(MISSIONS):
@@ -44,6 +46,7 @@ async def test_a_service_that_is_ended_while_it_starts_stops_what_it_has_taken_u
         assert states == [("running",)] * MISSIONS, "the next start goes on with them"
 
 
+@pytest.mark.slow
 async def test_vehicles_that_poll_are_told_to_stop_before_the_service_answers_no_more(tmp_path: Path) -> None:
     vehicles = pollers()
     async with service_in(tmp_path) as (service, api), flying(api, vehicles, steps=500) as (mission_id, _):
@@ -55,6 +58,7 @@ async def test_vehicles_that_poll_are_told_to_stop_before_the_service_answers_no
         assert all(vehicle.told_to_stop for vehicle in vehicles)
 
 
+@pytest.mark.slow
 async def test_asked_again_it_stops_its_vehicles_all_the_same(tmp_path: Path) -> None:
     vehicles = pollers()
     async with service_in(tmp_path) as (service, api), flying(api, vehicles, steps=500) as (mission_id, tasks):
@@ -69,6 +73,7 @@ async def test_asked_again_it_stops_its_vehicles_all_the_same(tmp_path: Path) ->
         assert len(told(service, "has NOT acknowledged the stop")) == len(vehicles)
 
 
+@pytest.mark.slow
 async def test_while_it_ends_no_flight_begins(tmp_path: Path) -> None:
     vehicles = pollers()
     async with service_in(tmp_path) as (service, api), flying(api, vehicles, steps=500) as (mission_id, tasks):

@@ -23,6 +23,7 @@ from tests.support.faults.hostile import PLACE, npy, npz
 from tests.support.paths import PROJECT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reader", ["terrain", "soundings"])
 def test_each_is_refused_in_little_memory_with_what_is_wrong(reader: str, tmp_path: Path) -> None:
     ended = subprocess.run(

@@ -49,6 +49,7 @@ def written_until_killed(url: str, folder: Path, first: int, lines: int) -> int:
     return said[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 async def test_pings_survive_being_killed_at_random_moments(databases: Databases, tmp_path: Path) -> None:
     database = Database(databases.fresh("sqlite"))

@@ -47,6 +47,7 @@ def read(folder: Path, name: str, inspection: str, layers: str) -> tuple[int, di
         return ended.returncode, json.loads(ended.stdout), np.fromfile(folder / "result", "<f8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
 def test_confinement_holds_where_inspection_misses_something(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(grids(tmp_path)[name])

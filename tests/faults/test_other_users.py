@@ -56,6 +56,7 @@ def missions(service: Service) -> list[str]:
     return [name for (name,) in service.rows("select name from missions order by name")]
 
 
+@pytest.mark.slow
 @users
 async def test_an_ordinary_user_does_not_command(uid: int) -> None:
     with open_folder(uid) as folder:
@@ -86,6 +87,7 @@ async def test_an_ordinary_user_does_not_command(uid: int) -> None:
         assert missions(service) == ["own"]
 
 
+@pytest.mark.slow
 @users
 async def test_an_ordinary_user_reads_writes_and_locks_none_of_its_files(uid: int) -> None:
     with open_folder(uid) as folder:
@@ -114,6 +116,7 @@ def run(uid: int, folder: Path, *arguments: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 async def test_files_of_an_installation_made_before_are_closed_and_the_log_says_so() -> None:
     with open_folder() as folder:
         async with service_in(folder) as (service, _):
@@ -134,6 +137,7 @@ async def test_files_of_an_installation_made_before_are_closed_and_the_log_says_
         assert stat.S_IMODE(folder.stat().st_mode) == stat.S_IMODE(before), "the folder is the user's own"
 
 
+@pytest.mark.slow
 async def test_a_lock_that_a_stranger_holds_does_not_keep_a_dead_process_alive() -> None:
     with open_folder() as folder:
         async with service_in(folder) as (first, api):
@@ -160,6 +164,7 @@ async def test_a_lock_that_a_stranger_holds_does_not_keep_a_dead_process_alive()
             await blocking.wait()
 
 
+@pytest.mark.slow
 async def test_backups_hold_no_secret_of_a_process() -> None:
     with open_folder() as folder:
         async with service_in(folder) as (service, _):

@@ -49,6 +49,7 @@ async def mission_with_pings(api: httpx.AsyncClient) -> str:
     return mission_id
 
 
+@pytest.mark.slow
 async def test_a_mission_is_taken_up_while_the_place_of_its_pings_does_not_answer(
     tmp_path: Path, silent: SilentServer
 ) -> None:
@@ -78,6 +79,7 @@ async def test_a_mission_is_taken_up_while_the_place_of_its_pings_does_not_answe
                 await again.kill()
 
 
+@pytest.mark.slow
 async def test_a_service_ends_while_the_place_of_its_pings_never_answers(tmp_path: Path, silent: SilentServer) -> None:
     async with service_in(tmp_path) as (service, api):
         mission_id = await mission_with_pings(api)

@@ -35,6 +35,7 @@ async def two(tmp_path: Path, databases: Databases) -> AsyncIterator[tuple[Runni
         yield running[0], running[1]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 async def test_any_of_them_answers_and_a_killed_ones_mission_goes_on(two: tuple[Running, Running]) -> None:
     (first, at_first), (second, at_second) = two
@@ -87,6 +88,7 @@ async def test_any_of_them_answers_and_a_killed_ones_mission_goes_on(two: tuple[
         assert vehicle.steps_seen == sorted(set(vehicle.steps_seen)), "no step is flown twice"
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 async def test_a_hung_ones_mission_goes_on_elsewhere_and_is_left_alone_when_it_wakes(
     two: tuple[Running, Running],

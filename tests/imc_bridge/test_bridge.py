@@ -31,6 +31,7 @@ def truth_errors(sea: Sea) -> list[float]:
     return errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("loss", "sensor"), [(0.0, "single"), (0.05, "single"), (0.0, "dvl")], ids=["clean", "5 % loss", "dvl"]
 )
@@ -119,6 +120,7 @@ async def test_a_waypoint_at_the_surface_is_flown_to_unless_the_vehicle_would_dr
         assert now.horizontal_distance_m(east_m, north_m) < away_m - 5.0, "it flew there"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["slope", "smooth"])
 async def test_guard_keeps_the_vehicle_off_the_bottom(family: str) -> None:
     async with open_sea(family=family) as sea:
@@ -184,6 +186,7 @@ async def test_silent_vehicle_is_lost_its_stop_unacknowledged_and_its_waypoint_r
         assert "no acknowledgement within 0.3 s" in stop.detail
 
 
+@pytest.mark.slow
 async def test_vehicle_that_reboots_goes_on_to_its_waypoint() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
@@ -394,6 +397,7 @@ async def test_plan_that_the_vehicle_refuses_is_told_in_its_words() -> None:
         assert not sea.bridge.nodes()[0].engaged
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
 async def test_waypoints_are_reached_in_a_current_of_half_the_speed(guidance: Guidance) -> None:
     async with open_sea(family="flat", current=(0.35, -0.35), bridge={"unknown_bottom_depth_m": 0.0}) as sea:

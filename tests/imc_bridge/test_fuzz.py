@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.support.commands import environment
 from tests.support.paths import PROJECT
 
@@ -42,6 +44,7 @@ def run(*arguments: str) -> dict[str, Any]:
     return json.loads(ended.stdout)
 
 
+@pytest.mark.slow
 def test_mutated_packets_neither_break_anything_nor_get_through() -> None:
     result = run("-m", "benchmarks.imc.fuzz", "--packets", "20000", "--seeds", "7")
     assert result["handler_errors"] == {}
@@ -52,6 +55,7 @@ def test_mutated_packets_neither_break_anything_nor_get_through() -> None:
     assert result["nodes"] <= 256
 
 
+@pytest.mark.slow
 def test_what_once_led_somewhere_new_does_no_harm() -> None:
     result = run("-c", REPLAY, str(CORPUS))
     assert result["handler_errors"] == {}

@@ -184,6 +184,7 @@ async def test_vehicle_that_was_silent_for_long_may_come_back_elsewhere() -> Non
         await bridge.close()
 
 
+@pytest.mark.slow
 async def test_forged_packets_move_no_vehicle_that_is_led() -> None:
     """Its states, arrivals and aborts, from another port of its machine and from another host, while it is led."""
     async with open_sea() as sea:

@@ -10,6 +10,7 @@ from tests.support.waiting import until
 ACKNOWLEDGED, REFUSED = WaypointStatus.ACKNOWLEDGED, WaypointStatus.REFUSED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
 async def test_a_crash_under_water_is_told_as_a_restart_and_the_vehicle_goes_on(guidance: Guidance) -> None:
     async with open_sea(radio_range_m=2000.0, bridge={"unknown_bottom_depth_m": 3.0}) as sea:
@@ -30,6 +31,7 @@ async def test_a_crash_under_water_is_told_as_a_restart_and_the_vehicle_goes_on(
         ]
 
 
+@pytest.mark.slow
 async def test_the_silence_of_a_crash_is_no_gap_of_the_radio() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()

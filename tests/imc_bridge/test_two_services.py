@@ -51,6 +51,7 @@ async def second(sea: Sea, **changes: Any) -> AsyncIterator[Service]:
         await service.bridge.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
 async def test_a_second_service_neither_engages_nor_stops_a_vehicle_of_the_first(guidance: Guidance) -> None:
     async with open_sea() as sea:

@@ -50,6 +50,7 @@ print([f.__name__ for key, f in compiled.items() if len(f.signatures) > before[k
 """Prints which compiled functions the default planner's warm-up forgot."""
 
 
+@pytest.mark.slow
 def test_the_default_planner_leaves_nothing_to_compile() -> None:
     # A process of its own: other tests have compiled everything in this one.
     found = subprocess.run([sys.executable, "-c", COMPILED], capture_output=True, text=True, check=False)

@@ -61,6 +61,7 @@ async def soundings(gateway: Gateway) -> list[tuple[Any, float]]:
     return [(row, row.depth_m - floor_m(*area.to_cells(row.lat_deg, row.lon_deg))) for row in rows]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 5.0])
 async def test_two_vehicles_are_led_through_an_area(make_gateway: Callable[..., Gateway], scale: float) -> None:
     gateway = make_gateway()
@@ -131,6 +132,7 @@ async def test_samples_that_are_all_short_as_an_altimeters_are_warned_of(gateway
     assert "neptus.samples" in warnings[0]
 
 
+@pytest.mark.slow
 async def test_where_no_depth_is_safe_the_vehicles_stay_and_the_panel_is_answered(
     make_gateway: Callable[..., Gateway],
 ) -> None:
@@ -147,6 +149,7 @@ async def test_where_no_depth_is_safe_the_vehicles_stay_and_the_panel_is_answere
         await gateway.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 5.0])
 async def test_a_lost_or_refused_upload_does_not_hang_the_panel(
     make_gateway: Callable[..., Gateway], scale: float
@@ -166,6 +169,7 @@ async def test_a_lost_or_refused_upload_does_not_hang_the_panel(
         await gateway.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [frozenset[int](), frozenset({4})], ids=["taken", "lost"])
 async def test_a_panel_that_waits_goes_on_after_our_restart(
     make_gateway: Callable[..., Gateway], lost: frozenset[int]
@@ -228,6 +232,7 @@ async def test_soundings_at_the_surface_are_of_the_vehicle_that_took_them(gatewa
         assert row.vehicle == f"{SESSION}-{1 if first else 2}"
 
 
+@pytest.mark.slow
 async def test_no_vehicle_is_sent_to_the_border(gateway: Gateway) -> None:
     panel = gateway.real(floor_m, [Auv(2.0, 2.0, 1.5), Auv(58.0, 47.0, 3.0)])
     await fly(gateway, panel, 20)
@@ -306,6 +311,7 @@ async def test_the_panel_shows_why_it_is_not_let_in(make_gateway: Callable[..., 
         await gateway.close()
 
 
+@pytest.mark.slow
 async def test_two_consoles_at_one_address_do_not_end_each_other(gateway: Gateway) -> None:
     first = gateway.real(floor_m, two(), pace=20.0)
     await asyncio.to_thread(first.connect)
@@ -320,6 +326,7 @@ async def test_two_consoles_at_one_address_do_not_end_each_other(gateway: Gatewa
         assert (await gateway.mission(session)).state is MissionState.RUNNING
 
 
+@pytest.mark.slow
 async def test_a_console_that_began_anew_ends_what_it_does_not_fly_any_more(
     make_gateway: Callable[..., Gateway],
 ) -> None:

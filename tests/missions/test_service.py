@@ -243,6 +243,7 @@ async def test_ending_a_mission_stops_its_vehicles_and_frees_them(
     await until_state(service, other, S.FINISHED)
 
 
+@pytest.mark.slow
 async def test_a_stop_that_is_not_acknowledged_is_an_alarm(service: MissionService) -> None:
     mission = await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(service, mission.id, "a")
@@ -259,6 +260,7 @@ async def test_a_stop_that_is_not_acknowledged_is_an_alarm(service: MissionServi
         await rover.poll()
 
 
+@pytest.mark.slow
 async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service: MissionService) -> None:
     """The end of the flight and an operator's abort at the same time lead to one end, not to both."""
     mission = await service.create(make_spec(steps=1, vehicles=[{"name": "a", "kind": "rest"}]))
@@ -279,6 +281,7 @@ async def test_an_abort_while_the_last_stops_go_out_is_refused_or_stays(service:
     assert states == ["ready", "running", expected]
 
 
+@pytest.mark.slow
 async def test_a_service_that_is_shut_down_while_a_mission_ends_writes_the_end_first(
     harbour: Harbour, database: Database
 ) -> None:
@@ -356,6 +359,7 @@ async def test_a_planner_that_proposes_nowhere_makes_vehicles_hold(bad_planners:
 # Vehicles
 
 
+@pytest.mark.slow
 async def test_vehicles_join_and_leave_while_a_mission_runs(service: MissionService, database: Database) -> None:
     mission_id = await started(service, sim_spec("a", steps=500, side_m=40.0))
     await until_step(service, mission_id, 1)
@@ -409,6 +413,7 @@ async def test_a_draft_becomes_ready_with_its_first_vehicle_and_back(service: Mi
     assert live.header.state is S.DRAFT
 
 
+@pytest.mark.slow
 async def test_a_straggler_does_not_stall_the_others(service: MissionService, database: Database) -> None:
     mission = await service.create(
         sim_spec(
@@ -689,6 +694,7 @@ async def test_a_position_on_the_other_side_of_the_earth_harms_nobody(service: M
 # Recovery
 
 
+@pytest.mark.slow
 async def test_a_restart_goes_on_after_the_last_step(harbour: Harbour, database: Database) -> None:
     mission_id = await started(harbour.service, sim_spec(steps=8))
     for step in (1, 3, 5):
@@ -763,6 +769,7 @@ async def test_a_loop_cancelled_at_any_write_goes_on_without_repeating_a_step(
     assert await step_numbers(database, mission_id) == [1, 2, 3, 4]
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_only_polls_after_a_restart_is_remembered(harbour: Harbour, database: Database) -> None:
     mission = await harbour.service.create(make_spec(steps=10, vehicles=[{"name": "a", "kind": "rest"}]))
     rover = Rover(harbour.service, mission.id, "a")

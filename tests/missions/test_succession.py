@@ -67,6 +67,7 @@ async def test_a_mission_that_another_one_follows_is_not_deleted(service: Missio
     assert await service.rows() == []
 
 
+@pytest.mark.slow
 async def test_a_mission_begins_when_the_one_before_it_was_flown_to_its_end(service: MissionService) -> None:
     west, east = await two_blocks(service)
     assert (await view_of(service, east)).after == west
@@ -77,6 +78,7 @@ async def test_a_mission_begins_when_the_one_before_it_was_flown_to_its_end(serv
     assert await alarms(service, east) == []
 
 
+@pytest.mark.slow
 async def test_simulated_vehicles_go_on_from_where_the_mission_before_left_them(service: MissionService) -> None:
     west, east = await two_blocks(service, "one", "two")
     await act(service, west, "start")
@@ -97,6 +99,7 @@ async def test_simulated_vehicles_go_on_from_where_the_mission_before_left_them(
     await until_state(service, east, S.FINISHED)
 
 
+@pytest.mark.slow
 async def test_three_missions_are_flown_in_their_order_also_across_a_restart(harbour: Harbour) -> None:
     west, east = await two_blocks(harbour.service)
     third = (await harbour.service.create(sim_spec(name="North", area=rectangle(0, 60, 30, 90), after=east))).id
@@ -135,6 +138,7 @@ async def test_a_mission_that_failed_is_followed_by_nothing(service: MissionServ
     assert await state_of(service, east) is S.READY
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_was_stopped_on_the_way_keeps_the_next_mission_from_beginning_by_itself(
     service: MissionService,
 ) -> None:
@@ -150,6 +154,7 @@ async def test_a_vehicle_that_was_stopped_on_the_way_keeps_the_next_mission_from
     await until_alarms(service, east, (AlarmKind.NOT_BEGUN, False))
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_went_home_on_the_way_keeps_the_next_mission_from_beginning_by_itself(
     service: MissionService,
 ) -> None:
@@ -217,6 +222,7 @@ async def test_legs_that_were_missed_before_a_restart_keep_the_next_mission_from
     await until_alarms(service, east, (AlarmKind.NOT_BEGUN, True))
 
 
+@pytest.mark.slow
 async def test_vehicles_that_come_home_at_the_end_go_on_from_there(service: MissionService) -> None:
     home = {"point": [-8.705, 41.185], "radius_m": 50}
     west, east = await two_blocks(service, recovery=home)
@@ -346,6 +352,7 @@ async def test_the_way_in_takes_nothing_of_a_missions_length(service: MissionSer
     assert 25.0 < member.committed_m < 40.0, "as much as was asked for, and a last leg"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [{"steps": 3}, {"budget": {"minutes": 0.5}}])
 async def test_a_restart_while_everybody_goes_home_changes_nothing_of_how_a_mission_ended(
     harbour: Harbour, length: dict[str, Any]

@@ -228,6 +228,7 @@ async def test_ping_raises_when_the_database_cannot_be_reached(tmp_path: Path) -
         await asyncio.to_thread(worker.join)
 
 
+@pytest.mark.slow
 async def test_a_transaction_cancelled_at_any_moment_leaves_no_connection_open(database: Database) -> None:
     async def work() -> None:
         async with database.reading() as session:
@@ -304,6 +305,7 @@ async def test_pings_that_overlap_are_answered(database: Database) -> None:
     assert await asyncio.gather(*(failures() for _ in range(8))) == [[]] * 8
 
 
+@pytest.mark.slow
 async def test_a_server_that_was_cut_off_is_reached_again_by_new_connections(
     databases: Databases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,6 +333,7 @@ async def test_a_server_that_was_cut_off_is_reached_again_by_new_connections(
             await database.close()
 
 
+@pytest.mark.slow
 async def test_closing_ends_a_ping_under_way(databases: Databases) -> None:
     async with cable_to(databases.fresh("postgresql")) as (cable, url):
         database = Database(url)

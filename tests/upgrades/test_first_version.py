@@ -147,6 +147,7 @@ async def test_every_row_is_there_after_the_upgrade_and_after_the_way_back(
     assert await contents(url, tables) == before
 
 
+@pytest.mark.slow
 async def test_this_version_knows_its_missions_and_flies_on(left: str) -> None:
     tables = await tables_of(left)
     before = await contents(left, tables)

@@ -33,6 +33,7 @@ async def entries(client: httpx.AsyncClient, headers: dict[str, str], **choice: 
     return listed
 
 
+@pytest.mark.slow
 async def test_every_command_is_written_down_before_it_is_answered(
     make_settings: Callable[..., Settings], tokens: dict[str, dict[str, str]]
 ) -> None:

@@ -100,6 +100,7 @@ async def test_guessing_tokens_ends_soon_and_disturbs_nobody_who_has_one(
             await websockets.connect(url, additional_headers={"Authorization": "Bearer bf_guess"})
 
 
+@pytest.mark.slow
 async def test_a_right_token_is_never_refused_for_wrong_ones_from_its_address(
     make_settings: Callable[..., Settings],
 ) -> None:

@@ -317,6 +317,7 @@ async def test_a_large_batch_of_good_measurements_is_taken_as_a_small_one(servic
     assert again == answer | {"replayed": True}
 
 
+@pytest.mark.slow
 async def test_a_file_that_stops_arriving_or_has_no_end_is_given_up(make_settings: Callable[..., Settings]) -> None:
     async with running(make_settings(slow_client_s=1, max_import_bytes=5000)) as server, make_client(server) as client:
         mission = (await client.post("/missions", json=mission_spec())).json()["id"]

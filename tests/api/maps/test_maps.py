@@ -125,6 +125,7 @@ FILES = {
 }
 
 
+@pytest.mark.slow
 async def test_every_file_is_downloaded_under_its_name(client: httpx.AsyncClient, measured: str) -> None:
     shown = (await client.get(f"{measured}/map")).json()
     for name, (media, begin) in FILES.items():
@@ -166,6 +167,7 @@ async def test_a_file_that_the_disk_has_no_room_for_is_refused_whole(
     assert "No space left on device" in answer.json()["detail"]
 
 
+@pytest.mark.slow
 async def test_the_list_of_files_is_complete_and_every_path_answers(client: httpx.AsyncClient, measured: str) -> None:
     listed = {entry["href"].rpartition("/")[2]: entry for entry in (await client.get(f"{measured}/products")).json()}
     assert set(FILES) | {"map.overlay.png", "map.s102", "soundings.geojson"} == set(listed)

@@ -185,6 +185,7 @@ def check_number(source: str, shown: str, value: float, language: Language) -> N
     assert float(text) == pytest.approx(value, abs=0.5 * 10**-decimals + 1e-9), (shown, value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("survey", [swath_survey, single_beam_survey])
 async def test_every_number_is_that_of_rest(client: httpx.AsyncClient, survey: Callable[..., Any]) -> None:
     path = await survey(client)
@@ -243,6 +244,7 @@ async def test_a_swath_survey_lists_holidays_crosslines_and_corrections(client: 
     assert page.tags["img"] == 6
 
 
+@pytest.mark.slow
 async def test_what_beams_met_is_not_told_as_known_to_an_accuracy(client: httpx.AsyncClient) -> None:
     told = {}
     for survey in (swath_survey, single_beam_survey):
@@ -299,6 +301,7 @@ async def test_reports_are_among_the_files(client: httpx.AsyncClient) -> None:
         assert wrong.json()["errors"][0]["field"] == "lang"
 
 
+@pytest.mark.slow
 async def test_reports_of_large_maps_end_with_their_client_and_tell_when_they_are_broken_off(
     server: Server, client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -88,6 +88,7 @@ def pit() -> Any:
     return within[:, None] & within[None, :]
 
 
+@pytest.mark.slow
 async def test_a_dredged_pit_is_found_and_nothing_else(client: httpx.AsyncClient) -> None:
     site = await new_site(client)
     first = await surveyed(client, site, START_S, seed=1)
@@ -146,6 +147,7 @@ async def test_a_dredged_pit_is_found_and_nothing_else(client: httpx.AsyncClient
     assert same["gained"] == lost, "the other way round it is filled"
 
 
+@pytest.mark.slow
 async def test_files_hold_what_the_answers_say(client: httpx.AsyncClient) -> None:
     site = await new_site(client, yearly_change_m=0.1)
     await surveyed(client, site, START_S, north_to_m=12.0)
@@ -222,6 +224,7 @@ async def test_a_mission_counts_once_and_as_it_is_corrected_later(client: httpx.
     assert [one["soundings"] for one in listed] == [CELLS**2 - 1]
 
 
+@pytest.mark.slow
 async def test_surveys_below_another_datum_are_not_mixed(client: httpx.AsyncClient) -> None:
     site = await new_site(client)
     first = await surveyed(client, site, START_S)
@@ -302,6 +305,7 @@ async def test_a_mission_has_to_be_of_a_site_that_is_there(
     assert (await get(client, f"/sites/{site}"))["missions"] == 0
 
 
+@pytest.mark.slow
 async def test_changes_of_missions_that_are_not_there_are_refused_by_name(client: httpx.AsyncClient) -> None:
     site = await new_site(client)
     first = await surveyed(client, site, START_S, seed=1)
@@ -342,6 +346,7 @@ async def test_who_may_look_may_not_change(guarded: Guarded) -> None:
     assert (await client.get("/sites")).status_code == 401
 
 
+@pytest.mark.slow
 async def test_two_processes_tell_the_same_of_a_site(make_settings: Callable[..., Settings]) -> None:
     settings = make_settings()
     async with (

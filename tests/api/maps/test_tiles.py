@@ -115,6 +115,7 @@ async def test_before_the_first_sounding_everything_is_transparent(
     assert (await client.get("/missions/none/tiles/depth/0/0/0.png")).status_code == httpx.codes.NOT_FOUND
 
 
+@pytest.mark.slow
 async def test_soundings_of_a_running_mission_show_within_seconds(client: httpx.AsyncClient) -> None:
     answer = await client.post("/missions", json=mission_spec(vehicles=[{"name": "rover", "kind": "rest"}], steps=5))
     path = f"/missions/{answer.json()['id']}"

@@ -29,6 +29,7 @@ def xyz(lines: int) -> bytes:
     return b"".join(b"%.2f %.2f %.2f\n" % (5 + i % 400 * 0.1, 5 + i // 400 * 0.05, 6.0) for i in range(lines))
 
 
+@pytest.mark.slow
 async def test_a_file_and_a_batch_reach_the_process_that_has_the_mission(
     two: tuple[Server, Server], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -101,6 +101,7 @@ async def test_an_idempotency_key_without_effect_is_refused(client: httpx.AsyncC
     assert answer.json()["replayed"]
 
 
+@pytest.mark.slow
 def test_the_document_tells_that_every_operation_may_refuse_parameters() -> None:
     paths = create_app(Settings(database_url="sqlite+aiosqlite:///:memory:")).openapi()["paths"]
     assert all("422" in operation["responses"] for methods in paths.values() for operation in methods.values())

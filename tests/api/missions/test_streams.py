@@ -109,6 +109,7 @@ def live_url(server: Server, mission_id: str, query: str = "") -> str:
     return f"{server.url.replace('http', 'ws', 1)}/api/v1/missions/{mission_id}/live{query}"
 
 
+@pytest.mark.slow
 async def test_the_socket_sends_a_snapshot_then_what_changes(
     server: Server, client: httpx.AsyncClient, mission: dict[str, Any]
 ) -> None:

@@ -33,6 +33,7 @@ async def cell(tmp_path: Path) -> bytes:
     return await asyncio.to_thread(made.write, tmp_path / "cell.000")
 
 
+@pytest.mark.slow
 async def test_a_mission_begins_with_a_chart_s_depths(
     client: httpx.AsyncClient, mission: dict[str, Any], cell: bytes
 ) -> None:
@@ -46,6 +47,7 @@ async def test_a_mission_begins_with_a_chart_s_depths(
     assert again.status_code == 200
 
 
+@pytest.mark.slow
 async def test_zones_are_proposed_and_nothing_changes(
     client: httpx.AsyncClient, mission: dict[str, Any], cell: bytes
 ) -> None:

@@ -24,6 +24,7 @@ from tests.support.paths import PROJECT
 GRID: dict[str, Any] = {"crs": "EPSG:4326", "sd_m": 0.3, "positive": "down"}
 
 
+@pytest.mark.slow
 async def test_no_file_brings_another_one_back(
     make_settings: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -54,6 +55,7 @@ async def test_no_file_brings_another_one_back(
     assert not told("".join(capfd.readouterr()))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "aarch64"), reason="no list of system calls for it")
 async def test_a_filter_that_forbids_to_lock_the_reader_in_is_told_from_a_kernel_that_cannot(tmp_path: Path) -> None:
     filtered = [sys.executable, str(PROJECT / "tests" / "support" / "faults" / "forbidding.py")]
@@ -65,6 +67,7 @@ async def test_a_filter_that_forbids_to_lock_the_reader_in_is_told_from_a_kernel
         assert "SystemCallFilter=" in answer.json()["remedy"]
 
 
+@pytest.mark.slow
 async def test_what_a_file_says_is_not_quoted(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:
     path = f"/missions/{mission['id']}/imports"
     for name, content in {

@@ -68,6 +68,7 @@ async def mission_below(client: httpx.AsyncClient, datum_epsg: int | None) -> st
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("product", "filename"), [("map.tif", "t.tif"), ("map.nc", "t.nc"), ("map.bag", "t.bag"), ("map.s102", "t.h5")]
 )
@@ -98,6 +99,7 @@ async def test_a_file_below_another_datum_is_taken_only_with_the_offset(
     assert not any(note.startswith("vertical datum") for note in same.json()["notes"])
 
 
+@pytest.mark.slow
 async def test_where_only_one_of_file_and_mission_states_a_datum_answer_and_log_say_so(
     client: httpx.AsyncClient,
 ) -> None:
@@ -117,6 +119,7 @@ async def test_where_only_one_of_file_and_mission_states_a_datum_answer_and_log_
         assert [one for one in events if one["level"] == "warning" and "vertical datum: " in one["message"]]
 
 
+@pytest.mark.slow
 async def test_an_import_that_is_off_from_what_was_sounded_says_by_how_much(
     client: httpx.AsyncClient, path: str
 ) -> None:
@@ -168,6 +171,7 @@ async def test_the_same_file_counts_once_however_often_it_is_sent(client: httpx.
     assert "with other options" in otherwise.json()["detail"]
 
 
+@pytest.mark.slow
 async def test_an_import_survives_a_restart(make_settings: Any) -> None:
     path = ""
     first: dict[str, Any] = {}
@@ -183,6 +187,7 @@ async def test_an_import_survives_a_restart(make_settings: Any) -> None:
             assert quality == first
 
 
+@pytest.mark.slow
 async def test_a_mission_begins_with_the_soundings_of_multibeam_files(
     client: httpx.AsyncClient, path: str, tmp_path: Path
 ) -> None:
@@ -236,6 +241,7 @@ async def test_a_wrong_file_is_refused_by_what_is_wrong_and_nothing_is_stored(
     assert (await client.get(f"{path}/map")).status_code == 404
 
 
+@pytest.mark.slow
 async def test_a_bomb_and_a_grid_of_a_million_millions_of_cells_are_refused(
     client: httpx.AsyncClient, path: str
 ) -> None:
@@ -256,6 +262,7 @@ async def test_a_file_that_is_too_large_is_refused(make_settings: Any) -> None:
         assert (await send(client, path, prior_text(20))).status_code == 201
 
 
+@pytest.mark.slow
 async def test_a_reference_grid_tells_how_far_the_map_is_off(client: httpx.AsyncClient, path: str) -> None:
     await send(client, path, prior_text(300))
     assert (await client.get(f"{path}/reference")).status_code == 404

@@ -160,6 +160,7 @@ async def test_an_idempotency_key_stores_once_and_repeats_the_answer(
     assert (await client.get(f"/missions/{mission['id']}")).json()["progress"]["soundings"] == 5
 
 
+@pytest.mark.slow
 async def test_a_long_poll_is_answered_by_the_start_of_the_mission(
     client: httpx.AsyncClient, mission: dict[str, Any]
 ) -> None:

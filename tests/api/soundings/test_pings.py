@@ -189,6 +189,7 @@ async def test_pings_are_there_after_a_restart(settings: Settings) -> None:
         assert [(part["pings"], part["number"] is None) for part in parts] == [(10, False), (2, True)]
 
 
+@pytest.mark.slow
 async def test_what_came_after_a_backup_is_still_in_the_database_that_a_restore_moved_aside(
     make_settings: Callable[..., Settings], databases: Databases, tmp_path: Path
 ) -> None:

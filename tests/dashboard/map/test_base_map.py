@@ -13,7 +13,7 @@ from tests.support.dashboard.pmtiles import plain_tile, tile_at, write_pmtiles
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 CHART = (214, 160, 40)
 """No colour of the page's own."""

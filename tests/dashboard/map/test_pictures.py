@@ -13,7 +13,7 @@ from tests.support.dashboard.browser import FONT
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 PICTURES = Path(__file__).with_name("pictures")
 WIDTH = 360

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, Route, expect
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(600)]
 
 
 ENDLESS_DECISIONS = """

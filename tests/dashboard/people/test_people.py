@@ -14,7 +14,7 @@ from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, need_axe, show, violations
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 LINE = "41.18505, -8.70490; 41.18545, -8.70440"
 

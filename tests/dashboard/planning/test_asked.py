@@ -9,7 +9,7 @@ from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, show
 from tests.support.paths import PROJECT
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 TABLE = PROJECT / "app" / "dashboard" / "web" / "src" / "state" / "form" / "missionFields.ts"
 

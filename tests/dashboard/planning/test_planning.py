@@ -11,7 +11,7 @@ from tests.support.dashboard.browser import PATIENCE_MS, Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, expect_state, picture, show, start, violations
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 FORECAST_MS = 240_000
 

@@ -10,7 +10,7 @@ from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, drag, show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 
 def test_the_page_loads_without_complaints_and_asks_nobody_else(watched: Watched, service: Service) -> None:

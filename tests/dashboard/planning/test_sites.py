@@ -8,7 +8,7 @@ from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id
 from tests.support.missions.specs import rectangle
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 AREA = rectangle(0, 0, 50, 50)
 

@@ -11,7 +11,7 @@ from tests.support.dashboard.steps import by_id, colours_in_the_middle, picture,
 from tests.support.mapping.tracks import DEPTH_M, flown, lawnmower, measured, pinged
 from tests.support.missions.specs import rectangle
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 START_S = 1_795_225_140.0
 

@@ -12,7 +12,7 @@ from tests.support.dashboard.steps import by_id, picture, show, violations
 from tests.support.mapping.drifting import SIDE_M, drift_of, pinged_while_drifting, ways
 from tests.support.missions.specs import rectangle
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 
 @pytest.fixture

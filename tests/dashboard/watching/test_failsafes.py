@@ -34,7 +34,7 @@ from tests.support.missions.ais import nmea, position
 from tests.support.missions.specs import LAT, LON, lon_lat, rectangle
 from tests.support.ports import free_ports
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 SPEED = 20.0
 SIDE_M = 400.0

@@ -14,7 +14,7 @@ from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, show, start
 from tests.support.missions.specs import AREA
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(600)]
 
 SCREENS = {"wide": (1600, 1000), "tablet": (1024, 768), "upright": (768, 1024), "phone": (390, 844)}
 PAIR = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]

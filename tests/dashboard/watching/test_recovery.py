@@ -10,7 +10,7 @@ from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, show
 from tests.support.missions.specs import lon_lat, rectangle
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 PAIR = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]
 NEAR, FAR = [-8.7046, 41.1849], [-8.7046, 41.1800]

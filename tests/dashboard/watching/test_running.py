@@ -10,7 +10,7 @@ from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, colours_in_the_middle, expect_colours, expect_state, show, start
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 PATIENCE_S = 90.0
 

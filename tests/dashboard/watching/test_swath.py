@@ -11,7 +11,7 @@ from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, colours_in_the_middle, expect_state, picture, show, start
 from tests.support.missions.specs import lon_lat, rectangle
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 SIDE_M, CELL_M = 60, 2
 

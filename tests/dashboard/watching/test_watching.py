@@ -13,7 +13,7 @@ from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 PAIR = [{"name": name, "kind": "sim", "sensor": "dvl"} for name in ("north", "south")]
 AREA = {

@@ -73,6 +73,7 @@ def offsets(found: AdjustedTracks) -> FloatArray:
     return np.asarray(found.offset_m[own] - time_s[:, None] / time_s.max() * OFF_M)
 
 
+@pytest.mark.slow
 def test_hills_tell_how_a_vehicle_drifted() -> None:
     found = adjusted(*swaths(hills))
     assert found.by_ties
@@ -82,6 +83,7 @@ def test_hills_tell_how_a_vehicle_drifted() -> None:
     assert found.sd_m.max() < 0.3 * found.before_sd_m.max()
 
 
+@pytest.mark.slow
 def test_furrows_tell_nothing_along_themselves() -> None:
     found = adjusted(*swaths(furrows))
     off = offsets(found)
@@ -136,6 +138,7 @@ def test_a_deviation_that_is_none_is_refused_by_name(name: str) -> None:
         adjusted(soundings, fixes, offset_sd_m=np.nan)
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(
     off=st.tuples(st.floats(-20, 20), st.floats(-20, 20)),
@@ -172,6 +175,7 @@ def test_thinned_soundings_are_means_without_spikes() -> None:
     assert 0.0 < found.sd_m[0] < 0.05
 
 
+@pytest.mark.slow
 def test_deviations_hold_whatever_vehicles_drift_by() -> None:
     """Positions that drift less or more than usual are nearly always within 1.96 deviations."""
     within = [share_within(times_usual) for times_usual in (0.5, 1.0, 1.7)]
@@ -179,6 +183,7 @@ def test_deviations_hold_whatever_vehicles_drift_by() -> None:
     assert np.mean(within) <= 0.98
 
 
+@pytest.mark.slow
 def test_deviations_hold_on_long_lines_whose_heading_is_wrong() -> None:
     """What bends each line by metres and is gone at its end is not seen by fixes at both ends."""
     assert share_within(0.25, heading_sd_rad=0.01) >= 0.9
@@ -226,6 +231,7 @@ def share_within(times_usual: float, heading_sd_rad: float = 0.0) -> float:
     return float(np.mean(within))
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(scale=st.floats(-0.005, 0.005), heading_rad=st.floats(-0.03, 0.03), course_rad=st.floats(-3.1, 3.1))
 def test_a_wrong_heading_or_scale_seen_by_fixes_is_taken_out_of_the_whole_dive(

@@ -12,6 +12,7 @@ from simulator.floors.seafloors import generate
 FLOOR = generate("rugged", 8, width_m=60.0, height_m=60.0)
 
 
+@pytest.mark.slow
 def test_a_rugged_floor_is_mapped_better_after_the_adjustment() -> None:
     found = AdjustJob(DriftScenario(FLOOR, 6.0, seed=2)).run(lambda step: None)
     assert orjson.loads(orjson.dumps(found)) == found

@@ -31,6 +31,7 @@ def report_of(runs: list[Any], section: ReportSection, seeds: tuple[int, ...] = 
     return Report(dict(runs), [section], ["here"], [], seeds, 500, {"command": "`this`"}, {})
 
 
+@pytest.mark.slow
 def test_one_command_makes_report_pictures_and_results_and_an_interrupted_one_goes_on(tmp_path: Path) -> None:
     folder = tmp_path / "floors"
     folder.mkdir()

@@ -63,6 +63,7 @@ def test_same_seed_same_run(smooth: Terrain, planner: str, tries: int) -> None:
     assert first.real_tries == 8 * tries
 
 
+@pytest.mark.slow
 def test_planners_stand_in_the_expected_order(smooth: Terrain) -> None:
     left = {
         "random": run(smooth, "random").remaining_pct,
@@ -72,6 +73,7 @@ def test_planners_stand_in_the_expected_order(smooth: Terrain) -> None:
     assert left["cao"] < left["osarses"] < left["random"]
 
 
+@pytest.mark.slow
 def test_the_first_term_alone_is_a_deadlock_that_the_other_terms_resolve(smooth: Terrain) -> None:
     left = {terms: run(smooth, "osarses", tries=5, objective=terms).remaining_pct for terms in ("J", "J+J1+J2", "full")}
     assert left["J"] > 80.0
@@ -79,6 +81,7 @@ def test_the_first_term_alone_is_a_deadlock_that_the_other_terms_resolve(smooth:
     assert left["J+J1+J2"] < left["J"] - 10.0
 
 
+@pytest.mark.slow
 def test_polynomial_cao_learns_from_contributions_and_beats_chance(smooth: Terrain) -> None:
     by_vehicle, of_team, random = (
         run(smooth, "cao", steps=200, regressors="polynomial", contribution="vehicle").remaining_pct,
@@ -102,6 +105,7 @@ def test_a_lost_vehicle_does_not_stall_the_others(smooth: Terrain, planner: str)
     assert result.history[-1] < result.history[10]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["lawnmower", "rollout"])
 @pytest.mark.parametrize(
     "happens",
@@ -135,6 +139,7 @@ def test_what_is_claimed_of_done_landmarks_holds_beside_walls_too() -> None:
     assert run_explore(blind, "random", PlannerOptions()).done_nees is None
 
 
+@pytest.mark.slow
 def test_rollouts_finish_before_the_lawnmower_on_average() -> None:
     """Single runs differ by a tenth and more by chance."""
     floors = [generate("smooth", seed, width_m=80.0, height_m=60.0) for seed in (2, 4, 6)]

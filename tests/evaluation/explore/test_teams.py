@@ -41,6 +41,7 @@ def test_the_planner_is_given_only_what_was_transmitted(smooth: Terrain) -> None
     np.testing.assert_array_equal(np.isfinite(whole.depth_m), team.landmarks.seen)
 
 
+@pytest.mark.slow
 def test_small_messages_cost_something_and_even_one_entry_is_of_use(smooth: Terrain) -> None:
     """While the bulk is being done, on average: single runs of cao differ by as much as messages cost, or more."""
     free, ten, one = (

@@ -31,6 +31,7 @@ def workers() -> Iterator[Any]:
         yield cluster
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # a dying worker leaves sockets behind
 def test_a_worker_killed_in_training_costs_nothing(workers: Any, tmp_path: Path) -> None:
     cluster = Cluster(workers.scheduler_address)
@@ -52,6 +53,7 @@ def test_a_worker_killed_in_training_costs_nothing(workers: Any, tmp_path: Path)
     np.testing.assert_array_equal(optimiser.best, reference.best)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_evaluations_on_a_cluster_are_those_made_here(workers: Any) -> None:
     jobs = [

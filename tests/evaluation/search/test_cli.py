@@ -18,6 +18,7 @@ def rescue(*arguments: str) -> dict[str, Any]:
     return orjson.loads(result.stdout)
 
 
+@pytest.mark.slow
 def test_the_default_planner_sees_the_goal_area_and_is_back_in_time() -> None:
     run = rescue("--scenario", "harbour", "--rc", "12", "--window", "400")
     assert run["goal_area_pct"] > 90.0
@@ -26,6 +27,7 @@ def test_the_default_planner_sees_the_goal_area_and_is_back_in_time() -> None:
     assert (run["collisions"], run["too_close"], run["trapped"]) == (0, 0, False)
 
 
+@pytest.mark.slow
 def test_three_robots_see_more_than_one() -> None:
     one, three = (rescue("--scenario", "1", "--window", "90", "--robots", n) for n in ("1", "3"))
     assert three["map_pct"] > 1.5 * one["map_pct"]
@@ -33,6 +35,7 @@ def test_three_robots_see_more_than_one() -> None:
     assert three["collisions"] == 0
 
 
+@pytest.mark.slow
 def test_planners_are_compared_under_either_clock() -> None:
     compared = rescue("--planner", "cao,random", "--seeds", "0:2", "--window", "90", "--clock", "steps")
     assert len(compared["runs"]) == 4

@@ -25,6 +25,7 @@ def scenario() -> SurveyScenario:
     return SurveyScenario(generate("smooth", 3, width_m=60.0, height_m=60.0), vehicles=2, steps=30, seed=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["cao", "lawnmower", "random"])
 def test_everybody_flies_for_the_same_minutes(scenario: SurveyScenario, planner: str) -> None:
     track = fly_planner_at_sea(scenario, planner, QUICK, MINUTES)
@@ -39,6 +40,7 @@ def test_everybody_flies_for_the_same_minutes(scenario: SurveyScenario, planner:
     assert (places.east_m < 60.0 + margin_m).all()
 
 
+@pytest.mark.slow
 def test_the_same_seed_flies_the_same_survey(scenario: SurveyScenario) -> None:
     first, again = (fly_planner_at_sea(scenario, "cao", QUICK, 1.0) for _ in range(2))
     np.testing.assert_array_equal(first.soundings.depth_m, again.soundings.depth_m)
@@ -60,6 +62,7 @@ def test_minutes_in_which_no_pattern_can_be_finished_are_compared_all_the_same(s
     assert judge(scenario, track.soundings, track.flown_m, yardstick=True).samples == 0
 
 
+@pytest.mark.slow
 def test_the_command_tells_minutes_and_metres(tmp_path: Path) -> None:
     floor = tmp_path / "floor.npz"
     save_npz(generate("smooth", 5, width_m=40.0, height_m=40.0), floor)

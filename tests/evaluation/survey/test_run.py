@@ -47,6 +47,7 @@ def test_a_sounder_does_not_begin_anew_with_each_leg(legs: Any) -> None:
     assert found == pytest.approx(0.26 * np.arange(1, len(found) + 1), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Terrain) -> None:
     scenario = SurveyScenario(harbour, steps=6, seed=3)
     first, second = (fly_planner(scenario, "cao", QUICK) for _ in range(2))
@@ -56,6 +57,7 @@ def test_a_run_is_reproducible_and_obeys_its_constraints(harbour: Terrain) -> No
         assert scenario.constraints.feasible(before, after[None])[0]
 
 
+@pytest.mark.slow
 def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Terrain) -> None:
     run = run_survey(SurveyScenario(harbour, steps=8, seed=0), "cao", QUICK)
     relief = float(np.std(harbour.z_m))
@@ -69,6 +71,7 @@ def test_a_survey_run_reports_the_planner_beside_its_yardsticks(harbour: Terrain
     assert run.recorded_track is None
 
 
+@pytest.mark.slow
 def test_baselines_travel_as_far_and_sound_as_often(harbour: Terrain) -> None:
     scenario = SurveyScenario(harbour)
     pair = lawnmower_baselines(harbour, scenario.constraints, scenario.starts_m, 300.0, 4000, scenario.grid)
@@ -91,6 +94,7 @@ def test_a_flown_lawnmower_finishes_its_lines_within_the_distance_that_it_is_giv
     assert np.abs(deviation).mean() < 1.5
 
 
+@pytest.mark.slow
 def test_floors_with_holes_are_surveyed_also_when_the_first_place_gives_no_echo() -> None:
     floor = generate("reef", 1, width_m=40.0, height_m=40.0)
     holes = floor.z_m.copy()
@@ -114,6 +118,7 @@ def test_even_lines_are_whole_and_fit_into_the_distance() -> None:
         np.testing.assert_allclose(np.hypot(*lines.T), 99.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_default_planner_beats_the_lawnmower_where_detail_is_concentrated() -> None:
     ratios = []
     for seed in (1, 2):

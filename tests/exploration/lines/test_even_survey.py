@@ -100,6 +100,7 @@ def fullest(left_m: FloatArray, radius_m: float, *, along: bool) -> list[EvenSur
     return fullest_surveys(sweep, vehicles, [Turns(radius_m, 0.0)] * len(left_m), Pattern(parts=8))
 
 
+@pytest.mark.slow
 @given(left_m=st.lists(st.floats(900.0, 4000.0), min_size=1, max_size=3), radius_m=st.floats(0.0, 6.0))
 @settings(max_examples=10, deadline=None)
 def test_where_lines_end_makes_up_for_what_a_whole_line_would_cost(left_m: list[float], radius_m: float) -> None:

@@ -37,6 +37,7 @@ def test_lines_across_keep_to_their_vehicles_strip_and_to_what_it_can_fly() -> N
     assert (np.abs(legs[:, 0]) > 20.0).sum() >= 3, "several lines lie across"
 
 
+@pytest.mark.slow
 @given(radius_m=st.floats(0.5, 12.0), budget_m=st.floats(1200.0, 6000.0))
 @settings(max_examples=30, deadline=None)
 def test_no_more_lines_are_begun_than_a_vehicle_has_way_for_with_its_turns(radius_m: float, budget_m: float) -> None:
@@ -47,6 +48,7 @@ def test_no_more_lines_are_begun_than_a_vehicle_has_way_for_with_its_turns(radiu
         assert 2 <= len(route) <= len(without)
 
 
+@pytest.mark.slow
 @given(radius_m=st.floats(0.5, 12.0), budget_m=st.floats(1200.0, 6000.0))
 @settings(max_examples=8, deadline=None)
 def test_nobody_is_dealt_more_than_it_has_way_for_with_its_turns(radius_m: float, budget_m: float) -> None:

@@ -90,12 +90,14 @@ def test_a_visitor_goes_over_the_landmark_and_down(depth: float) -> None:
     assert at[2] == pytest.approx(0.85 if np.isnan(depth) else depth - HEIGHT * UNIT)
 
 
+@pytest.mark.slow
 def test_a_team_over_sand_waves_leaves_next_to_nothing() -> None:
     scenario = ExploreScenario(unseen_floor("dunes", 2), landmarks=500, seed=2)
     run = run_explore(scenario, "pcao", PlannerOptions())
     assert run.remaining_pct <= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "seed"), [("dunes", 6), ("moraine", 6)])
 def test_a_linked_team_climbs_over_what_bars_one_of_it_or_parts_it(family: str, seed: int) -> None:
     run = run_explore(ExploreScenario(unseen_floor(family, seed), seed=seed), "pcao", PlannerOptions())

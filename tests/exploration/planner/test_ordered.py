@@ -41,6 +41,7 @@ def fly(planner: OrderedPlanner, situation: Situation, legs: int) -> list[np.nda
     return places
 
 
+@pytest.mark.slow
 @given(goal=st.tuples(st.floats(1.0, 99.0), st.floats(1.0, 99.0)), after=st.integers(0, 12))
 @settings(max_examples=8)
 def test_a_vehicle_gets_where_it_is_ordered_round_zones_and_inside_the_area(
@@ -287,6 +288,7 @@ def test_a_line_that_is_left_goes_on_where_it_was_left(name: str) -> None:
     assert way.buffer(1.0).covers(left)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lawnmower", "cao"])
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=6, deadline=None)

@@ -17,6 +17,7 @@ def wall_across_the_goal_area() -> ObstacleWorld:
     return ObstacleWorld("wall", solid, np.zeros_like(solid), 1.0, entry, np.array([70.0, 45.0]), entry)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robots", [1, 2])
 def test_what_lies_behind_a_long_way_round_is_looked_at_before_the_rest_of_the_site(robots: int) -> None:
     scenario = RescueScenario(wall_across_the_goal_area(), 20.0, 420.0, robots, scanner=Scanner(8.0, 1.0))

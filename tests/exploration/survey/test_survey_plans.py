@@ -133,6 +133,7 @@ def test_vertices_close_together_are_flown_in_one_leg() -> None:
     assert (x, y, first) == (0.0, 8.0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["cao", "lawnmower"])
 def test_vehicles_do_not_linger_at_the_corners_of_a_keep_out_zone(planner: Any) -> None:
     zone = np.array([[40.0, 30.0], [70.0, 30.0], [70.0, 60.0], [40.0, 60.0]])
@@ -168,6 +169,7 @@ def test_searching_never_worsens_a_plan_and_says_truly_what_it_is_worth() -> Non
         assert ((route >= 0.5 - 1e-9) & (route <= 99.5 + 1e-9)).all()
 
 
+@pytest.mark.slow
 def test_what_improves_plans_is_compiled_before_a_mission_needs_it() -> None:
     warm_up()
     compiled = set(improve.signatures)
@@ -237,6 +239,7 @@ def test_every_vehicle_flies_the_metres_that_it_has_left_and_no_more() -> None:
     assert (left < 25.0).all()
 
 
+@pytest.mark.slow
 def test_ground_that_gave_no_echo_is_not_flown_over_again() -> None:
     floor = generate("reef", 1)
     hole = floor.z_m.copy()

@@ -30,6 +30,7 @@ def slope(width_m: int, height_m: int, shoal_m: float, deep_m: float, towards_ra
     return Terrain(shoal_m + (deep_m - shoal_m) * (at - at.min()) / np.ptp(at), 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width_m", "height_m", "deep_m", "towards_rad", "vehicles"),
     [(160, 200, 35.0, 2.2, 1), (200, 160, 35.0, 0.7, 2), (140, 110, 8.0, 0.0, 1)],

@@ -99,6 +99,7 @@ def test_memory_of_earlier_versions_is_read() -> None:
     assert again.next_leg("a", pose, FLYING, sea.coverage(), {"a": pose}, 20.0) is not None
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(st.integers(60, 110), st.integers(60, 110), st.integers(1, 4), st.floats(6.0, 30.0), st.floats(-0.1, 0.1))
 def test_everything_is_seen(rows: int, cols: int, vehicles: int, depth_m: float, rise: float) -> None:
@@ -109,18 +110,21 @@ def test_everything_is_seen(rows: int, cols: int, vehicles: int, depth_m: float,
     assert (np.array(ends) < [cols + 2.0, rows + 2.0]).all()
 
 
+@pytest.mark.slow
 def test_one_vehicle_flies_hardly_more_than_the_lines() -> None:
     sea = Sea(np.full((180, 300), 20.0))
     flown, _ = sweep(sea, 1)
     assert flown < 1.3 * (3 * 300 + 2 * 60 + 30)
 
 
+@pytest.mark.slow
 def test_a_survey_that_is_taken_up_goes_on_the_same() -> None:
     depth = np.maximum(9.0 + 4.0 * np.sin(np.arange(150) / 20.0)[None] + np.zeros((100, 1)), 4.0)
     whole, parts = sweep(Sea(depth), 2), sweep(Sea(depth), 2, interrupted=True)
     assert np.allclose(whole[1], parts[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refused", [0.1, 0.5])
 def test_what_was_refused_is_flown_later(refused: float) -> None:
     depth = np.maximum(12.0 - 0.05 * np.arange(120)[None] + np.zeros((100, 1)), 4.0)
@@ -218,6 +222,7 @@ def test_ground_is_not_given_up_while_its_last_line_is_under_way() -> None:
     assert sea.seen.all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vehicles", [1, 2])
 def test_ground_that_cannot_be_seen_is_given_up(vehicles: int) -> None:
     sea = Sea(np.full((80, 160), 9.0))
@@ -508,6 +513,7 @@ def test_a_damaged_memory_is_refused() -> None:
         planner.restore(b"nonsense")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("skips", [True, False])
 def test_what_is_left_out_of_a_line_is_not_seen_and_all_else_is(skips: bool) -> None:
     sea = Sea(np.full((120, 200), 8.0))

@@ -171,6 +171,7 @@ def test_a_report_by_sound_that_holds_no_position_counts_for_nothing() -> None:
     assert path.take_report(state) is not None
 
 
+@pytest.mark.slow
 async def test_legs_go_on_by_sound_where_radio_does_not_reach() -> None:
     async with open_sea(radio_range_m=RADIO_M, bridge={"unknown_bottom_depth_m": 3.0}) as sea:
         modem = Modem(sea)

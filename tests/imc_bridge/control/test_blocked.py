@@ -19,6 +19,7 @@ def plan_state(sea: Sea, name: str) -> str | None:
     return next(node.plan_state for node in sea.bridge.nodes() if node.name == name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guidance", [Guidance.FOLLOW, Guidance.LEGS])
 async def test_a_late_vehicle_state_is_nobodys_abort(guidance: Guidance) -> None:
     async with open_sea() as sea:

@@ -10,6 +10,7 @@ from tests.support.waiting import until
 RANGE_M = 5000.0
 
 
+@pytest.mark.slow
 async def test_waypoints_are_reached_though_every_dive_breaks_the_link() -> None:
     async with open_sea(radio_range_m=RANGE_M) as sea:
         (name,) = await sea.ready()
@@ -39,6 +40,7 @@ async def test_console_that_announces_no_place_is_out_of_range_for_good() -> Non
         await until(lambda: any("another port" in node.reason for node in sea.bridge.nodes()), "it stays mute")
 
 
+@pytest.mark.slow
 async def test_vehicle_that_stays_away_longer_than_it_can_is_lost() -> None:
     async with open_sea(radio_range_m=RANGE_M) as sea:
         (name,) = await sea.ready()

@@ -72,6 +72,7 @@ def test_a_leg_at_the_surface_has_nowhere_to_float_up_from() -> None:
     assert list(found) == ["there", "surface"]
 
 
+@pytest.mark.slow
 async def test_legs_are_flown_out_of_radio_contact_and_reported_when_heard_again() -> None:
     async with open_sea(radio_range_m=RADIO_M, **DEEP) as sea:
         [name] = await sea.ready()
@@ -101,6 +102,7 @@ async def test_a_stop_under_water_is_said_to_be_unheard_and_carried_out_when_it_
         await until(lambda: sea.state(name) is NodeState.READY, "it is back and without a plan")
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_never_comes_back_is_released_with_where_to_look() -> None:
     async with open_sea(radio_range_m=RADIO_M, **DEEP) as sea:
         [name] = await sea.ready()
@@ -115,6 +117,7 @@ async def test_a_vehicle_that_never_comes_back_is_released_with_where_to_look() 
         assert sea.state(name) is NodeState.LOST
 
 
+@pytest.mark.slow
 async def test_no_leg_goes_deeper_than_the_bottom_allows() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()
@@ -139,6 +142,7 @@ async def test_a_leg_that_another_console_ends_is_told_and_left_alone() -> None:
         assert sea.bridge.intervention(name)
 
 
+@pytest.mark.slow
 async def test_how_a_vehicle_is_led_can_be_changed_between_engagements() -> None:
     async with open_sea() as sea:
         [name] = await sea.ready()

@@ -20,6 +20,7 @@ def circle(sea: Sea, step: int, east_m: float, north_m: float) -> dict[str, floa
     return {"circle_lat_deg": lat, "circle_lon_deg": lon}
 
 
+@pytest.mark.slow
 async def test_legs_of_10_m_are_reached_at_their_depth_without_a_loss_or_a_refusal() -> None:
     async with open_sea(radio_range_m=RADIO_M, speed=SPEED, bridge=REAL_TIME, family="flat") as sea:
         [name] = await sea.ready()
@@ -47,6 +48,7 @@ async def test_legs_of_10_m_are_reached_at_their_depth_without_a_loss_or_a_refus
         assert not any("not at its depth" in reason for reason in reasons)
 
 
+@pytest.mark.slow
 async def test_a_leg_without_room_to_descend_says_that_its_depth_was_not_reached() -> None:
     async with open_sea(radio_range_m=RADIO_M, speed=SPEED, bridge=REAL_TIME, family="flat") as sea:
         [name] = await sea.ready()
@@ -58,6 +60,7 @@ async def test_a_leg_without_room_to_descend_says_that_its_depth_was_not_reached
         assert "too short" in reason
 
 
+@pytest.mark.slow
 async def test_an_order_to_a_vehicle_that_is_under_water_waits_until_it_is_heard() -> None:
     async with open_sea(radio_range_m=RADIO_M, speed=SPEED, bridge=REAL_TIME, family="flat") as sea:
         [name] = await sea.ready()

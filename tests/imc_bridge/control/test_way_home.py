@@ -144,6 +144,7 @@ async def test_a_silent_vehicle_is_not_waited_for_and_gets_it_when_it_is_heard_a
         await until(lambda: on_board(sea) is not None and said(sea).startswith("kept"), "it has it")
 
 
+@pytest.mark.slow
 async def test_when_the_console_dies_the_vehicle_goes_home_and_the_next_one_takes_it_over() -> None:
     async with open_sea(family="flat", lost_comms_s=TIMEOUT_S) as sea:
         (name,) = await sea.ready()
@@ -183,6 +184,7 @@ async def test_a_vehicle_on_its_way_home_can_be_stopped() -> None:
         assert dune(sea).plan.plan_state is PlanState.READY
 
 
+@pytest.mark.slow
 async def test_a_stopped_vehicle_stays_where_it_is_until_it_is_engaged_again() -> None:
     async with open_sea(family="flat", lost_comms_s=TIMEOUT_S) as sea:
         (name,) = await sea.ready()
@@ -198,6 +200,7 @@ async def test_a_stopped_vehicle_stays_where_it_is_until_it_is_engaged_again() -
         await until(lambda: on_board(sea) is not None and said(sea).startswith("kept"), "it is armed again")
 
 
+@pytest.mark.slow
 async def test_a_restart_on_board_and_a_closing_bridge_leave_it_armed() -> None:
     async with open_sea(family="flat", lost_comms_s=TIMEOUT_S) as sea:
         (name,) = await sea.ready()

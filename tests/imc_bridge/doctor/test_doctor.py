@@ -220,6 +220,7 @@ async def test_our_own_id_in_use_elsewhere(harbour: tuple[Bridge, Peer]) -> None
     assert "'ccu-other'" in judge(bridge, 1.0).text()
 
 
+@pytest.mark.slow
 async def test_clock_that_is_off_by_hours() -> None:
     async with open_sea(speed=1.0, clock_offset_s=3 * 3600.0, boot_s=0.1, bridge={"position": (41.18, -8.7)}) as sea:
         await sea.ready()

@@ -274,6 +274,7 @@ def test_the_newest_sample_says_how_deep_a_vehicle_is() -> None:
     assert data.bottoms[0].depth_m == pytest.approx(12.0), "not half a metre off"
 
 
+@pytest.mark.slow
 def test_of_more_samples_than_are_taken_the_oldest_are_left_out() -> None:
     samples = [[20, 20, 2.0, 12.0]] * 50_000 + [[20, 21, 2.0, 12.0]]
     data = step(of([2.0], [12.0], [(20, 20)], samples), 1)

@@ -45,6 +45,7 @@ def test_a_place_has_its_zone(lat: float, lon: float, epsg: int) -> None:
     assert utm_epsg(lat, lon) == epsg
 
 
+@pytest.mark.slow
 @given(
     lat=st.floats(-79.0, 83.0),
     lon=st.floats(-180.0, 180.0),

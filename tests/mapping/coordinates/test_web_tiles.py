@@ -14,6 +14,7 @@ from app.mapping.types import Grid
 TO_DEGREES = pyproj.Transformer.from_crs("EPSG:3857", "EPSG:4326", always_xy=True)
 
 
+@pytest.mark.slow
 @given(
     lat=st.floats(-75.0, 80.0),
     lon=st.floats(-179.0, 179.0),

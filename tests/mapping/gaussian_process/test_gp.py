@@ -121,6 +121,7 @@ def test_a_constant_sea_floor_is_reproduced(depth: float, seed: int, n: int) -> 
     np.testing.assert_allclose(result.depth_m, depth, atol=1e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(east=st.floats(-1e5, 1e5), north=st.floats(-1e5, 1e5), depth=st.floats(-5, 200))
 def test_the_origin_and_the_datum_do_not_matter(east: float, north: float, depth: float) -> None:
@@ -132,6 +133,7 @@ def test_the_origin_and_the_datum_do_not_matter(east: float, north: float, depth
     np.testing.assert_allclose(there.sd_m, here.sd_m, atol=2e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 1000))
 def test_the_order_of_soundings_does_not_matter(seed: int) -> None:
@@ -204,6 +206,7 @@ def test_rough_corner_is_mapped_better_than_by_a_stationary_process() -> None:
     assert rmse[True] < 0.97 * rmse[False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "at_most"),
     [
@@ -267,6 +270,7 @@ def test_what_was_learned_makes_the_same_map_without_the_soundings_it_was_learne
     np.testing.assert_array_equal(again.claim_sd_m, expected.claim_sd_m)
 
 
+@pytest.mark.slow
 def test_many_soundings_of_one_cell_count_as_one_and_the_map_stays_as_good() -> None:
     rng = np.random.default_rng(1)
     east, north = rng.uniform(0, 20, (2, 40_000))
@@ -330,12 +334,14 @@ def test_bad_soundings_are_named(field: str, value: float, message: str) -> None
         GaussianProcessMap().fit(s)
 
 
+@pytest.mark.slow
 def test_warm_up_leaves_nothing_to_compile() -> None:
     # A process of its own: the tests before this one have compiled everything.
     found = subprocess.run([sys.executable, "-c", COMPILED], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_a_relief_below_the_noise_is_mapped_as_well_as_its_soundings_allow() -> None:
     def floor(east: FloatArray, north: FloatArray) -> FloatArray:
         return 50.0 + 0.1 * np.sin(east / 9.0) * np.cos(north / 11.0) + 0.08 * np.sin((east + north) / 15.0)

@@ -57,6 +57,7 @@ def test_beside_a_single_track_nothing_is_surrounded() -> None:
     assert support(levels(s), 2.0, 20.0).at(np.array([[15.0, 30.0]]))[0] == pytest.approx(0.0)
 
 
+@pytest.mark.slow
 def test_a_smooth_kernel_serves_between_the_lines_and_is_not_believed_beyond_them() -> None:
     s, grid = lines(), Grid(0.0, 0.0, 1.0, 100, 100)
     smooth = GaussianProcessMap("gaussian").fit(s).predict(grid)
@@ -77,6 +78,7 @@ def test_a_smooth_kernel_serves_between_the_lines_and_is_not_believed_beyond_the
     )
 
 
+@pytest.mark.slow
 def test_deviations_beyond_the_soundings_are_as_large_as_the_errors_there() -> None:
     """On rough hills of many sizes, 5 to 25 m beyond half a survey."""
     rng = np.random.default_rng(1)

@@ -27,6 +27,7 @@ from tests.support.missions.specs import make_spec
 from tests.support.waiting import until
 
 
+@pytest.mark.slow
 async def test_a_stop_that_is_not_acknowledged_is_taken_by_somebody_and_stays_so(harbour: Harbour) -> None:
     service = harbour.service
     mission = await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))
@@ -205,6 +206,7 @@ async def _silent(harbour: Harbour, spec: MissionSpec, alarm: str) -> str:
     return mission
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restarts", [False, True])
 async def test_a_vehicle_that_comes_back_while_nobody_flies_is_lost_no_longer(harbour: Harbour, restarts: bool) -> None:
     mission = await _silent(harbour, sim_spec("a", "b", steps=1000, side_m=80.0), "link_lost")
@@ -226,6 +228,7 @@ async def test_a_vehicle_that_comes_back_while_nobody_flies_is_lost_no_longer(ha
     assert (alarms.count(AlarmKind.LINK_LOST), alarms.count(AlarmKind.VEHICLE_LOST)) == (1, 1), "each was raised once"
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_is_not_heard_after_a_restart_is_still_lost(harbour: Harbour) -> None:
     vehicles = [{"name": "a", "kind": "rest"}, {"name": "b", "kind": "sim"}]
     mission = (await harbour.service.create(sim_spec(steps=1000, side_m=80.0, vehicles=vehicles))).id

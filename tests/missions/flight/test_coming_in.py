@@ -13,6 +13,7 @@ from tests.support.missions.specs import lon_lat, rectangle
 pytestmark = pytest.mark.usefixtures("simulated_time")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "beside", [((62.4, 46.7), (65.1, 47.5)), ((62.5, 48.5), (64.2, 50.2)), ((55.6, 51.2), (60.7, 51.8))]
 )

@@ -19,6 +19,7 @@ from tests.support.waiting import until
 pytestmark = pytest.mark.usefixtures("simulated_time")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["held", "taken out", "taken out in a pause for another"])
 async def test_who_leaves_its_line_and_comes_back_flies_all_of_it(
     harbour_closed: Harbour, database: Database, how: str

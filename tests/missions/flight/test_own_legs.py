@@ -74,6 +74,7 @@ class Flown:
         monkeypatch.setattr(SimFleetLink, "start", listening)
 
 
+@pytest.mark.slow
 async def test_no_vehicle_waits_for_a_decision_that_takes_long(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -98,6 +99,7 @@ async def test_no_vehicle_waits_for_a_decision_that_takes_long(
         assert (ahead >= 1).all(), ahead
 
 
+@pytest.mark.slow
 async def test_a_mission_ends_only_when_nothing_is_left_after_all_was_flown(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -127,6 +129,7 @@ async def test_a_mission_ends_only_when_nothing_is_left_after_all_was_flown(
     assert looked[-1]
 
 
+@pytest.mark.slow
 async def test_everybody_flies_its_own_legs_and_a_step_is_begun_once(
     service: MissionService, database: Database
 ) -> None:
@@ -162,6 +165,7 @@ async def test_a_vehicle_that_does_not_move_keeps_nobody(service: MissionService
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_misses_a_leg_is_waited_for_until_it_has_missed_three(service: MissionService) -> None:
     vehicles = [{"name": "a", "kind": "sim"}, {"name": "stuck", "kind": "rest"}]
     mission = await service.create(sim_spec(steps=4, step_deadline_s=20, vehicles=vehicles, **APART))
@@ -172,6 +176,7 @@ async def test_a_vehicle_that_misses_a_leg_is_waited_for_until_it_has_missed_thr
     assert (await service.get(mission.id)).team.named("stuck").misses == NOT_WAITED_FOR == 3
 
 
+@pytest.mark.slow
 async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionService, database: Database) -> None:
     limits = {"max_step_m": 8.0, "min_separation_m": 6.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
     frame, vehicles = LocalFrame(LAT, LON), []
@@ -188,6 +193,7 @@ async def test_vehicles_that_meet_are_kept_apart_on_the_way(service: MissionServ
     assert any("its next leg passes" in message for message in told)
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_comes_back_while_its_leg_is_written_gets_numbers_of_its_own(
     service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -213,6 +219,7 @@ async def test_a_vehicle_that_comes_back_while_its_leg_is_written_gets_numbers_o
     assert max(row.step for row in rows if row.vehicle == "a") == 15
 
 
+@pytest.mark.slow
 async def test_who_comes_back_flies_as_many_legs_as_the_others_have_left_not_as_many_as_are_undecided(
     service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,6 +241,7 @@ async def test_who_comes_back_flies_as_many_legs_as_the_others_have_left_not_as_
     assert len([row for row in rows if row.vehicle == "a" and row.step > flown]) == 15 - flown > 1
 
 
+@pytest.mark.slow
 async def test_vehicles_that_fall_silent_while_legs_are_exchanged_are_waited_for(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -297,6 +305,7 @@ async def test_after_a_pause_no_leg_is_left_out_as_after_a_restart(
     await act(service, mission, "abort")
 
 
+@pytest.mark.slow
 async def test_what_was_flown_is_the_same_after_the_service_started_again(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -321,6 +330,7 @@ async def test_what_was_flown_is_the_same_after_the_service_started_again(
     assert (await service.get(mission)).team.named("a").flown.remember() == before
 
 
+@pytest.mark.slow
 async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed: Harbour) -> None:
     service = await harbour_closed.open(time_scale=15.0)
     vehicles = [{"name": "fast", "kind": "sim", "speed_mps": 2.0}, {"name": "slow", "kind": "sim", "speed_mps": 0.8}]
@@ -338,6 +348,7 @@ async def test_a_fast_vehicle_flies_more_legs_in_the_same_minutes(harbour_closed
     assert view.efficiency_pct > 50.0
 
 
+@pytest.mark.slow
 async def test_who_has_flown_everything_circles_inside_the_area(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -30,6 +30,7 @@ def shoals() -> Terrain:
     return Terrain(depth_m, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["lawnmower", "cao"])
 async def test_a_survey_goes_round_shoals_and_maps_the_ground_between_them(
     planner: str, service: MissionService, monkeypatch: pytest.MonkeyPatch

@@ -37,6 +37,7 @@ def lines(**changes: Any) -> MissionSpec:
     return sim_spec(**({"steps": 8, "planner": {"name": "lawnmower"}} | changes))
 
 
+@pytest.mark.slow
 async def test_a_forecast_is_near_what_comes_and_says_what_it_assumes(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -223,6 +224,7 @@ def level(depth_m: float) -> Floor:
     return Floor(Terrain(np.full((30, 30), depth_m), 2.0, name="level"), "level", "level", 0.0)
 
 
+@pytest.mark.slow
 def test_a_forecast_on_the_way_goes_on_from_what_was_sounded() -> None:
     spec = lines()
     members = team_of(spec)

@@ -7,6 +7,7 @@ from benchmarks.planning.survey_teams import Run, TeamSurvey, figures, flown, ra
 SMALL = TeamSurvey(vehicles=2, side_m=80.0, minutes=5.0, cell_m=4.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["cao", "lawnmower"])
 def test_planners_are_judged_after_they_have_flown_nearly_all_of_their_way_and_had_a_map(planner: str) -> None:
     floor = SMALL.floor("smooth", 2)

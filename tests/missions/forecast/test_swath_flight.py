@@ -45,6 +45,7 @@ def flown(spec: MissionSpec, floor: Floor, prior: np.ndarray = NONE, budget_s: f
     return fly_over(floor, spec, members, starts_of(spec, members)[0], SoFar(prior=prior), budget_s)
 
 
+@pytest.mark.slow
 async def test_a_forecast_flies_a_survey_with_swath_sonars_and_tells_what_all_of_it_takes(
     service: MissionService,
 ) -> None:
@@ -63,6 +64,7 @@ async def test_a_forecast_flies_a_survey_with_swath_sonars_and_tells_what_all_of
     assert by_one_beam.whole_survey is None
 
 
+@pytest.mark.slow
 def test_deeper_water_takes_fewer_metres_and_a_short_budget_leaves_ground_unseen() -> None:
     shoal, deep = (flown(beams(), level(depth_m, 60.0)) for depth_m in (7.0, 16.0))
     assert shoal.coverage_pct > 97.0
@@ -80,6 +82,7 @@ def test_deeper_water_takes_fewer_metres_and_a_short_budget_leaves_ground_unseen
         assert short.whole.distances_m[name] >= way_m
 
 
+@pytest.mark.slow
 def test_vehicles_that_begin_beside_each_other_use_up_no_way_while_one_lets_the_other_pass() -> None:
     spec = beams(100.0, "abc", cell_m=1.0, limits={"max_step_m": 25.0}, budget={"minutes": 8})
     found = flown(spec, level(5.0, 100.0))

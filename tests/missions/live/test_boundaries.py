@@ -131,6 +131,7 @@ async def test_the_checklist_warns_of_a_margin_that_waiting_vehicles_overstep(
         assert checks["waiting"].status is CheckStatus.WARNING
 
 
+@pytest.mark.slow
 async def test_a_vehicle_reported_in_a_zone_is_an_alarm_of_its_mission(service: MissionService) -> None:
     spec = make_spec(100, steps=50, vehicles=[{"name": "a", "kind": "rest"}], keep_out=[rectangle(40, 40, 60, 60)])
     mission = (await service.create(spec)).id

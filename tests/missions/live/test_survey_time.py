@@ -173,6 +173,7 @@ async def test_who_comes_back_has_used_its_time(under_way: Made) -> None:
     assert again.way_left_m(vehicle.live.spec) == left_m < WHOLE_M - 100.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("simulated_time")
 async def test_vehicles_that_wait_for_each_other_all_the_time_survey_for_their_minutes(service: MissionService) -> None:
     limits = {"max_step_m": 8.0, "min_separation_m": 5.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
@@ -265,6 +266,7 @@ async def test_while_the_service_was_down_nobody_was_idle(under_way: Made) -> No
     assert vehicle.member.flown.idle_s == 7.0
 
 
+@pytest.mark.slow
 async def test_of_a_mission_that_ended_phase_and_battery_are_told_after_a_restart(harbour_closed: Harbour) -> None:
     service = await harbour_closed.open(time_scale=20.0)
     spec = sim_spec("a", side_m=40.0, budget={"minutes": 5}, recovery={"point": lon_lat(5.0, 5.0)})

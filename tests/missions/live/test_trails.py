@@ -63,6 +63,7 @@ def test_points_of_a_log_lie_where_the_clock_puts_them() -> None:
     assert in_order(np.zeros((0, 4)), log)[:, 1].tolist() == [0, 3, 4, 6]
 
 
+@pytest.mark.slow
 async def test_a_position_that_is_corrected_is_no_way_that_was_flown_also_after_a_restart(harbour: Harbour) -> None:
     service = await harbour.reopen(time_scale=1.0)
     mission = await service.create(sim_spec(vehicles=[{"name": "a", "kind": "rest"}]))
@@ -77,6 +78,7 @@ async def test_a_position_that_is_corrected_is_no_way_that_was_flown_also_after_
         service = await harbour.reopen(time_scale=1.0)
 
 
+@pytest.mark.slow
 async def test_a_way_across_180_degrees_is_as_long_as_any_other(harbour: Harbour) -> None:
     service = await harbour.reopen(time_scale=1.0)
     west = 179.9995

@@ -8,6 +8,7 @@ from simulator.floors.seafloors import generate
 SHORT = Survey(vehicles=2, steps=40, max_step_m=10.0, cell_m=2.0, spacing_m=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "planner"), [("smooth", "lawnmower"), ("reef", "cao")])
 def test_no_more_is_claimed_than_the_end_and_the_true_sea_floor_confirm(family: str, planner: str) -> None:
     found = claims_of(generate(family, 1, width_m=60.0, height_m=60.0), SHORT, planner)

@@ -28,6 +28,7 @@ async def begun(service: MissionService) -> tuple[LiveMission, Rover]:
     return live, rover
 
 
+@pytest.mark.slow
 async def test_who_is_held_is_told_when_it_asks_and_gets_a_new_leg_when_it_is_sent_on(service: MissionService) -> None:
     live, rover = await begun(service)
     await until(lambda: live.team.members["asks"].ordered, "its second leg waits for it")
@@ -45,6 +46,7 @@ async def test_who_is_held_is_told_when_it_asks_and_gets_a_new_leg_when_it_is_se
     await act(service, live.id, "abort")
 
 
+@pytest.mark.slow
 async def test_nobody_acknowledges_a_waypoint_that_it_was_never_given(service: MissionService) -> None:
     live, _ = await begun(service)
     member = live.team.members["asks"]
@@ -60,6 +62,7 @@ async def test_nobody_acknowledges_a_waypoint_that_it_was_never_given(service: M
         await waypoint(live, "asks", after_step=1000)
 
 
+@pytest.mark.slow
 async def test_a_leg_that_is_over_is_not_handed_out_again(service: MissionService) -> None:
     mission = await service.create(sim_spec(steps=1, vehicles=[*VEHICLES, {"name": "b", "kind": "rest"}]))
     live, rover = await service.get(mission.id), Rover(service, mission.id, "asks")
@@ -73,6 +76,7 @@ async def test_a_leg_that_is_over_is_not_handed_out_again(service: MissionServic
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_who_is_home_is_told_so_and_acknowledges_it(service: MissionService) -> None:
     spec = sim_spec(steps=1000, vehicles=VEHICLES, recovery={"point": lon_lat(15.0, 4.0)})
     mission = await service.create(spec)

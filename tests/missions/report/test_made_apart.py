@@ -55,6 +55,7 @@ def whole(made: Any) -> Any:
     return (made.filename, made.media_type, made.content.whole()) if isinstance(made, Product) else made
 
 
+@pytest.mark.slow
 async def test_they_are_what_they_would_be_here(
     harbour: Harbour, live: LiveMission, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -76,6 +77,7 @@ async def test_they_are_what_they_would_be_here(
         assert same.pop(), kind
 
 
+@pytest.mark.slow
 async def test_one_that_everybody_left_makes_room_for_the_next(harbour: Harbour, live: LiveMission) -> None:
     children = new_children()
     first, second = (asyncio.create_task(reported(harbour, live)) for _ in range(2))

@@ -63,6 +63,7 @@ def text_of(content: bytes) -> str:
     return "".join(document[number].get_textpage().get_text_bounded() for number in range(len(document)))
 
 
+@pytest.mark.slow
 async def test_what_there_is_no_room_for_is_counted(harbour: Harbour, live: LiveMission) -> None:
     answers = await harbour.service.reports.answers(live)
     place = {"number": 1, "area_m2": 9.0, "lat_deg": 41.0, "lon_deg": -8.0}
@@ -117,6 +118,7 @@ async def test_letters_of_other_languages_stay_and_marks_that_turn_the_writing_a
         assert "\u202e" not in text
 
 
+@pytest.mark.slow
 async def test_a_report_is_made_once_for_all_who_ask_and_is_the_same_for_the_same_answers(
     harbour: Harbour, live: LiveMission
 ) -> None:
@@ -146,6 +148,7 @@ async def test_a_report_is_the_same_after_a_restart(
     assert (await service.reports.report(again, options)).content.whole() == before
 
 
+@pytest.mark.slow
 async def test_a_mission_under_way_has_a_report_of_what_is_known(harbour: Harbour) -> None:
     mission = await harbour.service.create(sim_spec("a", steps=40))
     live = await harbour.service.get(mission.id)

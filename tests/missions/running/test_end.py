@@ -29,6 +29,7 @@ def nobody_follows(service: MissionService) -> bool:
     return not service._runs and all(info.state is not LinkState.ENGAGED for info, _ in service.hub.vehicles())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", [Action.FINISH, Action.ABORT])
 async def test_a_paused_mission_is_not_brought_home_by_a_service_that_ends(harbour: Harbour, action: Action) -> None:
     service = harbour.service

@@ -54,6 +54,7 @@ async def phase_of(service: MissionService, mission: MissionView, name: str) -> 
     return next(v.phase for v in (await view_of(service, mission.id)).vehicles if v.name == name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", [INSIDE, OUTSIDE])
 async def test_at_the_end_of_a_mission_everybody_goes_home(service: MissionService, point: tuple[float, float]) -> None:
     mission = await service.create(recovered("a", "b", point=point, steps=3))
@@ -76,6 +77,7 @@ def unlike(**changes: Any) -> MissionSpec:
     return recovered(point=lon_lat(50.0, -20.0), **(shape | changes))
 
 
+@pytest.mark.slow
 async def test_who_has_flown_its_way_goes_home_while_others_survey(service: MissionService) -> None:
     mission = await service.create(unlike())
     await act(service, mission.id, "start")
@@ -89,6 +91,7 @@ async def test_who_has_flown_its_way_goes_home_while_others_survey(service: Miss
     assert told == ["fast goes home: it has flown its way", "slow goes home: everybody has flown its way"]
 
 
+@pytest.mark.slow
 async def test_who_is_to_stop_in_the_end_waits_for_the_others(service: MissionService) -> None:
     mission = await service.create(unlike(recovery={"on_finish": "stop"}))
     await act(service, mission.id, "start")
@@ -98,6 +101,7 @@ async def test_who_is_to_stop_in_the_end_waits_for_the_others(service: MissionSe
     assert not [words for words in await words_of(service, mission, "recovery") if "goes home" in words]
 
 
+@pytest.mark.slow
 async def test_who_is_lost_keeps_no_mission_open_whose_others_are_home(service: MissionService) -> None:
     mission = await service.create(unlike(step_deadline_s=30.0))
     await act(service, mission.id, "start")
@@ -186,6 +190,7 @@ async def test_without_a_recovery_point_nobody_can_be_asked_to_return(service: M
     assert (await act(service, mission.id, "finish")).mission.state is MissionState.FINISHED
 
 
+@pytest.mark.slow
 async def test_a_vehicle_goes_home_for_a_battery_and_comes_back(service: MissionService) -> None:
     mission = await service.create(recovered("a", "b", point=OUTSIDE, steps=1000))
     await act(service, mission.id, "start")
@@ -248,6 +253,7 @@ async def test_what_a_vehicle_is_at_is_known_when_its_clock_has_jumped(service: 
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_is_held_waits_until_it_is_sent_on(service: MissionService) -> None:
     starts = {"a": lon_lat(35.0, 60.0), "b": lon_lat(85.0, 60.0)}
     vehicles = [{"name": name, "kind": "sim", "start": start} for name, start in starts.items()]
@@ -338,6 +344,7 @@ async def test_who_waited_before_the_mission_was_stopped_waits_in_circles_after_
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_vehicles_that_fly_in_steps_of_the_whole_team_come_home_too(service: MissionService) -> None:
     spec = recovered("a", "b", point=OUTSIDE, steps=1000, limits={"max_step_m": 8.0, "com_range_m": 500.0})
     mission = await service.create(spec)
@@ -360,6 +367,7 @@ async def test_vehicles_that_fly_in_steps_of_the_whole_team_come_home_too(servic
     assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
 async def test_who_is_sent_on_while_nobody_else_surveys_goes_on(
     service: MissionService, limits: dict[str, Any]
@@ -384,6 +392,7 @@ async def test_who_is_sent_on_while_nobody_else_surveys_goes_on(
 WAITS: dict[str, Any] = {"recovery": {"wait_for_batteries": True}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
 async def test_a_mission_may_wait_until_its_only_vehicle_has_another_battery(
     harbour: Harbour, limits: dict[str, Any]
@@ -460,6 +469,7 @@ async def test_a_mission_that_is_ended_while_somebody_surveys_waits_for_no_batte
     assert await words_of(service, mission, "waiting") == []
 
 
+@pytest.mark.slow
 async def test_who_joins_while_everybody_goes_home_surveys_and_comes_home_too(service: MissionService) -> None:
     mission = await service.create(recovered("a", point=lon_lat(15.0, -300.0), steps=4))
     await act(service, mission.id, "start")
@@ -502,6 +512,7 @@ async def test_a_mission_waits_for_who_is_held_by_a_failsafe(service: MissionSer
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_simulated_vehicles_are_where_they_were_when_the_service_restarts(harbour: Harbour) -> None:
     service = harbour.service
     vehicles = [{"name": name, "kind": "sim", "endurance_min": 30.0} for name in ("a", "b")]
@@ -530,6 +541,7 @@ async def test_simulated_vehicles_are_where_they_were_when_the_service_restarts(
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_a_service_that_restarts_goes_on_bringing_everybody_home(harbour: Harbour) -> None:
     service = harbour.service
     mission = await service.create(recovered("a", "b", point=lon_lat(15.0, -300.0), steps=1000))
@@ -570,6 +582,7 @@ async def test_a_paused_mission_is_finished_at_home_too(service: MissionService)
     assert [vehicle.phase for vehicle in ended.vehicles] == [Phase.HOME]
 
 
+@pytest.mark.slow
 async def test_vehicles_turn_back_in_time(harbour_closed: Harbour) -> None:
     """Five minutes of energy: it is home long before its steps are done, with some of it left."""
     # Its reserve is a minute: a machine that is busy for a second may not use that up.
@@ -606,6 +619,7 @@ async def test_vehicles_are_called_home_though_no_line_can_be_written(service: M
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_the_way_home_keeps_clear_of_zones(service: MissionService) -> None:
     spec = recovered(
         point=lon_lat(10.0, 8.0),

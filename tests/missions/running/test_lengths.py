@@ -65,6 +65,7 @@ async def way_m(database: Database, mission_id: str) -> dict[str, float]:
         return (await mission_queries.committed_way(session, mission_id))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["lawnmower", "random", "cao"])
 async def test_a_longer_mission_flies_on_past_its_old_end(
     service: MissionService, database: Database, planner: str
@@ -86,6 +87,7 @@ async def test_a_longer_mission_flies_on_past_its_old_end(
         assert 160.0 < flown_m < 205.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["lawnmower", "random", "cao"])
 async def test_a_shorter_mission_ends_where_it_is_to_and_everybody_comes_home(
     service: MissionService, database: Database, planner: str
@@ -114,6 +116,7 @@ async def test_legs_ahead_beyond_the_new_end_are_taken_back(service: MissionServ
     assert [(row.status, row.begun) for row in given_up] == [(WaypointStatus.MISSED, False)] * len(given_up)
 
 
+@pytest.mark.slow
 async def test_minutes_may_become_fewer_or_more(service: MissionService) -> None:
     live = await started(service, survey(budget={"minutes": 4}))
     await until_flown_m(live, 30.0)
@@ -128,6 +131,7 @@ async def test_minutes_may_become_fewer_or_more(service: MissionService) -> None
         assert 100.0 < member.flown.survey_s < 135.0
 
 
+@pytest.mark.slow
 async def test_a_length_may_be_told_in_another_unit(service: MissionService, database: Database) -> None:
     live = await started(service, survey(budget={"minutes": 10}))
     await until_flown_m(live, 30.0)
@@ -141,6 +145,7 @@ async def test_a_length_may_be_told_in_another_unit(service: MissionService, dat
     assert ended.reason.startswith("every step is done")
 
 
+@pytest.mark.slow
 async def test_steps_become_more_and_fewer(service: MissionService) -> None:
     live = await started(service, survey(steps=5))
     await until_flown_m(live, 15.0)
@@ -157,6 +162,7 @@ async def test_steps_become_more_and_fewer(service: MissionService) -> None:
     assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
 
 
+@pytest.mark.slow
 async def test_a_team_that_goes_in_steps_gets_more_of_them(service: MissionService) -> None:
     together = {"limits": {"max_step_m": 5.0, "min_separation_m": 0.0, "com_range_m": 60.0}, "planner": {"name": "cao"}}
     live = await started(service, survey(steps=3, side_m=40.0, **together))
@@ -184,6 +190,7 @@ async def test_what_is_used_up_is_refused_and_nothing_changes(service: MissionSe
     assert not await lines_of(live), "it is as long as that already"
 
 
+@pytest.mark.slow
 async def test_who_is_home_is_named_and_sent_on(service: MissionService) -> None:
     vehicles = [{"name": n, "kind": "sim", "speed_mps": v} for n, v in {"fast": 2.0, "slow": 0.5}.items()]
     live = await started(service, survey(budget={"km_per_vehicle": 0.08}, vehicles=vehicles))
@@ -200,6 +207,7 @@ async def test_who_is_home_is_named_and_sent_on(service: MissionService) -> None
     assert {vehicle.phase for vehicle in ended.vehicles} == {Phase.HOME}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("again", [False, True])
 async def test_while_it_is_paused_it_changes_too_also_after_a_restart(
     harbour: Harbour, database: Database, *, again: bool
@@ -222,6 +230,7 @@ async def test_while_it_is_paused_it_changes_too_also_after_a_restart(
     assert 70.0 < flown_m < 100.0 + STEP_M
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("paused", [False, True])
 async def test_another_process_goes_on_with_the_new_length(
     harbour: Harbour, database: Database, *, paused: bool
@@ -291,6 +300,7 @@ async def test_a_mission_that_ends_or_has_ended_stays_as_long_as_it_is(service: 
         await change(service, live, minutes=20)
 
 
+@pytest.mark.slow
 async def test_before_the_start_it_is_simply_another_length(service: MissionService) -> None:
     mission = await service.create(survey(budget={"minutes": 10}))
     live = await service.get(mission.id)

@@ -64,6 +64,7 @@ async def test_a_mission_is_its_first_askers(two: tuple[Harbour, Harbour]) -> No
     assert await other.missions() == []
 
 
+@pytest.mark.slow
 async def test_running_missions_go_to_whoever_is_left(two: tuple[Harbour, Harbour]) -> None:
     one, other = [await harbour.open() for harbour in two]
     missions = [(await one.create(sim_spec(f"v{k}", steps=500))).id for k in range(3)]
@@ -244,6 +245,7 @@ async def test_a_database_that_goes_away_for_a_while_stops_the_vehicles_until_it
         await harbour.close()
 
 
+@pytest.mark.slow
 async def test_a_server_that_is_cut_off_without_a_word_stops_the_vehicles_in_time(
     make_settings: Callable[..., ServiceSettings], databases: Databases
 ) -> None:
@@ -265,6 +267,7 @@ async def test_a_server_that_is_cut_off_without_a_word_stops_the_vehicles_in_tim
         assert (await view_of(service, mission.id)).state is MissionState.RUNNING
 
 
+@pytest.mark.slow
 async def test_a_server_that_changes_places_with_its_standby_leaves_no_mission_without_anybody_who_flies_it(
     make_settings: Callable[..., ServiceSettings],
 ) -> None:
@@ -328,6 +331,7 @@ async def test_viewers_that_have_every_connection_do_not_hold_up_the_watch(
         await harbour.close()
 
 
+@pytest.mark.slow
 async def test_a_mission_that_cannot_be_read_for_a_while_does_not_hold_up_who_takes_it_up(
     make_settings: Callable[..., ServiceSettings], databases: Databases
 ) -> None:

@@ -81,6 +81,7 @@ def ends_at(legs: list[tuple[int, float, float, str]], east_m: float, north_m: f
     return [status for _, east, north, status in legs if np.hypot(east - east_m, north - north_m) < 0.5]
 
 
+@pytest.mark.slow
 async def test_a_vehicle_goes_where_it_is_sent_and_then_goes_on(service: MissionService, database: Database) -> None:
     zone = rectangle(30.0, 30.0, 50.0, 50.0)
     live = await flying(service, survey("a", "b", keep_out=[zone]))
@@ -109,6 +110,7 @@ async def test_a_vehicle_goes_where_it_is_sent_and_then_goes_on(service: Mission
     assert not [line for line in await events_after(live, 0, 1000) if line.kind == "boundary"]
 
 
+@pytest.mark.slow
 async def test_an_order_whose_legs_wait_for_another_vehicle_is_carried_out(
     service: MissionService, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -174,6 +176,7 @@ async def test_what_cannot_be_flown_is_refused_with_what_would_be_right(service:
         await vehicle_orders.skip_line(live, "a", "Ana")
 
 
+@pytest.mark.slow
 async def test_energy_that_does_not_last_for_the_way_home_refuses_the_order(service: MissionService) -> None:
     vehicles = [{"name": "a", "kind": "sim", "endurance_min": 9.0, "speed_mps": 1.0}]
     recovery = {"point": lon_lat(5.0, 5.0)}
@@ -186,6 +189,7 @@ async def test_energy_that_does_not_last_for_the_way_home_refuses_the_order(serv
     await act(service, live.id, "abort")
 
 
+@pytest.mark.slow
 async def test_a_line_is_left_out_flown_again_and_a_part_looked_at_closer(
     service: MissionService, database: Database
 ) -> None:
@@ -234,6 +238,7 @@ async def test_an_order_is_ended_by_resuming_the_vehicle_or_calling_it_home(serv
     assert (await orders_of(live))[0].state is OrderState.CANCELLED
 
 
+@pytest.mark.slow
 async def test_holding_everybody_is_a_pause(service: MissionService) -> None:
     live = await flying(service, survey("a", "b", steps=15), step=2)
     await hold(live, "a", "Ana")
@@ -256,6 +261,7 @@ async def test_holding_everybody_is_a_pause(service: MissionService) -> None:
     await until_state(service, live.id, MissionState.FINISHED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", ["accepted", "legs"])
 async def test_a_restart_neither_loses_nor_repeats_an_order(
     harbour: Harbour, database: Database, monkeypatch: pytest.MonkeyPatch, after: str
@@ -292,6 +298,7 @@ async def _never(*_: Any) -> None:
     await asyncio.Event().wait()
 
 
+@pytest.mark.slow
 async def test_legs_that_an_order_replaces_take_nothing_of_the_length(
     service: MissionService, database: Database
 ) -> None:
@@ -329,6 +336,7 @@ async def test_a_team_that_moves_as_one_takes_no_orders(service: MissionService)
     await act(service, live.id, "abort")
 
 
+@pytest.mark.slow
 async def test_lines_are_as_close_for_vehicles_that_joined_a_draft(service: MissionService) -> None:
     described, joined = survey("a", "b"), survey("a", "b").model_copy(update={"vehicles": []})
     mission = (await service.create(joined)).id

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from itertools import combinations, pairwise
 
 import numpy as np
+import pytest
 from shapely.geometry import LineString, Polygon
 
 from app.missions.flight.legs.next_moment import VERTICAL_SHARE
@@ -50,6 +51,7 @@ def block(sea: Sea, names: list[str], area: tuple[tuple[int, int], ...], **chang
     )
 
 
+@pytest.mark.slow
 async def test_vehicles_go_over_into_the_next_block_clear_of_zones_and_of_each_other(
     make_settings: Callable[..., ServiceSettings],
 ) -> None:

@@ -96,6 +96,7 @@ def by_the_cluster() -> float:
     return done("cluster")
 
 
+@pytest.mark.slow
 async def test_a_forecast_waits_for_a_cluster_that_hangs_no_longer_than_for_this_machine(
     service: MissionService, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,6 +122,7 @@ async def test_a_forecast_waits_for_a_cluster_that_hangs_no_longer_than_for_this
     await until(lambda: service.compute.elsewhere, "the cluster is there again")
 
 
+@pytest.mark.slow
 async def test_maps_forecasts_files_and_adjusted_tracks_are_those_made_here(
     service: MissionService, dask: DaskCluster, sent: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:

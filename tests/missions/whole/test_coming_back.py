@@ -44,6 +44,7 @@ class Deaf:
         self._bridge.transport.send = self._send
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_goes_on_with_our_plan_is_asked_until_it_hears() -> None:
     async with open_sea() as sea:
         (name,) = await sea.ready()
@@ -68,6 +69,7 @@ async def test_a_vehicle_that_goes_on_with_our_plan_is_asked_until_it_hears() ->
         await sea.reached(name, 1)
 
 
+@pytest.mark.slow
 async def test_a_mission_goes_on_by_itself_when_its_vehicle_hears_again(
     make_settings: Callable[..., ServiceSettings],
 ) -> None:

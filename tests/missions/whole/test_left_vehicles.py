@@ -28,6 +28,7 @@ async def whole(content: bytes) -> AsyncIterator[bytes]:
     yield content
 
 
+@pytest.mark.slow
 async def test_an_aborted_vehicle_stays_with_its_last_place_and_age_and_can_come_back(harbour: Harbour) -> None:
     service = harbour.service
     vehicles = [{"name": "a", "kind": "rest", "depth_m": 3.0}, {"name": "b", "kind": "rest"}]

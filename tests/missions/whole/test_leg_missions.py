@@ -23,6 +23,7 @@ from tests.support.waiting import until
 SPEED = 20.0
 
 
+@pytest.mark.slow
 async def test_a_mission_by_legs_finishes_without_contact_under_water_and_has_every_sounding_in_the_end(
     make_settings: Callable[..., ServiceSettings], tmp_path: Path
 ) -> None:

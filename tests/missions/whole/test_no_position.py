@@ -1,5 +1,7 @@
 """A vehicle whose navigation fails while it surveys: it is brought up, somebody is told, and it goes on when it can."""
 
+import pytest
+
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.settings import ImcSettings
 from simulator.dune import DuneFleet, DuneOptions, default_specs
@@ -12,6 +14,7 @@ from tests.support.waiting import until
 SPEED = 10.0
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_tells_no_position_comes_up_and_is_told_of_and_goes_on_with_its_mission(
     harbour_closed: Harbour,
 ) -> None:

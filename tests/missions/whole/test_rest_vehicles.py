@@ -20,6 +20,7 @@ SIDE_M = 50.0
 STEPS = 12
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 async def test_a_mission_of_two_polling_vehicles_from_create_to_geotiff(database_url: str) -> None:
     settings = Settings(port=0, database_url=database_url, imc=ImcSettings(enabled=False), time_scale=10)

@@ -2,6 +2,8 @@
 
 import math
 
+import pytest
+
 from app.estimation.occupancy import Cell
 from app.missions.live.mission import LiveMission
 from app.missions.operations.measurements import measure
@@ -77,6 +79,7 @@ def states_at(live: LiveMission, *places_m: tuple[float, float]) -> list[Cell]:
     return [Cell(states[int(north), int(east)]) for east, north in places_m]
 
 
+@pytest.mark.slow
 async def test_boats_that_see_each_other_at_the_entry_go_and_search(service: MissionService) -> None:
     live = await service.get((await service.create(two_boats())).id)
     boats = [SeeingBoat(live, "a", 12.5, 5.5), SeeingBoat(live, "b", 17.5, 5.5)]
@@ -115,6 +118,7 @@ async def test_a_boat_hides_what_is_behind_it_and_a_wall_beside_it_is_seen(harbo
     assert search_grid(live) == before
 
 
+@pytest.mark.slow
 async def test_a_late_scan_knows_where_the_others_were_when_it_was_taken(service: MissionService) -> None:
     live = await service.get((await service.create(two_boats())).id)
     a, b = SeeingBoat(live, "a", 12.5, 5.5), SeeingBoat(live, "b", 17.5, 5.5)

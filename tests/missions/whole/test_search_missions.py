@@ -42,6 +42,7 @@ def all_round(east: float, north: float, time_s: float, **changes: Any) -> Scan:
     return Scan.model_validate(values | {"bearing_step_deg": 2.0, "reach_m": 10.0, "ranges_m": nothing} | changes)
 
 
+@pytest.mark.slow
 async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_in_time(
     harbour: Harbour, service: MissionService
 ) -> None:
@@ -161,6 +162,7 @@ async def test_a_scan_that_was_refused_can_be_sent_again_as_it_should_be(harbour
     assert search_grid(await service.get(mission.id)) == before
 
 
+@pytest.mark.slow
 async def test_a_vehicle_waits_for_scans_and_turns_back_where_something_comes_up(service: MissionService) -> None:
     mission = await service.create(
         search_spec(vehicles=[{"name": "boat", "kind": "rest", "depth_m": 0}], search={"simulated_obstacles": []})
@@ -317,6 +319,7 @@ def test_the_examples_are_missions() -> None:
         np.testing.assert_array_equal(world.solid, truth.solid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("site", ["car-park-1", "car-park-2", "car-park-3"])
 async def test_every_boat_of_an_example_begins_where_it_has_room_and_takes_part(
     service: MissionService, site: str

@@ -51,6 +51,7 @@ async def said(live: LiveMission) -> list[str]:
     return [line.message for line in await events_after(live)]
 
 
+@pytest.mark.slow
 async def test_who_is_held_stays_where_it_is_and_searches_on(service: MissionService) -> None:
     live = await flying(service, 4)
     boat = live.team.members["boat"]
@@ -67,6 +68,7 @@ async def test_who_is_held_stays_where_it_is_and_searches_on(service: MissionSer
     assert not any(AGROUND in words for words in await said(live))
 
 
+@pytest.mark.slow
 async def test_who_is_called_home_goes_round_what_was_found_on_the_way(service: MissionService) -> None:
     live = await flying(service, 1, **HOME)
     boat = live.team.members["boat"]
@@ -97,6 +99,7 @@ async def test_nobody_goes_to_a_recovery_point_that_nobody_has_looked_at(service
     assert not any(AGROUND in line for line in await said(live))
 
 
+@pytest.mark.slow
 async def test_nobody_runs_into_who_is_held(service: MissionService) -> None:
     boats = [{"name": name, "kind": "sim", "depth_m": 0} for name in "ab"]
     limits = {"max_step_m": 3.0, "min_depth_m": 0.0, "min_altitude_m": 0.1, "min_separation_m": 4.0}
@@ -151,6 +154,7 @@ async def test_a_search_whose_time_is_longer_than_the_energy_lasts_is_warned_of(
         assert next(check for check in preflight(live).checks if check.id == "recovery.boat").status is status
 
 
+@pytest.mark.slow
 async def test_who_is_called_home_in_a_search_comes_to_its_entry(service: MissionService) -> None:
     live = await flying(service, 6)
     boat = live.team.members["boat"]

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from app.missions.operations.imports.imports import imports_of
 from app.missions.operations.measurements import measure
@@ -51,6 +52,7 @@ async def survey(harbour: Harbour, site: str) -> str:
     return mission
 
 
+@pytest.mark.slow
 async def test_the_second_survey_begins_with_the_first_and_finds_what_was_dredged(
     make_settings: Callable[..., ServiceSettings], tmp_path: Path
 ) -> None:

@@ -166,6 +166,7 @@ async def test_a_stop_does_not_wait_for_the_database(harbour: Harbour, whole: bo
     assert present == [("a", whole)]
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_did_not_acknowledge_is_told_again_after_the_end(service: MissionService) -> None:
     mission = (await service.create(make_spec(steps=50, vehicles=[{"name": "a", "kind": "rest"}]))).id
     rover = Rover(service, mission, "a")

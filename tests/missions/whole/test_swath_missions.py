@@ -73,6 +73,7 @@ async def ensonified(live: LiveMission, share_pct: float) -> None:
     await until(reached, f"{share_pct} % are ensonified")
 
 
+@pytest.mark.slow
 async def test_a_mission_sees_all_of_its_area_and_ends_by_itself(harbour: Harbour) -> None:
     live = await started(harbour)
     await until_state(harbour.service, live.id, MissionState.FINISHED)
@@ -101,6 +102,7 @@ async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Har
     assert (progress.ensonified_pct or 0.0) > 99.0
 
 
+@pytest.mark.slow
 async def test_cells_and_what_was_left_are_the_same_after_the_service_started_again(harbour: Harbour) -> None:
     live = await started(harbour, cell_m=0.5, coverage={"cell_of_depth": 0.1})
     await until_state(harbour.service, live.id, MissionState.FINISHED)
@@ -134,6 +136,7 @@ async def test_cells_and_what_was_left_are_the_same_after_the_service_started_ag
     assert again.minutes_left < 60.0
 
 
+@pytest.mark.slow
 async def test_a_map_of_swaths_is_shown_as_it_was_at_any_step(harbour: Harbour) -> None:
     live = await started(harbour)
     await until_state(harbour.service, live.id, MissionState.FINISHED)
@@ -149,6 +152,7 @@ async def test_a_map_of_swaths_is_shown_as_it_was_at_any_step(harbour: Harbour) 
         live = await harbour.service.get(live.id)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("simulated_time")
 async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour) -> None:
     live = await started(harbour)
@@ -166,6 +170,7 @@ async def test_a_service_that_starts_again_knows_what_was_seen(harbour: Harbour)
     assert progress.beams > seen
 
 
+@pytest.mark.slow
 async def test_nothing_is_left_only_where_nothing_is_expected_of_legs_that_were_flown(
     harbour_closed: Harbour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -207,6 +212,7 @@ async def test_a_mission_that_did_not_see_all_says_so_when_it_ends(
     assert live.progress().eta_s == 0.0
 
 
+@pytest.mark.slow
 async def test_a_finished_survey_is_shown_without_reading_its_pings(harbour: Harbour) -> None:
     live = await started(harbour)
     await until_state(harbour.service, live.id, MissionState.FINISHED)
@@ -239,6 +245,7 @@ async def test_pings_are_placed_anew_when_the_tide_is_known(harbour: Harbour) ->
     assert np.allclose((before - after.map.depth_m)[seen], 1.5)
 
 
+@pytest.mark.slow
 async def test_vehicles_keep_a_height_above_a_bottom_that_falls_away(harbour_closed: Harbour) -> None:
     harbour = harbour_closed
     await harbour.open(simulation={"family": "slope", "seed": 2}, time_scale=20.0)

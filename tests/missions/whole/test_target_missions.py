@@ -41,6 +41,7 @@ def round_trip(count: int, begin_s: float) -> list[Measurement]:
     ]
 
 
+@pytest.mark.slow
 async def test_posted_ranges_find_a_target_and_a_restart_does_not_forget_it(
     harbour: Harbour, service: MissionService
 ) -> None:
@@ -103,6 +104,7 @@ async def test_a_range_needs_its_target_and_no_sounding_beside_it() -> None:
             measured(5, 5, 1.0, **changes)
 
 
+@pytest.mark.slow
 async def test_simulated_vehicles_map_and_keep_track_of_a_simulated_target(harbour: Harbour) -> None:
     """In the service's own simulation: one of three leaves the mapping for the target, says so, and comes back."""
     service = harbour.service

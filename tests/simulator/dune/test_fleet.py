@@ -105,6 +105,7 @@ class Console:
         await self.until(lambda: self.state(node) == (0, 1), lambda: self.say(node, stop_request()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "faults",
     [NetworkFaults(), NetworkFaults(loss=0.2, delay_s=0.005, jitter_s=0.01, duplicate=0.2, reorder=0.2)],

@@ -184,6 +184,7 @@ def test_migrations_lie_beside_the_package() -> None:
     assert list(Path(migrate.MIGRATIONS, "versions").glob("0001_*.py"))
 
 
+@pytest.mark.slow
 async def test_what_only_words_told_is_kept_as_values(empty_url: str) -> None:
     """Databases that know neither which legs were not begun nor why exactly vehicles were called home."""
     asked = {"response": "return", "why": "called home by Ana", "over": True, "asked": True, "done": False}

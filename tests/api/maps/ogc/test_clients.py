@@ -42,6 +42,7 @@ def keyed(gis: Gis, mission: str = "") -> str:
     return f"{gis.url}/key/{gis.key}/ogc" + (f"/missions/{mission}" if mission else "")
 
 
+@pytest.mark.slow
 def test_owslib_reads_everything(gis: Gis) -> None:
     service = Features(f"{gis.url}/ogc", headers={"Authorization": f"Bearer {gis.key}"})
     assert set(service.feature_collections()) >= {"areas", "tracks", "soundings", "contours", "holidays", "vehicles"}

@@ -39,6 +39,7 @@ def rmse(found: FloatArray) -> float:
     return float(np.sqrt(np.nanmean((found - bottom_m(*np.meshgrid(at, at))) ** 2)))
 
 
+@pytest.mark.slow
 async def test_a_map_bent_by_drift_is_straightened_and_bent_again(client: httpx.AsyncClient) -> None:
     path = await swath_mission(client)
     first, second = ways()

@@ -61,6 +61,7 @@ async def test_an_order_that_asks_for_more_finds_outliers(client: httpx.AsyncCli
     assert not found["features"]["features"][0]["properties"]["within"]
 
 
+@pytest.mark.slow
 async def test_an_answer_holds_until_something_is_measured_or_corrected(client: httpx.AsyncClient, path: str) -> None:
     answer = await client.get(f"{path}/crosslines")
     tag = {"If-None-Match": answer.headers["etag"]}
@@ -78,6 +79,7 @@ async def test_an_answer_holds_until_something_is_measured_or_corrected(client: 
     assert after == pytest.approx([depth - 0.75 for depth in before])
 
 
+@pytest.mark.slow
 async def test_crossings_are_a_file(client: httpx.AsyncClient, path: str) -> None:
     listed = {product["name"]: product["href"] for product in (await client.get(f"{path}/products")).json()}
     assert listed["crossovers.csv"] == f"/api/v1{path}/crossovers.csv"

@@ -38,6 +38,7 @@ async def survey_with_an_offset(client: httpx.AsyncClient) -> str:
     return path
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_measures_too_deep_is_found_and_corrected_by_one_call(settings: Settings) -> None:
     async with running(settings) as server, make_client(server) as client:
         path = await survey_with_an_offset(client)

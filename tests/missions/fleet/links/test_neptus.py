@@ -373,6 +373,7 @@ async def test_a_file_that_is_too_large_is_cut_off(gateway: Gateway, monkeypatch
     await panel.fly()
 
 
+@pytest.mark.slow
 async def test_with_tokens_only_an_operators_token_lets_a_panel_in(make_gateway: Callable[..., Gateway]) -> None:
     gateway = make_gateway()
     await gateway.open()
@@ -420,6 +421,7 @@ async def test_answers_are_only_for_the_host_that_logged_in(gateway: Gateway) ->
             await asyncio.to_thread(urllib.request.urlopen, f"http://127.0.0.1:{gateway.ports[1]}{path}")
 
 
+@pytest.mark.slow
 async def test_a_panel_that_waits_is_answered_after_a_restart(gateway: Gateway) -> None:
     panel = panel_of(gateway)
     await asyncio.to_thread(panel.connect)
@@ -437,6 +439,7 @@ async def test_a_panel_that_waits_is_answered_after_a_restart(gateway: Gateway) 
     assert mission.progress.step >= 3
 
 
+@pytest.mark.slow
 async def test_where_the_depth_the_panel_flies_at_is_not_safe_the_answer_is_to_stay(
     make_gateway: Callable[..., Gateway], monkeypatch: pytest.MonkeyPatch
 ) -> None:

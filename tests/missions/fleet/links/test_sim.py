@@ -198,6 +198,7 @@ async def test_one_without_energy_goes_nowhere_until_it_is_charged() -> None:
         await link.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("current", [(0.5, 0.0), (-0.35, 0.35), (0.0, -0.5)])
 async def test_it_arrives_against_and_across_half_its_speed(current: tuple[float, float]) -> None:
     events: list[FleetEvent] = []
@@ -279,6 +280,7 @@ def test_the_sonar_that_a_mission_describes_is_the_one_that_is_simulated() -> No
         SwathSonarSpec(aperture_deg=180.0)
 
 
+@pytest.mark.slow
 async def test_out_of_reach_it_tells_nothing_takes_no_orders_and_comes_up_after_a_while() -> None:
     events: list[FleetEvent] = []
     link = SimFleetLink(SimulationSettings(), 20.0)

@@ -97,6 +97,7 @@ def test_a_policy_that_cannot_be_kept_is_refused_with_what_would_be_right() -> N
         make_spec(surface_policy={"max_position_sd_m": 1.0, "good_position_sd_m": 2.0})
 
 
+@pytest.mark.slow
 async def test_a_running_mission_brings_its_vehicles_up_and_down_again(harbour: Harbour, database: Database) -> None:
     """Simulated vehicles whose dead reckoning drifts: fixes come at the surface, the log tells of each."""
     service = await harbour.reopen(simulation={"drift_m2ps": 0.05})
@@ -136,6 +137,7 @@ def test_by_the_clock_a_vehicle_comes_up_and_goes_down_again_whatever_it_says() 
         assert not decided([early], [[15.0, 12.0, 9.0]], **CLOCK).legs[0].surfacing
 
 
+@pytest.mark.slow
 async def test_a_mission_brings_its_vehicles_up_by_the_clock(harbour: Harbour, database: Database) -> None:
     service = harbour.service
     policy = {"every_min": 1.0, "stay_s": 5.0}

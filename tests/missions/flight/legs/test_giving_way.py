@@ -267,6 +267,7 @@ async def test_who_gave_way_to_a_vehicle_that_is_home_goes_on(scene: PlacedVehic
     assert scene.ordered[1] is second.order
 
 
+@pytest.mark.slow
 def test_vehicles_whose_lines_lead_past_each_other_pass_and_survey(monkeypatch: pytest.MonkeyPatch) -> None:
     routes = lawnmower.shared_lines
     # Each has the other's strip, at one depth: neither could set out while the other stood in its way.

@@ -75,6 +75,7 @@ async def test_a_vehicle_that_restarted_is_said_to_follow_again_however_soon_it_
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.slow
 async def test_a_vehicle_that_is_not_heard_after_a_restart_is_said_to_have_been_heard_before(harbour: Harbour) -> None:
     service = harbour.service
     mission = (await service.create(make_spec(steps=200, vehicles=[{"name": "b", "kind": "rest"}]))).id

@@ -49,6 +49,7 @@ async def test_one_whose_way_home_cannot_be_told_keeps_nobody_from_looking_after
     assert b.way_home_m is not None
 
 
+@pytest.mark.slow
 async def test_only_who_is_heard_can_follow_another_console(
     service: MissionService, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -222,6 +222,7 @@ def kill_after_the_first_batch(command: list[str], database: str) -> None:
         process.send_signal(signal.SIGKILL)
 
 
+@pytest.mark.slow
 async def test_a_command_that_was_killed_and_run_again_has_imported_everything_once(
     service: MissionService, tmp_path: Path, database_url: str
 ) -> None:
