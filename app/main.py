@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import re
 import socket
 import ssl
 import sys
@@ -49,6 +48,7 @@ from app.api.missions import alarms, fleet, forecasts, missions, orders, searche
 from app.api.schemas import API
 from app.api.soundings import corrections, imports, measurements, pings, soundings
 from app.api.state import EdgeState
+from app.certificates import first_certificate
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
 from app.end_signals import EndSignals
@@ -68,9 +68,6 @@ SWITCH_S = 0.001
 GRACE_S = 5
 """Seconds that open requests get to end when the process is asked to."""
 MAX_VIEWER_MESSAGE_BYTES = 4096
-
-CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----", re.DOTALL)
-"""A certificate in a PEM file (RFC 7468)."""
 
 log = structlog.get_logger(__name__)
 
@@ -154,7 +151,7 @@ def create_app(settings: Settings | None = None, *, port: int | None = None) -> 
                 log_in,
                 is_own_user=is_own_user,
                 url=settings.peer_url or _own_url(settings, port or settings.port),
-                certificate=certificates_in(settings.tls_certificate) if settings.tls_certificate else None,
+                certificate=first_certificate(settings.tls_certificate) if settings.tls_certificate else None,
             )
             app.state.edge = EdgeState(settings, service, tokens, limits, audit, SessionStore(database))
             await tokens.exists("")  # so that they are known when it matters
@@ -323,11 +320,6 @@ class Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave signals to :func:`serve`, which catches them for longer."""
         yield
-
-
-def certificates_in(file: Path) -> str:
-    """Return the certificates of a PEM file without anything else: its private key may be in the same file."""
-    return "".join(f"{block}\n" for block in CERTIFICATE.findall(file.read_text()))
 
 
 def check_certificate(settings: Settings) -> None:

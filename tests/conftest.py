@@ -11,6 +11,7 @@ import structlog
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
+from tests.support.certificates import Authority
 from tests.support.compute.numba_cache import share
 from tests.support.paths import CAPTURES, TERRAINS
 from tests.support.storage.databases import KINDS, Databases
@@ -116,6 +117,15 @@ def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def other_certificate(tmp_path: Path) -> Path:
     """Another one, of another key."""
     return new_certificate(tmp_path)[0]
+
+
+@pytest.fixture
+def authority(tmp_path: Path) -> Authority:
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl is not installed: no certificate can be made")
+    folder = tmp_path / "authority"
+    folder.mkdir()
+    return Authority(folder)
 
 
 def new_certificate(folder: Path) -> tuple[Path, Path]:

@@ -15,6 +15,15 @@ if TYPE_CHECKING:
     from app.settings import Settings
 
 
+UNKNOWN_AUTHORITY = "SSL_CERT_FILE=FILE names a file with the certificate (PEM) of the authority that signed it"
+OTHER_NAME = "Call the service in --url as its certificate does"
+REMEDIES = {10: "Renew it and restart the service", 62: OTHER_NAME, 64: OTHER_NAME}
+"""By OpenSSL's codes: it has expired, or is for another name or another address."""
+RENEWED = (
+    "Was the file renewed since the service was started? Restart it, or call it by its name: --url https://NAME:PORT"
+)
+
+
 class RunningService:
     """A service that answers at a URL; closes its connections at the end of a ``with`` block.
 
@@ -35,6 +44,7 @@ class RunningService:
     ) -> None:
         import httpx
 
+        self._pinned = certificate is not None
         self.url = url.rstrip("/").removesuffix("/api/v1")
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
         try:
@@ -43,7 +53,7 @@ class RunningService:
                 headers=headers,
                 timeout=300.0,
                 trust_env=not on_this_machine,
-                verify=True if certificate is None else trust(certificate),
+                verify=_usual_trust() if certificate is None else _trust(certificate),
             )
         except httpx.InvalidURL as error:
             raise CommandError(f"{url!r} is no URL: {error}", "Such as http://127.0.0.1:8080") from None
@@ -70,9 +80,17 @@ class RunningService:
     def _answer(self, method: str, path: str, **content: Any) -> Any:
         import httpx
 
+        from app.certificates import certificate_refusal
+
         try:
             return _content(self._client.request(method, path, **content))
         except (httpx.HTTPError, httpx.InvalidURL) as error:
+            refused = certificate_refusal(error)
+            if refused is not None:
+                remedy = RENEWED if self._pinned else REMEDIES.get(refused.verify_code, UNKNOWN_AUTHORITY)
+                raise CommandError(
+                    f"{self.url}: its certificate is not trusted: {refused.verify_message}", remedy
+                ) from None
             raise CommandError(f"{self.url} does not answer: {error}", "Is the service running there?") from None
 
 
@@ -101,22 +119,23 @@ def own_url(settings: "Settings") -> str:
     return f"{'http' if settings.tls_certificate is None else 'https'}://{host}:{settings.port}"
 
 
-def trust(certificate: "Path") -> "ssl.SSLContext":
-    """Return what trusts this certificate and no other, whatever name it is for.
+def _usual_trust() -> "ssl.SSLContext":
+    """Return what trusts the public authorities and those that this machine trusts, or SSL_CERT_FILE's alone."""
+    import httpx
 
-    Raises CommandError where it cannot be read.
-    """
-    import ssl
-
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.check_hostname = False
-    # The certificate itself is trusted, not only who signed it.
-    context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
-    try:
-        context.load_verify_locations(certificate)
-    except OSError as error:
-        raise CommandError(f"{certificate} cannot be read: {error}", "tls_certificate names it") from None
+    context = httpx.create_ssl_context()
+    context.load_default_certs()
     return context
+
+
+def _trust(file: "Path") -> "ssl.SSLContext":
+    """Return what trusts the certificate in this file and no other. Raises CommandError where it cannot be read."""
+    from app.certificates import first_certificate, trusting
+
+    try:
+        return trusting(first_certificate(file))
+    except (OSError, ValueError) as error:
+        raise CommandError(f"{file} cannot be read: {error}", "tls_certificate names it") from None
 
 
 def own_token(settings: "Settings") -> str | None:

@@ -24,6 +24,7 @@ from starlette.types import Scope
 
 from app.api.accounts.roles import Role
 from app.api.accounts.tokens import Principal
+from app.certificates import trusting
 from app.missions.running.ownership import Peer
 
 PEER = "x-bathyfleet-peer"
@@ -130,9 +131,7 @@ def tls_of(peer: Peer) -> ssl.SSLContext | None:
     """Return how a process that serves TLS is recognised: by its very certificate, which the database vouches for."""
     if not peer.url.startswith("https:"):
         return None
-    context = ssl.create_default_context(cadata=peer.certificate)
-    context.check_hostname = peer.certificate is None
-    return context
+    return ssl.create_default_context() if peer.certificate is None else trusting(peer.certificate)
 
 
 class PeerClients:

@@ -210,6 +210,7 @@ def _put_file_back(path: Path, file: Path, files: PingFiles, *, replace: bool) -
     """
     if path.exists() and not replace:
         raise BackupError(f"{path} exists", "--replace moves it aside")
+    _check_owner(path)
     private.make_folder(path.parent)
     part = path.with_name(f"{path.name}.part")
     aside = path.with_name(f"{path.name}.before-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}")
@@ -239,6 +240,16 @@ def _put_file_back(path: Path, file: Path, files: PingFiles, *, replace: bool) -
                 aside.unlink(missing_ok=True)
     private.mend(private.family(aside))
     return aside if there else None
+
+
+def _check_owner(path: Path) -> None:
+    """Raise BackupError where root would leave a database that the user whose place it is may not open."""
+    there = next(one for one in (path, *path.absolute().parents) if one.exists())
+    owner = there.stat().st_uid
+    if os.geteuid() == 0 and owner != 0:
+        raise BackupError(
+            f"{there} belongs to user {owner}, who could not use what root puts there", "Restore it as that user"
+        )
 
 
 def _keep(path: Path, aside: Path) -> None:

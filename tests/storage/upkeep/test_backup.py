@@ -163,6 +163,24 @@ async def test_a_restore_that_is_broken_off_leaves_the_database_in_its_place(sql
     assert not beside(tmp_path, f"{path_of(sqlite.url).name}.")
 
 
+async def test_root_restores_nothing_that_its_owner_could_not_use(
+    sqlite: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in the folder of a service that systemd runs: its user would be locked out of its own database."""
+    await fill(sqlite)
+    await sqlite.close()
+    copy, _ = back_up(sqlite.url, tmp_path / "copy.db")
+    path = path_of(sqlite.url)
+    if os.geteuid() == 0:
+        os.chown(path, 12345, -1)
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    with pytest.raises(BackupError, match=rf"{path.name} belongs to user {path.stat().st_uid}") as refused:
+        restore_to(sqlite.url, copy, replace=True)
+    assert "as that user" in refused.value.remedy
+    assert not beside(tmp_path, f"{path.name}.")
+    assert path.stat().st_uid != 0
+
+
 KILLED_RESTORE = """
 import os, shutil, signal, sys
 from pathlib import Path

@@ -27,6 +27,7 @@ from bathyfleet.client.connection import (
     root,
     settings,
     together,
+    trust,
 )
 from bathyfleet.client.files import Arriving
 from bathyfleet.client.maps import dataset
@@ -49,7 +50,6 @@ from bathyfleet.client.streams import (
     ends,
     live_address,
     message_of,
-    tls_of,
     wait_after,
 )
 from bathyfleet.client.wait import Wait
@@ -77,14 +77,14 @@ class AsyncClient(AsyncOperations):
     timeout_s : float
         The longest wait for an answer that has begun to be made.
     verify : bool or SSLContext
-        How a certificate is checked; ``ssl.create_default_context(cafile=...)`` trusts one that the service made.
+        How a certificate is checked; ``ssl.create_default_context(cafile=...)`` trusts an authority of your own.
 
     Raises
     ------
     ProblemError
         By all methods, when the service says why not: its subclasses are kinds of reasons.
     UnreachableError
-        By all methods, when nobody answers.
+        By all methods, when nobody answers, or with a certificate that is not trusted.
     """
 
     def __init__(
@@ -97,9 +97,9 @@ class AsyncClient(AsyncOperations):
         verify: bool | ssl.SSLContext = True,
     ) -> None:
         self._address = root(address)
-        self._http = httpx.AsyncClient(**settings(self._address, token, timeout_s, verify))
+        self._tls = trust(self._address, verify)
+        self._http = httpx.AsyncClient(**settings(self._address, token, timeout_s, self._tls))
         self._token = token
-        self._verify = verify
         self._patience_s = patience_s
 
     async def __aenter__(self) -> Self:
@@ -236,7 +236,7 @@ class AsyncClient(AsyncOperations):
                     address,
                     additional_headers=authorization(self._token),
                     max_size=LARGEST_MESSAGE,
-                    ssl=tls_of(self._address, self._verify),
+                    ssl=self._tls,
                 ) as socket:
                     async for text in socket:
                         attempts.reached()

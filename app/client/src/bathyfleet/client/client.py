@@ -26,6 +26,7 @@ from bathyfleet.client.connection import (
     root,
     settings,
     together,
+    trust,
 )
 from bathyfleet.client.files import Arriving
 from bathyfleet.client.maps import dataset
@@ -48,7 +49,6 @@ from bathyfleet.client.streams import (
     ends,
     live_address,
     message_of,
-    tls_of,
     wait_after,
 )
 from bathyfleet.client.wait import Wait
@@ -74,14 +74,14 @@ class Client(Operations):
     timeout_s : float
         The longest wait for an answer that has begun to be made.
     verify : bool or SSLContext
-        How a certificate is checked; ``ssl.create_default_context(cafile=...)`` trusts one that the service made.
+        How a certificate is checked; ``ssl.create_default_context(cafile=...)`` trusts an authority of your own.
 
     Raises
     ------
     ProblemError
         By all methods, when the service says why not: its subclasses are kinds of reasons.
     UnreachableError
-        By all methods, when nobody answers.
+        By all methods, when nobody answers, or with a certificate that is not trusted.
     """
 
     def __init__(
@@ -94,9 +94,9 @@ class Client(Operations):
         verify: bool | ssl.SSLContext = True,
     ) -> None:
         self._address = root(address)
-        self._http = httpx.Client(**settings(self._address, token, timeout_s, verify))
+        self._tls = trust(self._address, verify)
+        self._http = httpx.Client(**settings(self._address, token, timeout_s, self._tls))
         self._token = token
-        self._verify = verify
         self._patience_s = patience_s
 
     def __enter__(self) -> Self:
@@ -230,7 +230,7 @@ class Client(Operations):
                     address,
                     additional_headers=authorization(self._token),
                     max_size=LARGEST_MESSAGE,
-                    ssl=tls_of(self._address, self._verify),
+                    ssl=self._tls,
                 ) as socket:
                     for text in socket:
                         attempts.reached()

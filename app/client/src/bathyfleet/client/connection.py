@@ -34,14 +34,28 @@ def root(address: str) -> str:
     return address.rstrip("/").removesuffix("/api/v1")
 
 
-def settings(address: str, token: str | None, timeout_s: float, verify: bool | ssl.SSLContext) -> dict[str, Any]:
+def trust(address: str, verify: bool | ssl.SSLContext) -> ssl.SSLContext | None:
+    """Return how the certificate at an address is checked, by requests and by live sockets; None without HTTPS.
+
+    Reading what is trusted takes longer than most requests; plain HTTP has no use for it.
+    """
+    if not address.startswith("https:"):
+        return None
+    if isinstance(verify, ssl.SSLContext):
+        return verify
+    context = httpx.create_ssl_context(verify)
+    if verify:
+        context.load_default_certs()  # what this machine trusts beside the public authorities
+    return context
+
+
+def settings(address: str, token: str | None, timeout_s: float, tls: ssl.SSLContext | None) -> dict[str, Any]:
     """Return the settings of an HTTP connection to the service at an address that :func:`root` returned."""
     return {
         "base_url": address,
         "headers": authorization(token) | {"Accept": "*/*"},
         "timeout": httpx.Timeout(timeout_s, connect=10.0),
-        # Loading certificates takes longer than most requests; plain HTTP has no use for them.
-        "verify": verify if address.startswith("https:") else False,
+        "verify": tls or False,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ssl
 import time
 from collections.abc import Callable
 from http import HTTPStatus
@@ -83,6 +84,11 @@ class Attempts:
         """
         if isinstance(error, httpx.LocalProtocolError):
             raise ValueError(f"{self._what}: it cannot be sent: {error}") from error
+        refused = _certificate_refusal(error)
+        if refused is not None:
+            raise UnreachableError(
+                f"{self._what}: its certificate is not trusted: {refused.verify_message}; verify= says what is"
+            ) from error
         if not self._repeatable and not isinstance(error, NEVER_SENT):
             raise UnreachableError(
                 f"{self._what}: no answer came ({_told(error)}); whether it was done has to be looked up"
@@ -128,6 +134,13 @@ def _retry_after_s(answer: httpx.Response) -> float:
         return max(float(answer.headers.get("retry-after", "")), 0.0)
     except ValueError:
         return 0.0
+
+
+def _certificate_refusal(error: BaseException | None) -> ssl.SSLCertVerificationError | None:
+    """Return why a certificate was refused, where that is what is behind an error: asking again changes nothing."""
+    while error is not None and not isinstance(error, ssl.SSLCertVerificationError):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 def _told(error: Exception) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ssl
 from typing import Annotated, get_args
 
 import httpx
@@ -111,16 +110,3 @@ def wait_after(error: Exception, attempts: Attempts, name: str) -> float:
 def live_address(address: str, mission_id: str) -> str:
     """Return the address of a mission's live socket."""
     return f"ws{address.removeprefix('http')}/api/v1/missions/{part(mission_id)}/live"
-
-
-def tls_of(address: str, verify: bool | ssl.SSLContext) -> ssl.SSLContext | None:
-    """Return how the other end of a live socket is checked; None without HTTPS."""
-    if not address.startswith("https"):
-        return None
-    if isinstance(verify, ssl.SSLContext):
-        return verify
-    context = ssl.create_default_context()
-    if not verify:
-        context.check_hostname = False
-        context.verify_mode = ssl.CERT_NONE
-    return context

@@ -1,0 +1,43 @@
+"""Certificates: how a service's own one is recognised, and why one was refused."""
+
+import re
+import ssl
+from pathlib import Path
+
+CERTIFICATE = re.compile(r"-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----", re.DOTALL)
+"""A certificate in a PEM file (RFC 7468)."""
+NO_CHECK_TIME = 0x200000
+"""OpenSSL's X509_V_FLAG_NO_CHECK_TIME, which the library does not name."""
+
+
+def first_certificate(file: Path) -> str:
+    """Return the service's certificate in its file: the first one.
+
+    Those of the authorities that signed it follow, and its private key may be in the same file. Raises ValueError
+    where there is none, OSError where it cannot be read.
+    """
+    found = CERTIFICATE.search(file.read_text())
+    if found is None:
+        raise ValueError("it holds no certificate (PEM)")
+    return f"{found[0]}\n"
+
+
+def trusting(certificate: str) -> ssl.SSLContext:
+    """Return what trusts this very certificate (PEM) and no other.
+
+    Whoever shows it has its key, so its name, its authority and its time say nothing more: vehicles have to be stopped
+    on the day after it has expired, too. Raises SSLError for what is no certificate.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    # The certificate itself is trusted, not only who signed it.
+    context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN | NO_CHECK_TIME
+    context.load_verify_locations(cadata=certificate)
+    return context
+
+
+def certificate_refusal(error: BaseException | None) -> ssl.SSLCertVerificationError | None:
+    """Return why a certificate was refused, where that is what is behind an error."""
+    while error is not None and not isinstance(error, ssl.SSLCertVerificationError):
+        error = error.__cause__ or error.__context__
+    return error
