@@ -527,12 +527,18 @@ function withOwn(vehicle: VehicleSpec, draft: Draft): VehicleSpec {
   return { ...made, ...(point ? { recovery_point: point } : {}) } as VehicleSpec;
 }
 
+/** What a search's steps follow from, where nobody said how many: with another window there are others. */
+const LENGTH_OF_SEARCH = ["window_min", "speed_mps", "max_step_m"] as const;
+
 /** What only a search has: its places, and vehicles at the surface. Planner and length are left to the service. */
-function searchOf({ base, goal, entry, obstacles }: Draft, vehicles: readonly VehicleSpec[]) {
+function searchOf(draft: Draft, vehicles: readonly VehicleSpec[]) {
+  const { base, goal, entry, obstacles, ...texts } = draft;
   const places = { goal: placeOf(goal), entry: placeOf(entry) };
   if (!places.goal || !places.entry) throw new Error("the draft has faults");
   const search = { ...base.search, ...places, obstacles: obstacles.map(polygonOf) };
-  if (base.kind === "search") return { search, ...(base.budget ? { budget: base.budget } : {}) };
+  const before = textsOf(base, "search");
+  const sameLength = base.budget && LENGTH_OF_SEARCH.every((name) => texts[name] === before[name]);
+  if (base.kind === "search") return { search, ...(sameLength ? { budget: base.budget } : {}) };
   const depth_m = SPEC["vehicles.depth_m"].minimum;
   return {
     search,
