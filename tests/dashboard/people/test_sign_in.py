@@ -95,6 +95,29 @@ def test_a_viewer_sees_what_he_may_not_do_and_signs_out(page: Page, tokens: dict
     expect(page.get_by_test_id("sign-in")).to_be_visible()
 
 
+def test_enter_sends_no_length_where_its_button_may_not_be_pressed(
+    watched: Watched, service: Service, tokens: dict[str, str]
+) -> None:
+    operator = {"Authorization": f"Bearer {tokens['operator']}"}
+    spec = httpx.get(f"{service.url}/api/v1/missions/{tokens['mission']}", headers=operator, timeout=60).json()["spec"]
+    made = httpx.post(f"{service.url}/api/v1/missions", headers=operator, json=spec, timeout=60).raise_for_status()
+    path = f"{service.url}/api/v1/missions/{made.json()['id']}"
+    httpx.post(f"{path}/start", headers=operator, timeout=60).raise_for_status()
+    page = watched.page
+    page.goto(f"/#/missions/{made.json()['id']}")
+    sign_in(page, tokens["viewer"])
+    # The dialog as it stays open for somebody whose role was taken away.
+    expect(page.get_by_test_id("change-length")).to_be_disabled()
+    page.get_by_test_id("change-length").evaluate("button => { button.disabled = false; button.click(); }")
+    expect(page.get_by_test_id("set-length")).to_be_disabled()
+    page.get_by_test_id("length-value").fill("7")
+    page.get_by_test_id("length-value").press("Enter")
+    expect(page.get_by_test_id("length-dialog")).to_be_visible()
+    expect(page.get_by_test_id("length-dialog").get_by_role("alert")).to_have_count(0)
+    assert not any(address.endswith("/budget") for address in watched.addresses)
+    httpx.post(f"{path}/abort", headers=operator, timeout=60).raise_for_status()
+
+
 def test_a_watch_keeper_sees_what_another_commands(page: Page, service: Service, tokens: dict[str, str]) -> None:
     page.goto(f"/#/missions/{tokens['mission']}")
     sign_in(page, tokens["viewer"])

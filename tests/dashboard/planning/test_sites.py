@@ -41,6 +41,8 @@ def test_a_site_is_made_of_the_area_that_is_described(page: Page, service: Servi
     by_id(page, "new-mission").click()
     by_id(page, "field-name").fill("Harbour mouth")
     page.get_by_text("Site that is surveyed again").click()
+    room = "button => [button.scrollWidth - button.clientWidth, button.scrollHeight - button.clientHeight]"
+    assert by_id(page, "make-site").evaluate(room) == [0, 0]
     by_id(page, "make-site").click()
     expect(by_id(page, "site")).not_to_have_value("")
     expect(page.get_by_text("No survey of it has ended yet.")).to_be_visible()

@@ -42,6 +42,7 @@ def test_a_mission_from_the_form_to_its_abort(watched: Watched, service: Service
         expect(by_id(page, f"card-{name}")).to_have_attribute("data-link", "engaged")
         expect(by_id(page, f"vehicle-mark-{name}")).to_be_visible()
         expect(by_id(page, f"depth-{name}")).to_have_text(re.compile(r"\d\.\d m"))
+        expect(by_id(page, f"card-{name}")).to_contain_text("Pos. age")
     marker = page.locator(".maplibregl-marker", has=by_id(page, "vehicle-mark-sim-1"))
     place = marker.get_attribute("style")
     assert place is not None

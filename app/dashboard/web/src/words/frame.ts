@@ -168,6 +168,7 @@ export const FRAME = {
   },
   "fleet.mission": { en: "Mission", pt: "Missão" },
   "fleet.heard": { en: "Heard", pt: "Ouvido" },
+  "fleet.positionAge": { en: "Age of position", pt: "Idade da posição" },
   "fleet.depth": { en: "Depth", pt: "Profundidade" },
   "fleet.speed": { en: "Speed", pt: "Velocidade" },
   "fleet.place": { en: "Place", pt: "Lugar" },

@@ -126,6 +126,7 @@ export const MAP = {
     pt: "Não pode ser mostrado no espaço: {fault}",
   },
   "marks.lastHeardAgo": { en: ", last heard {ageS} ago", pt: ", ouvido há {ageS}" },
+  "marks.positionOld": { en: ", position {ageS} old", pt: ", posição de há {ageS}" },
   "marks.old": { en: "{old} old", pt: "há {old}" },
   "marks.waypointOf": {
     en: "Waypoint {step} of {vehicle}: {status}",

@@ -3,7 +3,6 @@
 export const REVIEW = {
   "charts.depthOfVehicles": { en: "Depth of vehicles", pt: "Profundidade dos veículos" },
   "charts.battery": { en: "Battery", pt: "Bateria" },
-  "charts.secondsSinceHeard": { en: "Seconds since heard", pt: "Segundos sem contacto" },
   "charts.chartsOverStepsBeginWithThe": {
     en: "Charts over steps begin with the first step.",
     pt: "Os gráficos por passo começam com o primeiro passo.",

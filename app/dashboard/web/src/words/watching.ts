@@ -6,6 +6,11 @@ export const WATCHING = {
     en: "Show only what one has to know of each vehicle",
     pt: "Mostrar só o essencial de cada veículo",
   },
+  "cards.positionAge": { en: "Pos. age", pt: "Idade pos." },
+  "cards.sinceItToldWhereItIs": {
+    en: "Age of its position: since it last told where it is",
+    pt: "Idade da posição: desde que disse pela última vez onde está",
+  },
   "cards.wholeCards": { en: "◂ Whole cards", pt: "◂ Fichas completas" },
   "cards.foldCards": { en: "Fold cards ▸", pt: "Dobrar fichas ▸" },
   "cards.noVehicleTakesPartYetSwitch": {

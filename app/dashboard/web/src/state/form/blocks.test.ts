@@ -3,9 +3,9 @@ import type { LngLat, NewMission, PlanView } from "../../api/types";
 import { ringOf } from "../../map/area";
 import {
   atBlock,
-  blockTitle,
   comingFrom,
   earlier,
+  faultInBlock,
   inAll,
   inSequence,
   type PlannedVehicle,
@@ -15,7 +15,7 @@ import {
   withAreas,
   withoutBlock,
 } from "./blocks";
-import { allBlocks, type Draft, emptyDraft, faultsOf } from "./draft";
+import { allBlocks, blockTitle, type Draft, emptyDraft, faultsOf } from "./draft";
 import { draftIn, missionFile } from "./missionFile";
 
 const square = (west: number): LngLat[] => [
@@ -116,8 +116,31 @@ describe("blocks", () => {
   it("are all checked, and a search has none", () => {
     const crossed = [WEST[0], WEST[2], WEST[1], WEST[3]] as LngLat[];
     expect(faultsOf({ ...three, blocks: [{ name: "", ring: crossed }] }).blocks).toContain("crosses itself");
+    const faulty = {
+      ...drawn(),
+      turn: 1,
+      blocks: [
+        { name: "Quay", ring: crossed },
+        { name: "", ring: [] },
+      ],
+    };
+    expect(faultsOf(faulty).blocks).toMatch(/^Quay: .*crosses itself/);
+    expect(faultsOf({ ...faulty, blocks: faulty.blocks.toReversed() }).blocks).toMatch(
+      /^Block 1: An area needs/,
+    );
     const search = { ...three, kind: "search" as const, goal: "41.0005, -8.9895", entry: "41.0002, -8.9898" };
     expect(toMissions(search).length).toBe(1);
+  });
+
+  it("are told apart where the service refuses the area of one", () => {
+    expect(faultInBlock("ring", "on land", three, 2)).toEqual(["blocks", "Block 3: on land"]);
+    expect(faultInBlock("ring", "on land", three, three.turn)).toEqual(["ring", "on land"]);
+    expect(faultInBlock("steps", "too many", three, 2)).toEqual(["steps", "too many"]);
+    // A search has the marked one alone.
+    expect(faultInBlock("ring", "on land", { ...three, turn: 1, kind: "search" }, 0)).toEqual([
+      "ring",
+      "on land",
+    ]);
   });
 
   it("are kept in a mission's file", () => {

@@ -1,8 +1,16 @@
 /** Several areas of one plan, flown one after the other by the same team: blocks. Pure. */
 
 import type { ForecastView, LngLat, NewMission, PlanView } from "../../api/types";
-import { say } from "../../words/say";
-import { allBlocks, type Block, cornersOf, type Draft, toMission } from "./draft";
+import {
+  allBlocks,
+  type Block,
+  blockTitle,
+  cornersOf,
+  type Draft,
+  type FaultKey,
+  ofBlock,
+  toMission,
+} from "./draft";
 
 /** Between a typed rectangle and the next one, as a share of its width. */
 const GAP = 0.1;
@@ -10,9 +18,6 @@ const GAP = 0.1;
 /** The areas that are flown: a search has one. */
 export const flownBlocks = (draft: Draft): Block[] =>
   allBlocks(draft).filter((_, i) => draft.kind === "survey" || i === draft.turn);
-
-export const blockTitle = ({ name }: Pick<Block, "name">, i: number): string =>
-  name.trim() || say("blocks.block", { i: i + 1 });
 
 /** The draft's blocks in another order or number, and which of them is described by the form's fields. */
 const arranged = (all: readonly Block[], turn: number): Partial<Draft> => ({
@@ -82,6 +87,14 @@ export function toMissions(draft: Draft): NewMission[] {
       ...(stays ? { recovery: { ...made.recovery, on_finish: "stop" } } : {}),
     } as NewMission;
   });
+}
+
+/** Where a fault belongs that the service finds in the `i`-th block; one of its area is told of beside the marked one alone. */
+export function faultInBlock(field: FaultKey, fault: string, draft: Draft, i: number): [FaultKey, string] {
+  const blocks = flownBlocks(draft);
+  const block = blocks[i];
+  const isAnother = field === "ring" && blocks.length > 1 && i !== draft.turn;
+  return isAnother && block ? ["blocks", ofBlock(block, i, fault)] : [field, fault];
 }
 
 /** A block as its plan is asked for: its vehicles come from where they end the one before. */

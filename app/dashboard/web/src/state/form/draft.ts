@@ -365,7 +365,7 @@ export function faultsOf(draft: Draft): Faults {
   if (draft.kind === "survey") {
     if (lengthChoiceOf(draft) === "spacing_m") note("spacing_m", spacingFault(draft));
     note("floor_depth_m", floorDepthFault(draft.floor_depth_m));
-    for (const { ring } of draft.blocks) note("blocks", areaFault(ring, cell_m));
+    note("blocks", blocksFault(draft, cell_m));
     for (const [name, text] of Object.entries(draft.options))
       note(`options.${name}`, optionFault(name, text));
     if (!canPlan(draft.planner, draft)) faults.planner = say("draft.fullCoverageNeedsVehicles");
@@ -411,6 +411,15 @@ export function faultsOf(draft: Draft): Faults {
   }
   for (const name of vehicleNames(draft)) Object.assign(faults, ownFaults(name, draft));
   return faults;
+}
+
+/** What is wrong with the first of the areas that the fields do not describe. */
+function blocksFault(draft: Draft, cell_m: number): string {
+  const faults = allBlocks(draft).map((block, i) => {
+    const fault = i === draft.turn ? "" : areaFault(block.ring, cell_m);
+    return fault && ofBlock(block, i, fault);
+  });
+  return faults.find((fault) => fault !== "") ?? "";
 }
 
 /** What is wrong with how far lines are to be apart: with the number, or with the way that it asks of each vehicle. */
@@ -467,6 +476,13 @@ export function allBlocks(draft: Draft): Block[] {
   const mine = { name: draft.block_name, ring: cornersOf(draft) };
   return [...draft.blocks.slice(0, draft.turn), mine, ...draft.blocks.slice(draft.turn)];
 }
+
+export const blockTitle = ({ name }: Pick<Block, "name">, i: number): string =>
+  name.trim() || say("blocks.block", { i: i + 1 });
+
+/** A fault of one block of several, with what that is called. */
+export const ofBlock = (block: Block, i: number, fault: string): string =>
+  `${blockTitle(block, i)}: ${fault}`;
 
 /** What to send for a draft without faults; of several blocks for the one that its fields describe. */
 export function toMission(described: Draft): NewMission {
@@ -527,12 +543,18 @@ function withOwn(vehicle: VehicleSpec, draft: Draft): VehicleSpec {
   return { ...made, ...(point ? { recovery_point: point } : {}) } as VehicleSpec;
 }
 
+/** What a search's steps follow from, where nobody said how many: with another window there are others. */
+const LENGTH_OF_SEARCH = ["window_min", "speed_mps", "max_step_m"] as const;
+
 /** What only a search has: its places, and vehicles at the surface. Planner and length are left to the service. */
-function searchOf({ base, goal, entry, obstacles }: Draft, vehicles: readonly VehicleSpec[]) {
+function searchOf(draft: Draft, vehicles: readonly VehicleSpec[]) {
+  const { base, goal, entry, obstacles, ...texts } = draft;
   const places = { goal: placeOf(goal), entry: placeOf(entry) };
   if (!places.goal || !places.entry) throw new Error("the draft has faults");
   const search = { ...base.search, ...places, obstacles: obstacles.map(polygonOf) };
-  if (base.kind === "search") return { search, ...(base.budget ? { budget: base.budget } : {}) };
+  const before = textsOf(base, "search");
+  const sameLength = base.budget && LENGTH_OF_SEARCH.every((name) => texts[name] === before[name]);
+  if (base.kind === "search") return { search, ...(sameLength ? { budget: base.budget } : {}) };
   const depth_m = SPEC["vehicles.depth_m"].minimum;
   return {
     search,

@@ -57,6 +57,13 @@ describe("a copy of another kind", () => {
     expect(made).toMatchObject({ arrival_radius_m: 1.5, limits: { keep_out_margin_m: 25 } });
   });
 
+  it("has as many steps as there were only where the search is as long as it was", () => {
+    const draft = copyOf(shown("search"));
+    expect(toMission(draft).budget).toEqual({ steps: 1800 });
+    for (const longer of [{ window_min: "60" }, { speed_mps: "2" }, { max_step_m: "5" }])
+      expect(toMission({ ...draft, ...longer })).not.toHaveProperty("budget");
+  });
+
   it("is what it was after a change there and back", () => {
     const search = shown("search");
     const there = turned("survey", search);

@@ -138,9 +138,9 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
               {byEndurance ? percent(v.energy_left_pct) : batteryWords(v)}
             </dd>
           </div>
-          <div class={vehicle.stale && !away ? "late" : ""}>
-            <dt>{say("fleet.heard")}</dt>
-            <dd>{age(vehicle.age_s)}</dd>
+          <div class={vehicle.stale && !away ? "late" : ""} title={say("cards.sinceItToldWhereItIs")}>
+            <dt>{say("cards.positionAge")}</dt>
+            <dd data-testid={`position-age-${v.name}`}>{age(vehicle.age_s)}</dd>
           </div>
         </dl>
       </Steady>

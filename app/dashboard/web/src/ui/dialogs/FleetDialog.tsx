@@ -26,7 +26,7 @@ export function FleetDialog() {
                   say("asked.vehicle"),
                   say("compare.state"),
                   say("fleet.mission"),
-                  say("fleet.heard"),
+                  say("fleet.positionAge"),
                   say("charts.battery"),
                   say("fleet.depth"),
                   say("charts.altitude"),

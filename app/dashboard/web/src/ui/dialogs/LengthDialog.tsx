@@ -13,6 +13,8 @@ import { Dialog } from "../parts/Dialog";
 
 type Unit = keyof Budget;
 
+const FORM = "length-form";
+
 /** What a mission's length may be told in. */
 const units = (): readonly (readonly [Unit, string])[] => [
   ["minutes", say("fields.minutes")],
@@ -62,7 +64,7 @@ export function LengthDialog() {
       heading={say("length.howLong", { name: present?.name ?? "" })}
       fault={fault.value}
       actions={
-        <Button id="set-length" kind="command primary" commands disabled={sending.value} onClick={change}>
+        <Button id="set-length" kind="command primary" commands disabled={sending.value} form={FORM}>
           {sending.value ? say("length.setting") : say("length.set")}
         </Button>
       }
@@ -70,7 +72,7 @@ export function LengthDialog() {
       <p>
         {present ? say("length.countsFromTheBeginning", { progress: lengthWords(present.progress) }) : ""}
       </p>
-      <form class="length-form" onSubmit={(event) => void change(event)}>
+      <form id={FORM} class="length-form" onSubmit={(event) => void change(event)}>
         <label class="field">
           {say("length.length")}
           <Typed text={text} label={say("length.length")} id="length-value" />

@@ -1,7 +1,7 @@
 import "./BlockFields.css";
 import { sizeOf } from "../../map/area";
-import { atBlock, blockTitle, earlier, renamed, withAnother, withoutBlock } from "../../state/form/blocks";
-import { allBlocks } from "../../state/form/draft";
+import { atBlock, earlier, renamed, withAnother, withoutBlock } from "../../state/form/blocks";
+import { allBlocks, blockTitle } from "../../state/form/draft";
 import { fixed } from "../../state/format";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";

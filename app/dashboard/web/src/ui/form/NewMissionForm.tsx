@@ -8,8 +8,9 @@ import { boundsOf } from "../../map/geo";
 import type { PlaceMark } from "../../map/marks/marks";
 import { recoveryMarks } from "../../map/marks/recovery";
 import { placeOf } from "../../state/coordinates";
-import { blockTitle, flownBlocks, toMissions } from "../../state/form/blocks";
+import { faultInBlock, flownBlocks, toMissions } from "../../state/form/blocks";
 import {
+  blockTitle,
   copyOf,
   type Draft,
   emptyDraft,
@@ -139,11 +140,13 @@ export function NewMissionForm() {
     }
     const sent = new AbortController();
     sending.value = sent;
+    let taken = 0;
     try {
       const { tide_table: table, tide_source, floor_depth_m } = draft.value;
       const source = tide_source || say("mission.tideTable");
       const withTide = async (id: string) => {
         if (table) await api.setTide(id, { table, source });
+        taken += 1;
       };
       if (edited) {
         // What it follows stays as it is.
@@ -161,7 +164,8 @@ export function NewMissionForm() {
       refused.value = error;
       for (const { field, message, expected } of error.faults) {
         const words = [message, expected].filter(Boolean).join(say("mission.expected"));
-        faults.value = { ...faults.value, [fieldOf(field, draft.value)]: words };
+        const [key, fault] = faultInBlock(fieldOf(field, draft.value), words, draft.value, taken);
+        faults.value = { ...faults.value, [key]: fault };
       }
       faulty.value += 1;
     } finally {

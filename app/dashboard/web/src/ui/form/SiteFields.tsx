@@ -58,7 +58,7 @@ export function SiteFields() {
             label={say("search.site")}
           />
         </label>
-        <Button kind="tool" id="make-site" onClick={() => void describe()}>
+        <Button kind="link-button" id="make-site" onClick={() => void describe()}>
           {say("site.makeASiteOfThisArea")}
         </Button>
       </div>
@@ -120,11 +120,11 @@ function Known({ site }: { site: string }) {
       {changes.value ? <Changes found={changes.value} /> : null}
       {known.length > 0 ? (
         <div class="row">
-          <Button kind="tool small" onClick={() => void download("map.tif")}>
+          <Button kind="link-button" onClick={() => void download("map.tif")}>
             {say("site.mapAsGeotiff")}
           </Button>
           {changes.value ? (
-            <Button kind="tool small" id="changes-file" onClick={() => void download("changes.tif")}>
+            <Button kind="link-button" id="changes-file" onClick={() => void download("changes.tif")}>
               {say("site.changesAsGeotiff")}
             </Button>
           ) : null}

@@ -3,9 +3,10 @@ import { api, type Described } from "../../api/client";
 import SPEC from "../../api/mission.json";
 import type { PlanView } from "../../api/types";
 import { sizeOf } from "../../map/area";
-import { blockTitle, comingFrom, toMissions } from "../../state/form/blocks";
+import { comingFrom, toMissions } from "../../state/form/blocks";
 import {
   allBlocks,
+  blockTitle,
   canPlan,
   cornersOf,
   estimate,

@@ -37,7 +37,9 @@ interface ButtonProps extends AriaAttributes {
   commands?: boolean;
   disabled?: boolean;
   title?: string;
-  onClick: (event: MouseEvent) => void;
+  /** Id of the form that it sends, as Enter in one of its fields does: only where the button may be pressed. */
+  form?: string;
+  onClick?: (event: MouseEvent) => void;
   children: ComponentChildren;
 }
 
@@ -47,17 +49,19 @@ export function Button({
   commands = false,
   disabled,
   title,
+  form,
   onClick,
   ...rest
 }: ButtonProps) {
   const why = commands ? whyNotCommand.value : "";
   // The second click of a double click is no second command, and none for what has come to lie under it.
   const once = (event: MouseEvent) => {
-    if (event.detail < 2) onClick(event);
+    if (event.detail < 2) onClick?.(event);
   };
   return (
     <button
-      type="button"
+      type={form ? "submit" : "button"}
+      form={form}
       class={kind}
       data-testid={id}
       disabled={disabled || why !== ""}

@@ -13,6 +13,10 @@ it("a vehicle that is not heard tells for how long on the map, a simulation that
     const vehicle = { view, waypoint: undefined, colour: "#fff", age_s: 421, stale: true };
     return VehicleMark({ vehicle })?.props as { age: string; title: string; stale: boolean };
   };
-  expect(mark("imc")).toMatchObject({ age: "7 min 01 s", stale: true });
+  expect(mark("imc")).toMatchObject({
+    age: "7 min 01 s",
+    title: "a, position 7 min 01 s old",
+    stale: true,
+  });
   expect(mark("sim")).toMatchObject({ age: "", title: "a", stale: true });
 });

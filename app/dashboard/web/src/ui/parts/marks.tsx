@@ -36,7 +36,7 @@ export function VehicleMark({ vehicle, past }: { vehicle?: Vehicle; past?: Past 
       left={!active}
       alarm={breach}
       age={old ? age(vehicle.age_s) : ""}
-      title={`${name}${vehicle.stale && !away ? say("marks.lastHeardAgo", { ageS: age(vehicle.age_s) }) : ""}`}
+      title={`${name}${vehicle.stale && !away ? say("marks.positionOld", { ageS: age(vehicle.age_s) }) : ""}`}
     />
   );
 }

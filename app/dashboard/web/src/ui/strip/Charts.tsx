@@ -33,7 +33,7 @@ const METRICS = {
   },
   age_s: {
     get title() {
-      return say("charts.secondsSinceHeard");
+      return say("fleet.positionAge");
     },
     unit: "s",
     down: false,
