@@ -4,7 +4,7 @@ import ipaddress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from app.commands.command import CommandError
+from app.commands.command import CommandError, meant_id
 
 if TYPE_CHECKING:
     import ssl
@@ -62,10 +62,10 @@ class RunningService:
 
     def ask(self, begin: str, method: str, path: str, **content: Any) -> Any:
         """Send something for the one mission whose id begins so; returns the answer. Raises CommandError."""
-        meant = [mission["id"] for mission in self.missions() if mission["id"].startswith(begin)]
-        if len(meant) != 1:
-            raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}")
-        return self._answer(method, f"/missions/{meant[0]}/{path}", **content)
+        return self._answer(method, f"/missions/{self._meant(begin)}/{path}", **content)
+
+    def _meant(self, begin: str) -> str:
+        return meant_id(begin, {one["id"]: one["name"] for one in self.missions()}, "missions", f"at {self.url}")
 
     def _answer(self, method: str, path: str, **content: Any) -> Any:
         import httpx
