@@ -56,9 +56,10 @@ class RunningService:
     ) -> None:
         self._client.close()
 
-    def missions(self) -> list[Any]:
-        """Return its missions as it lists them. Raises CommandError."""
-        return list(self._answer("GET", "/missions"))
+    def missions(self, before: str = "") -> list[Any]:
+        """Return its missions as it lists them, or those after the one whose id begins so. Raises CommandError."""
+        asked = {"before": self._meant(before)} if before else {}
+        return list(self._answer("GET", "/missions", params=asked))
 
     def ask(self, begin: str, method: str, path: str, **content: Any) -> Any:
         """Send something for the one mission whose id begins so; returns the answer. Raises CommandError."""
