@@ -47,7 +47,8 @@ class Links:
         reason = status.reason
         if control is not None and not engaged and control.refusal is not None and not reason:
             reason = f"not ours: {control.refusal.reason}"
-        same = known is not None and (known.state, known.engaged) == (status.state, engaged)
+        now_it_is = (node.name, status.state, engaged)
+        same = known is not None and (known.vehicle, known.state, known.engaged) == now_it_is
         # The seconds in the reason for a silence are no news.
         silent = status.state in (NodeState.LOST, NodeState.EXPECTED_OFFLINE)
         if same and (silent or (known is not None and known.reason == reason)):

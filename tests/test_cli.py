@@ -583,7 +583,11 @@ def test_missions_are_listed_paused_and_aborted_where_there_is_no_browser(
         assert listed[1].startswith(f"{one}  A: running")
         asked = ("missions", "list", "--json", "--state", "running", "--state", "paused")
         (running,) = json.loads(bathyfleet(*asked, "--url", f"{url}/api/v1/").stdout)
-        assert (running["id"], running["state"], running["progress"]["step"]) == (one, "running", 0)
+        assert (running["id"], running["state"], "step" in running["progress"]) == (one, "running", True)
+        assert bathyfleet("missions", "list", "--limit", "1", **here).stdout.splitlines() == listed[:1]
+        assert bathyfleet("missions", "list", "--before", two[:8], **here).stdout.startswith(f"{one}  A: running")
+        unknown = bathyfleet("missions", "pause", "none-such", **here)
+        assert (unknown.code, f"There are: {two} B; {one} A, at {url}" in unknown.stderr) == (1, True), unknown.stderr
         assert "no missions that are failed" in bathyfleet("missions", "list", "--state", "failed", **here).stdout
         longer = bathyfleet("missions", "budget", "--steps", "60", **here)
         assert (longer.code, longer.stdout.startswith(f"{one}  A: 60 steps")) == (0, True), longer.stderr

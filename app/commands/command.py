@@ -1,6 +1,6 @@
 """What commands share. Heavy imports stay inside functions, so that ``--help`` answers at once."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -20,6 +20,11 @@ USAGE = 2
 INTERRUPTED = 130
 """Exit codes: something failed, the command cannot be understood, or it was interrupted."""
 
+SHORTEST_PREFIX = 4
+"""Characters of an id's beginning, so that a slip of the finger means nobody else."""
+MOST_SHOWN = 5
+"""Of those that can be meant."""
+
 Database = Annotated[
     str | None,
     typer.Option(help="Database URL: sqlite+aiosqlite:///FILE or postgresql+asyncpg://USER:PASSWORD@HOST/NAME"),
@@ -32,6 +37,30 @@ class CommandError(Exception):
     def __init__(self, message: str, remedy: str = "") -> None:
         super().__init__(message)
         self.remedy = remedy
+
+
+def id_with_prefix(prefix: str, named: Mapping[str, str], what: str, where: str) -> str:
+    """Return the one id that begins so, of those that are ``named``, newest first. Raises CommandError.
+
+    ``what`` they are of, and ``where`` they are, is told to who has to choose.
+    """
+    from imc_bridge.printable import printable
+
+    if prefix in named:
+        return prefix
+    if len(prefix) < SHORTEST_PREFIX:
+        raise CommandError(
+            f"{prefix!r} is too short for the beginning of an id", f"Give at least {SHORTEST_PREFIX} characters"
+        )
+    meant = [id_ for id_ in named if id_.startswith(prefix)]
+    if len(meant) == 1:
+        return meant[0]
+    shown = [f"{id_} {printable(named[id_])}" for id_ in meant or named]
+    more = f"; and {len(shown) - MOST_SHOWN} more" if len(shown) > MOST_SHOWN else ""
+    candidates = "; ".join(shown[:MOST_SHOWN]) or "none"
+    raise CommandError(
+        f"{len(meant)} {what} have ids that begin with {prefix!r}", f"There are: {candidates}{more}, {where}"
+    )
 
 
 def command_settings(**overrides: Any) -> "Settings":

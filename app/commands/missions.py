@@ -44,6 +44,8 @@ def list_missions(
     states: Annotated[
         list[str] | None, typer.Option("--state", help="Only missions in this state, as often as needed.")
     ] = None,
+    limit: Annotated[int | None, typer.Option(min=1, help="Most missions.", show_default="all")] = None,
+    before: Annotated[str, typer.Option(help="Only missions older than this: its id, or the begin of it.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, as GET /api/v1/missions answers.")] = False,
     url: Url = None,
     token: Token = None,
@@ -58,7 +60,7 @@ def list_missions(
         if state not in list(MissionState):
             raise typer.BadParameter(f"{state!r} is not one of {', '.join(MissionState)}", param_hint="--state")
     with _service(url, token) as service:
-        found = [one for one in service.missions() if one["state"] in wanted]
+        found = [one for one in service.missions(before) if one["state"] in wanted][:limit]
     if as_json:
         typer.echo(json.dumps(found, indent=2))
         return

@@ -4,7 +4,7 @@ import ipaddress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from app.commands.command import CommandError
+from app.commands.command import CommandError, id_with_prefix
 
 if TYPE_CHECKING:
     import ssl
@@ -66,16 +66,17 @@ class RunningService:
     ) -> None:
         self._client.close()
 
-    def missions(self) -> list[Any]:
-        """Return its missions as it lists them. Raises CommandError."""
-        return list(self._answer("GET", "/missions"))
+    def missions(self, before: str = "") -> list[Any]:
+        """Return its missions as it lists them, or those after the one whose id begins so. Raises CommandError."""
+        asked = {"before": self._meant(before)} if before else {}
+        return list(self._answer("GET", "/missions", params=asked))
 
     def ask(self, begin: str, method: str, path: str, **content: Any) -> Any:
         """Send something for the one mission whose id begins so; returns the answer. Raises CommandError."""
-        meant = [mission["id"] for mission in self.missions() if mission["id"].startswith(begin)]
-        if len(meant) != 1:
-            raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}")
-        return self._answer(method, f"/missions/{meant[0]}/{path}", **content)
+        return self._answer(method, f"/missions/{self._meant(begin)}/{path}", **content)
+
+    def _meant(self, begin: str) -> str:
+        return id_with_prefix(begin, {one["id"]: one["name"] for one in self.missions()}, "missions", f"at {self.url}")
 
     def _answer(self, method: str, path: str, **content: Any) -> Any:
         import httpx

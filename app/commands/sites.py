@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.command import CommandError, Database, command_settings
+from app.commands.command import Database, command_settings, id_with_prefix
 from app.commands.data import write_product
 from app.commands.stored_missions import with_missions
 
@@ -22,12 +22,9 @@ CHANGES = "changes."
 
 
 async def _meant(service: "MissionService", begin: str) -> "SiteView":
-    every = await service.sites.all()
-    meant = [site for site in every if site.id.startswith(begin)]
-    if len(meant) != 1:
-        known = "; ".join(f"{site.id} {site.name}" for site in every[:5]) or "none"
-        raise CommandError(f"{len(meant)} sites have ids that begin with {begin!r}", f"There are: {known}")
-    return meant[0]
+    known = {site.id: site for site in await service.sites.all()}
+    named = {site.id: site.name for site in known.values()}
+    return known[id_with_prefix(begin, named, "sites", "in this database")]
 
 
 @sites_app.command("list")

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from app.commands.command import CommandError, check_database, noted
+from app.commands.command import CommandError, check_database, id_with_prefix, noted
 
 T = TypeVar("T")
 
@@ -73,10 +73,6 @@ async def meant_mission(service: "MissionService", begin: str) -> "LiveMission":
     """Return the one mission whose id begins so. Raises CommandError."""
     from app.storage.upkeep.prepare import name_of
 
-    every = await service.missions()
-    meant = [summary.id for summary in every if summary.id.startswith(begin)]
-    if len(meant) != 1:
-        ids = "; ".join(f"{summary.id} {summary.name}" for summary in every[:5]) or "none"
-        remedy = f"There are: {ids}, in database {name_of(service.settings.database_url)}"
-        raise CommandError(f"{len(meant)} missions have ids that begin with {begin!r}", remedy)
-    return await service.get(meant[0])
+    named = {summary.id: summary.name for summary in await service.missions()}
+    database = name_of(service.settings.database_url)
+    return await service.get(id_with_prefix(begin, named, "missions", f"in database {database}"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from enum import IntEnum
 
@@ -80,7 +79,7 @@ class Capacity:
         """Whether a node that never answered is no longer shown."""
         standing = standing_of(node)
         kept_s = UNANNOUNCED_KEPT_WALL_S if standing is Standing.UNANNOUNCED else UNHEARD_KEPT_WALL_S
-        if standing is Standing.HEARD or now - _last_sign(node) <= kept_s * time_scale:
+        if standing is Standing.HEARD or now - node.last_sign <= kept_s * time_scale:
             return False
         return not self.keeps(node)
 
@@ -137,7 +136,7 @@ class Capacity:
         of_host = [node for node in alike if node.host == host]
         for group, limit in ((of_host, most_of_host), (alike, most)):
             if len(group) >= limit:
-                longest = min(group, key=_last_sign)
+                longest = min(group, key=lambda node: node.last_sign)
                 return (True, longest) if _is_silent(longest, now) else (False, None)
         if len(self._nodes) < MAX_NODES:
             return True, None
@@ -146,14 +145,10 @@ class Capacity:
 
     def _weakest(self, may_leave: Callable[[Node], bool]) -> Node | None:
         leavers = [node for node in self._nodes.values() if not self.keeps(node) and may_leave(node)]
-        return min(leavers, key=lambda node: (standing_of(node), _last_sign(node)), default=None)
-
-
-def _last_sign(node: Node) -> float:
-    return max((at for at in (node.heard_at, node.announced_at) if at is not None), default=-math.inf)
+        return min(leavers, key=lambda node: (standing_of(node), node.last_sign), default=None)
 
 
 def _is_silent(node: Node, now: float) -> bool:
     if node.announcement is None:
-        return now - _last_sign(node) > UNANNOUNCED_SILENT_S
+        return now - node.last_sign > UNANNOUNCED_SILENT_S
     return node.given_up(now)

@@ -212,11 +212,25 @@ class Node:
         self.controller = None
         self._latest.clear()
 
+    @property
+    def last_sign(self) -> float:
+        """When it spoke or announced itself last."""
+        return max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
+
+    def replaced_by(self, other: Node, now: float) -> bool:
+        """Whether it is another computer of the same vehicle that speaks now, under the same name and another id.
+
+        It speaks from an address of this one, which has been silent since it announced itself first. Elsewhere it would
+        be another vehicle, of the name of one that may be under water.
+        """
+        since = other.first_announced_at
+        gone = since is not None and self.last_sign < since and now - self.last_sign > self.lost_after_s
+        return gone and other.address in self.addresses
+
     def given_up(self, now: float) -> bool:
         """Whether it was silent long enough for another host to announce its id."""
-        last = max((at for at in (self.heard_at, self.announced_at) if at is not None), default=-math.inf)
         patience = max(ANNOUNCES_MISSED * self.settings.announce_period_s, min(self.patience_s, LONGEST_DIVE_S))
-        return now - last > patience
+        return now - self.last_sign > patience
 
     # Packets and the vehicle's clock
 

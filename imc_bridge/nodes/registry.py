@@ -114,9 +114,8 @@ class NodeRegistry:
         if node.announcement is None or node.name == node.announcement.name:
             return
         holder = self.named(node.announcement.name)
-        if holder is not None and standing_of(holder) is not Standing.HEARD and not self.capacity.in_use(holder):
-            self._name(holder, "")
-            self._name(node, node.announcement.name)
+        if holder is not None and standing_of(holder) is not Standing.HEARD:
+            self._take_over(node.announcement.name, node)
 
     def _make_room(self, standing: Standing, host: str, name: str, now: float) -> bool:
         there_is, leaver = self.capacity.room(standing, host, name, now)
@@ -234,15 +233,36 @@ class NodeRegistry:
         self._look_for_namesakes(now)
 
     def _look_for_namesakes(self, now: float) -> None:
-        """Note who announces the name of another: after a restart of ours either could be called by it."""
+        """Note who announces the name of another: after a restart of ours either could be called by it.
+
+        Who is there alone has the name, whoever had it before.
+        """
         named: dict[str, Node] = {}
-        for node in self._nodes.values():
+        heard = [node for node in self._nodes.values() if standing_of(node) is Standing.HEARD]
+        for node in heard:
             node.namesake = None
-            if node.announcement is None or standing_of(node) is not Standing.HEARD or node.given_up(now):
+        for node in sorted(heard, key=lambda node: -node.last_sign):
+            if node.announcement is None or node.given_up(now):
                 continue
             other = named.setdefault(node.announcement.name, node)
-            if other is not node:
+            if other is not node and (self.capacity.in_use(node) or not node.replaced_by(other, now)):
                 node.namesake, other.namesake = other, node
+        for name, node in named.items():
+            if node.namesake is None:
+                self._take_over(name, node)
+
+    def _take_over(self, name: str, node: Node) -> None:
+        """Give a node a name that another has, which is not in use, and the addresses that both have announced."""
+        holder = self.named(name)
+        if holder is None or holder is node or self.capacity.in_use(holder):
+            return
+        self._name(holder, "")
+        self._name(node, name)
+        if standing_of(holder) is Standing.HEARD:
+            self._name(holder, name)
+        for address in node.addresses:
+            if self._by_address.get(address) is holder:
+                self._by_address[address] = node
 
     def _contested(self, node: Node, new: Announcement, now: float) -> bool:
         """Note which node claims the id; return whether a second one does, whose announce must not count.

@@ -35,7 +35,7 @@ from tests.support.storage.databases import Databases
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
 # what they are called, profiles go down, times go on, steps were flown, lengths have one unit, there is such a site,
-# there is a reference grid to differ from.
+# there is a reference grid to differ from, and such a mission to go on after.
 BEYOND_THE_SCHEMA = {
     "changeSite",
     "createMission",
@@ -55,6 +55,7 @@ BEYOND_THE_SCHEMA = {
     "getTile",
     "getTileJson",
     "importSoundings",
+    "listMissions",
     "previewPlan",
     "proposeZones",
     "setBudget",

@@ -217,6 +217,9 @@ def test_pages_of_a_listing_come_one_after_the_other(client: Client) -> None:
     audit = [entry.id for page in client.pages(client.list_audit, mission=mission.id, limit=1) for entry in page]
     assert audit == [entry.id for entry in client.list_audit(mission=mission.id)]
     assert list(client.pages(client.list_steps, mission.id)) == [[]]
+    client.create_mission(mission_spec())
+    listed = [found.id for page in client.pages(client.list_missions, limit=1) for found in page]
+    assert (len(listed) > 1, listed) == (True, [found.id for found in client.list_missions()])
     client.abort_mission(mission.id)
 
 

@@ -10,8 +10,10 @@ from imc_bridge import Bridge, BridgeSettings, RefusedError
 from imc_bridge.control.control import Phase
 from imc_bridge.doctor.diagnosis import Cause
 from imc_bridge.doctor.doctor import judge
+from imc_bridge.events import LinkChange, NodeState
 from imc_bridge.network.discovery import own_announce
 from imc_bridge.network.transport import Address
+from imc_bridge.nodes.node import LONGEST_DIVE_S
 
 START_S = 1.7e9
 HERE, THERE = ("10.0.0.1", 6002), ("10.0.0.77", 6002)
@@ -24,6 +26,7 @@ class Scene:
         self.now_s = 0.0
         self.plan = ""
         """What the vehicles execute."""
+        self.depth_m = 0.0
         self.sent: list[tuple[Any, Address]] = []
         self.bridge = Bridge(BridgeSettings(), clock=lambda: self.now_s, wall_clock=lambda: START_S + self.now_s)
         self.bridge.listen(lambda event: None)
@@ -62,7 +65,7 @@ class Scene:
         mode, doing, place = imcpy.VehicleState(), imcpy.PlanControlState(), imcpy.EstimatedState()
         mode.op_mode = imcpy.VehicleState.OperationModeEnum(3 if self.plan else 0)
         doing.state, doing.plan_id = imcpy.PlanControlState.StateEnum(3 if self.plan else 1), self.plan
-        place.lat, place.lon = math.radians(41.0), math.radians(-8.7)
+        place.lat, place.lon, place.depth = math.radians(41.0), math.radians(-8.7), self.depth_m
         for message in (mode, doing, place):
             self.bridge.on_packet(self.packet(message, imc_id), address)
 
@@ -117,6 +120,62 @@ async def test_of_two_vehicles_with_one_name_neither_is_engaged(first: int) -> N
     # One of them has gone.
     scene.live(60.0, (first, HERE), announced=True)
     assert [node.conflict for node in scene.bridge.nodes()] == [None, None]
+
+
+def dived(scene: Scene) -> None:
+    """A vehicle goes down in a plan of its own console, and falls silent."""
+    scene.announce()
+    scene.live(15.0, (0x1E, HERE), announced=True)
+    scene.plan, scene.depth_m = "survey", 5.0
+    scene.live(1.0, (0x1E, HERE))
+    scene.plan, scene.depth_m = "", 0.0
+    scene.live(60.0)
+
+
+async def test_a_vehicle_with_another_computer_at_the_same_address_is_led_by_its_name() -> None:
+    scene = Scene()
+    dived(scene)
+    (old,) = scene.bridge.nodes()
+    assert old.state is NodeState.EXPECTED_OFFLINE
+    told: list[LinkChange] = []
+    scene.bridge.listen(lambda event: told.append(event) if isinstance(event, LinkChange) else None)
+    scene.announce(0x1F, uid=2)
+    scene.live(15.0, (0x1F, HERE), announced=True)
+    names = {node.imc_id: node.name for node in scene.bridge.nodes()}
+    assert names == {0x1E: "lauv-x (0x001E)", 0x1F: "lauv-x"}
+    assert [node.conflict for node in scene.bridge.nodes()] == [None, None]
+    assert [change.state for change in told if change.vehicle == "lauv-x"][-1] is NodeState.READY
+    assert scene.bridge._registry.at(HERE) is scene.bridge._registry[0x1F]
+    # The other one was not gone.
+    scene.announce()
+    scene.live(1.0, (0x1E, HERE), (0x1F, HERE))
+    with pytest.raises(RefusedError, match="announce one name"):
+        await scene.bridge.engage("lauv-x")
+
+
+@pytest.mark.parametrize("speakers", [(0x1F,), (0x1E, 0x1F)])
+async def test_who_comes_while_another_of_its_name_dives_or_is_heard_is_not_engaged(speakers: tuple[int, ...]) -> None:
+    """A vehicle under water is as silent as one that has another computer; elsewhere another vehicle speaks."""
+    scene = Scene()
+    dived(scene)
+    address = ("10.0.0.2", 6002) if speakers == (0x1F,) else HERE
+    scene.announce(0x1F, address, uid=2)
+    scene.live(60.0, *((imc_id, address) for imc_id in speakers), announced=True)
+    for node in scene.bridge.nodes():
+        if node.imc_id not in speakers:
+            continue
+        with pytest.raises(RefusedError, match="announce one name"):
+            await scene.bridge.engage(node.name)
+
+
+def test_a_vehicle_that_was_given_up_leaves_its_name_to_the_one_that_is_heard() -> None:
+    scene = Scene()
+    dived(scene)
+    scene.announce(0x1F, ("10.0.0.2", 6002))
+    scene.live(1.0, (0x1F, ("10.0.0.2", 6002)))
+    scene.now_s += LONGEST_DIVE_S
+    scene.live(1.0, (0x1F, ("10.0.0.2", 6002)))
+    assert {node.imc_id: node.name for node in scene.bridge.nodes()}[0x1F] == "lauv-x"
 
 
 def test_a_name_that_is_announced_and_under_which_nothing_speaks_blocks_no_vehicle() -> None:

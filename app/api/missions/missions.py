@@ -12,6 +12,7 @@ from app.api.mission import Mission
 from app.api.peer_lists import from_peers
 from app.api.schemas import API, ActionRequest, EndRequest, MissionId, NoteRequest, VehicleName
 from app.api.state import Service, State
+from app.missions.errors import MissionNotFoundError
 from app.missions.operations import history
 from app.missions.preflight.survey import preflight
 from app.missions.running.homecoming import call_home, hold
@@ -79,12 +80,40 @@ async def create_mission(
     return mission
 
 
-@router.get("", operation_id="listMissions", summary="List the missions")
-async def list_missions(request: Request, state: State, service: Service, reader: Reader) -> list[MissionSummary]:
+@router.get(
+    "",
+    operation_id="listMissions",
+    summary="List the missions",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def list_missions(
+    request: Request,
+    state: State,
+    service: Service,
+    reader: Reader,
+    before: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=64,
+            pattern=r"^[A-Za-z0-9_-]+$",
+            description="Only missions older than that of this id",
+        ),
+    ] = None,
+    limit: Annotated[
+        int | None, Query(ge=1, le=1000, description="Most missions in the answer; all of them unless given")
+    ] = None,
+) -> list[MissionSummary]:
     """Return every mission, newest first, with its state and progress."""
     # One that ended and that no process has in memory is listed by each.
     found = {one.id: one for one in [*await service.missions(), *await from_peers(request, state, _summaries)]}
-    return sorted(found.values(), key=lambda mission: mission.created_at, reverse=True)
+    newest = sorted(found.values(), key=lambda mission: (mission.created_at, mission.id), reverse=True)
+    if before is None:
+        return newest[:limit]
+    if before not in found:
+        raise MissionNotFoundError(f"there is no mission {before!r} any more", "begin again without `before`")
+    older = newest[newest.index(found[before]) + 1 :]
+    return older[:limit]
 
 
 @router.get(

@@ -48,6 +48,9 @@ LEVEL_WORDS = frozenset({
 })  # fmt: skip
 """In a column's name or a sentence without one of these such a word is part of a name, as in Key West."""
 
+_PLACES = re.compile(r"\b(?:key west|west (?:dock|haven|point|port))\b", re.IGNORECASE)
+"""What harbours are called, also in capitals, whose names hold one of those words where no zone is written so."""
+
 _SHIFT = r"[-+\u2212]\s?(?=[0:]*[1-9])(?:1[0-4]|0?\d)(?::?\d\d)?(?!\d)"
 _SHIFTED = re.compile(rf"\b(?:UTC|GMT)\s?{_SHIFT}", re.IGNORECASE)
 _IS_UTC = re.compile(r"(?<![^\W_])(?:UTC|GMT)(?![^\W_])|[(\[]\s?Z\s?[)\]]|\btime Z\b", re.IGNORECASE)
@@ -131,7 +134,7 @@ def _states_utc(words: str, number: int, *, judge: bool) -> bool:
     """
     if number > JUDGED_LINES:
         return False
-    words = " ".join(words[:JUDGED_CHARACTERS].split())
+    words = _PLACES.sub("", " ".join(words[:JUDGED_CHARACTERS].split()))
     # When a file was made is not the zone of its times.
     zone = "" if _CLOCK_TIME.search(_SHIFTED.sub("", words)) else _other_zone(words)
     if judge and zone:

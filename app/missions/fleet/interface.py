@@ -391,6 +391,10 @@ class PolledVehicles(Protocol):
         """Note that a vehicle has the waypoint of ``step``."""
         ...
 
+    def told_to_wait(self, vehicle: str) -> None:
+        """Note that a vehicle was told to hold where it is for now."""
+        ...
+
     def told_to_stop(self, vehicle: str, mission_id: str) -> None:
         """Note that a vehicle was told to stop."""
         ...

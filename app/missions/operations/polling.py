@@ -56,8 +56,11 @@ async def waypoint(
         state = "ending" if state is MissionState.RUNNING else state
         raise ConflictError(f"the mission is {state}: stop and hold", "ask again after it was started or resumed")
     if (withdrawal := _staying(member)) is not None:
-        if link is not None and (withdrawal.over or withdrawal.response is Response.STOP):
-            link.told_to_stop(vehicle, live.id)
+        if link is not None:
+            if withdrawal.over or withdrawal.response is Response.STOP:
+                link.told_to_stop(vehicle, live.id)
+            else:
+                link.told_to_wait(vehicle)
         raise ConflictError(f"{vehicle!r} stays where it is ({withdrawal.why}): stop and hold", "ask again later")
     found = newer()
     if found is not None and link is not None:

@@ -255,3 +255,20 @@ async def test_missions_that_ended_and_searches_keep_their_length(
     assert "search.window_s" in refused.json()["detail"]
     assert "PUT /api/v1/missions/{id}" in refused.json()["remedy"]
     assert (await client.put("/missions/nobody/budget", json={"steps": 7})).status_code == 404
+
+
+async def test_missions_are_listed_in_pages_where_these_are_asked_for(client: httpx.AsyncClient) -> None:
+    made = [(await client.post("/missions", json=mission_spec())).json()["id"] for _ in range(3)]
+
+    async def listed(**query: str | int) -> list[str]:
+        return [one["id"] for one in (await client.get("/missions", params=query)).json()]
+
+    newest = await listed()
+    assert newest[:3] == made[::-1]
+    assert await listed(limit=2) == newest[:2]
+    assert await listed(before=made[1]) == newest[2:]
+    assert await listed(before=made[2], limit=1) == newest[1:2]
+    gone = await client.get("/missions", params={"before": "nowhere"})
+    assert gone.status_code == httpx.codes.NOT_FOUND
+    assert gone.json()["remedy"] == "begin again without `before`"
+    assert (await client.get("/missions", params={"limit": 0})).status_code == httpx.codes.UNPROCESSABLE_ENTITY

@@ -33,6 +33,7 @@ from app.missions.fleet.links.simulated.launch import Launch
 from app.missions.settings import SimulationSettings
 from app.missions.spec.vehicle import Sensor
 from imc_bridge import BridgeSettings
+from imc_bridge.control.plans import leg_time_s
 from simulator.dune import DuneFleet, DuneOptions, default_specs
 from simulator.dune.plan import PlanState
 from simulator.floors import seafloors
@@ -483,6 +484,60 @@ async def test_a_vehicle_that_posts_no_place_where_it_can_be_is_heard_and_blind(
     assert told.position_age_s is not None
     assert told.report_age_s == told.position_age_s > 0.2 > told.age_s
     assert not post(0.0).without_position
+    await link.close()
+
+
+async def test_a_vehicle_that_asks_on_and_does_not_tell_where_it_is_is_blind_once_it_should_have_arrived() -> None:
+    link = RestFleetLink(1000.0, lost_after_s=0.2)
+    await link.start(lambda _event: None)
+    loop, times_s = asyncio.get_running_loop(), itertools.count(1000.0)
+    here, there = Position(LAT, LON, 1.0), Position(LAT + 1e-3, LON, 1.0)
+    leg_s = leg_time_s(horizontal_distance_m(here.lat_lon, there.lat_lon), 1.0, 1.0) / 1000.0
+
+    def post(place: Position) -> None:
+        link.heard(VehicleReport("r", next(times_s), place))
+
+    def asks(step: int) -> bool:
+        """Ask for what is newer than a step's waypoint; whether it is taken for blind then."""
+        link.has_waypoint("r", step)
+        return link.vehicles()[0].without_position
+
+    post(here)
+    await link.engage("r")
+    sent_s = loop.time()
+    assert not asks(-1)
+    await until(lambda: not asks(-1) and loop.time() - sent_s > 0.3, "it waits for a waypoint for long")
+    await link.order(WaypointOrder(MISSION, 1, "r", there, 1.0, 3.0, 1.0))
+    sent_s = loop.time()
+    assert not asks(1), "it has just been sent"
+    await until(lambda: asks(1), "it is never told of")
+    assert loop.time() - sent_s > 0.2 + leg_s, "it has the time for its leg"
+    await link.order(WaypointOrder(MISSION, 2, "r", here, 1.0, 3.0, 1.0))
+    assert asks(2), "another waypoint tells nothing of where it is"
+    link.told_to_wait("r")
+    await until(lambda: not asks(2), "it is held")
+    post(there)
+    assert not asks(2)
+    await link.close()
+
+
+async def test_a_vehicle_that_posts_only_what_it_kept_is_not_blind() -> None:
+    link = RestFleetLink(lost_after_s=0.1)
+    await link.start(lambda _event: None)
+    here, loop = Position(LAT, LON, 1.0), asyncio.get_running_loop()
+    link.heard(VehicleReport("r", 1000.0, here))
+    await link.engage("r")
+    await link.order(WaypointOrder(MISSION, 1, "r", here, 50.0, 3.0, 1.0))
+    link.has_waypoint("r", 1)
+    sent_s, kept_s = loop.time(), itertools.count(500.0)
+
+    def posts_on() -> bool:
+        link.heard(VehicleReport("r", next(kept_s), here))
+        link.has_waypoint("r", 1)
+        assert not link.vehicles()[0].without_position
+        return loop.time() - sent_s > 0.3
+
+    await until(posts_on, "time passes")
     await link.close()
 
 

@@ -1,7 +1,8 @@
 """Vehicles that poll: they post their positions and soundings and fetch their waypoints over HTTP.
 
 A vehicle acknowledges a waypoint by fetching it and a stop by being told so; arrival is judged by the positions that it
-posts. Nothing is sent to it of our own accord, so it counts as lost when it has been silent for ``lost_after_s``.
+posts. Nothing is sent to it of our own accord, so it counts as lost when it has been silent for ``lost_after_s``. One
+that asks on without telling where it is may be under water, or tell only where it arrives: it has the time for its leg.
 """
 
 import asyncio
@@ -24,6 +25,7 @@ from app.missions.fleet.interface import (
     WaypointStatus,
 )
 from app.missions.fleet.links.visiting import VisitedLink, Visitor
+from imc_bridge.control.plans import leg_time_s
 from imc_bridge.nodes.plausibility import CONFIRMATIONS, PlausiblePlace, Step, moved_m, reach_m
 from imc_bridge.telemetry.soundings import StateSample
 
@@ -41,6 +43,8 @@ class _Poller(Visitor):
     """When it last told where it is, the event loop's time."""
     doubtful_since_s: float | None = None
     """Since when it has told only of places where it cannot be, the event loop's time; None: it has not."""
+    unplaced_since_s: float | None = None
+    """Since when it asks for more than the waypoint that it has, without a place told, the event loop's time."""
     newest_s: float = -math.inf
     """The newest time by its clock: what is older was kept until now."""
     newest_heard_s: float = 0.0
@@ -101,11 +105,21 @@ class RestFleetLink(VisitedLink):
                 reason=self._reason(p.state),
                 age_s=now_s - p.heard_s,
                 position_age_s=None if p.placed_s is None else now_s - p.placed_s,
-                without_position=p.doubtful_since_s is not None and p.heard_s - p.doubtful_since_s > self._lost_after_s,
+                without_position=self._without_position(p),
                 report=p.report,
             )
             for p in self._pollers.values()
         ]
+
+    def _without_position(self, poller: _Poller) -> bool:
+        if poller.doubtful_since_s is not None and poller.heard_s - poller.doubtful_since_s > self._lost_after_s:
+            return True
+        order, report = poller.order, poller.report
+        if order is None or report is None or poller.unplaced_since_s is None:
+            return False
+        away_m = horizontal_distance_m(report.position.lat_lon, order.position.lat_lon)
+        leg_s = leg_time_s(away_m, order.position.depth_m, order.speed_mps) / self._time_scale
+        return poller.heard_s - poller.unplaced_since_s > self._lost_after_s + leg_s
 
     async def engage(self, vehicle: str) -> None:
         """Let a vehicle follow. Raises VehicleRefusedError when it was never heard or is silent."""
@@ -188,7 +202,7 @@ class RestFleetLink(VisitedLink):
         """
         poller = self._touch(report.vehicle)
         now_s = asyncio.get_running_loop().time()
-        poller.doubtful_since_s = None
+        poller.doubtful_since_s = poller.unplaced_since_s = None
         older_s = poller.newest_s - report.time_s
         if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
@@ -212,6 +226,8 @@ class RestFleetLink(VisitedLink):
         if poller.order is not None and poller.order.step <= step and poller.status is WaypointStatus.SENT:
             self._report(poller, WaypointStatus.ACKNOWLEDGED)
             self._check_arrival(poller)
+        if poller.order is not None and poller.status is not WaypointStatus.SENT and poller.unplaced_since_s is None:
+            poller.unplaced_since_s = poller.heard_s
 
     def _check_arrival(self, poller: _Poller) -> None:
         order, report = poller.order, poller.report
@@ -220,12 +236,18 @@ class RestFleetLink(VisitedLink):
         if horizontal_distance_m(report.position.lat_lon, order.position.lat_lon) <= order.arrival_radius_m:
             self._report(poller, WaypointStatus.REACHED)
 
+    def told_to_wait(self, vehicle: str) -> None:
+        """Note that a vehicle was told to hold for now: it need not tell again and again where."""
+        poller = self._touch(vehicle)
+        poller.unplaced_since_s = None
+
     def told_to_stop(self, vehicle: str, mission_id: str) -> None:
         """Note that a vehicle was told to stop, which acknowledges the stop, also one that is yet to come."""
         if vehicle not in self._pollers:
             return
         poller = self._touch(vehicle)
         poller.stopping = False
+        poller.unplaced_since_s = None
         poller.told.set()
         if poller.order is not None and poller.order.mission_id == mission_id:
             poller.order = None

@@ -22,13 +22,26 @@ class Operations(ABC):
     def _call(self, call: Call[T]) -> T:
         """Make a request and return its answer."""
 
-    def list_missions(self) -> list[models.MissionSummary]:
-        """List the missions: ``GET /missions``."""
-        return self._call(Call[list[models.MissionSummary]]("GET", "/missions", list[models.MissionSummary]))
-
     def create_mission(self, body: models.MissionSpec | Mapping[str, Any]) -> models.MissionView:
         """Describe a new mission: ``POST /missions``."""
         return self._call(Call[models.MissionView]("POST", "/missions", models.MissionView, body=body))
+
+    def list_missions(self, *, before: str | None = None, limit: int | None = None) -> list[models.MissionSummary]:
+        """List the missions: ``GET /missions``.
+
+        Parameters
+        ----------
+        before : str
+            Only missions older than that of this id
+        limit : int, 1 to 1000
+            Most missions in the answer; all of them unless given
+        """
+        return self._call(Call[list[models.MissionSummary]](
+            "GET",
+            "/missions",
+            list[models.MissionSummary],
+            query={"before": before, "limit": limit},
+        ))
 
     def get_mission(self, mission_id: str) -> models.MissionView:
         """See a mission: ``GET /missions/{mission_id}``."""
@@ -1396,13 +1409,31 @@ class AsyncOperations(ABC):
     async def _call(self, call: Call[T]) -> T:
         """Make a request and return its answer."""
 
-    async def list_missions(self) -> list[models.MissionSummary]:
-        """List the missions: ``GET /missions``."""
-        return await self._call(Call[list[models.MissionSummary]]("GET", "/missions", list[models.MissionSummary]))
-
     async def create_mission(self, body: models.MissionSpec | Mapping[str, Any]) -> models.MissionView:
         """Describe a new mission: ``POST /missions``."""
         return await self._call(Call[models.MissionView]("POST", "/missions", models.MissionView, body=body))
+
+    async def list_missions(
+        self,
+        *,
+        before: str | None = None,
+        limit: int | None = None,
+    ) -> list[models.MissionSummary]:
+        """List the missions: ``GET /missions``.
+
+        Parameters
+        ----------
+        before : str
+            Only missions older than that of this id
+        limit : int, 1 to 1000
+            Most missions in the answer; all of them unless given
+        """
+        return await self._call(Call[list[models.MissionSummary]](
+            "GET",
+            "/missions",
+            list[models.MissionSummary],
+            query={"before": before, "limit": limit},
+        ))
 
     async def get_mission(self, mission_id: str) -> models.MissionView:
         """See a mission: ``GET /missions/{mission_id}``."""

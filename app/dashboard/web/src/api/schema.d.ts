@@ -7781,7 +7781,12 @@ export type $defs = Record<string, never>;
 export interface operations {
     listMissions: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Only missions older than that of this id */
+                before?: string;
+                /** @description Most missions in the answer; all of them unless given */
+                limit?: number;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -7808,6 +7813,15 @@ export interface operations {
             };
             /** @description Not allowed */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
