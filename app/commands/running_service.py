@@ -122,10 +122,13 @@ def own_url(settings: "Settings") -> str:
 
 def _usual_trust() -> "ssl.SSLContext":
     """Return what trusts the public authorities and those that this machine trusts, or SSL_CERT_FILE's alone."""
+    import os
+
     import httpx
 
     context = httpx.create_ssl_context()
-    context.load_default_certs()
+    if not os.environ.keys() & {"SSL_CERT_FILE", "SSL_CERT_DIR"}:
+        context.load_default_certs()
     return context
 
 

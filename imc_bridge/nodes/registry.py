@@ -9,7 +9,7 @@ from imc_bridge.network.discovery import Announcement, reachable_first
 from imc_bridge.network.transport import Address
 from imc_bridge.nodes.capacity import Capacity, Standing, standing_of
 from imc_bridge.nodes.newcomers import Newcomers
-from imc_bridge.nodes.node import ANNOUNCES_MISSED, Node
+from imc_bridge.nodes.node import ANNOUNCES_MISSED, LONGEST_DIVE_S, Node
 from imc_bridge.settings import BridgeSettings
 
 MAX_CLAIMS = 8
@@ -235,7 +235,8 @@ class NodeRegistry:
     def _look_for_namesakes(self, now: float) -> None:
         """Note who announces the name of another: after a restart of ours either could be called by it.
 
-        Who is there alone has the name, whoever had it before.
+        A new computer of a vehicle has its name at once, who is there alone otherwise once the other one cannot be
+        under water any more.
         """
         named: dict[str, Node] = {}
         heard = [node for node in self._nodes.values() if standing_of(node) is Standing.HEARD]
@@ -248,13 +249,19 @@ class NodeRegistry:
             if other is not node and (self.capacity.in_use(node) or not node.replaced_by(other, now)):
                 node.namesake, other.namesake = other, node
         for name, node in named.items():
-            if node.namesake is None:
+            holder = self.named(name)
+            if node.namesake is not None or holder is None or holder is node:
+                continue
+            if holder.replaced_by(node, now) or now - holder.last_sign > LONGEST_DIVE_S:
                 self._take_over(name, node)
 
     def _take_over(self, name: str, node: Node) -> None:
-        """Give a node a name that another has, which is not in use, and the addresses that both have announced."""
+        """Give a node a name that another has, and the addresses that both have announced.
+
+        Neither may be in use: whoever leads a vehicle stops it by its name.
+        """
         holder = self.named(name)
-        if holder is None or holder is node or self.capacity.in_use(holder):
+        if holder is None or self.capacity.in_use(holder) or self.capacity.in_use(node):
             return
         self._name(holder, "")
         self._name(node, name)

@@ -1,5 +1,6 @@
 """Systems that share what should be one's own: our id, a vehicle's name, a vehicle's id at another address."""
 
+import asyncio
 import math
 from typing import Any
 
@@ -166,6 +167,47 @@ async def test_who_comes_while_another_of_its_name_dives_or_is_heard_is_not_enga
             continue
         with pytest.raises(RefusedError, match="announce one name"):
             await scene.bridge.engage(node.name)
+
+
+async def test_a_vehicle_that_we_lead_keeps_its_name_as_long_as_it_may_be_under_water() -> None:
+    """Its plan ends by itself within minutes; that nobody leads it any more does not mean that another one is it."""
+    scene = Scene()
+    scene.announce()
+    scene.live(15.0, (0x1E, HERE), announced=True)
+    first = scene.bridge._registry[0x1E]
+    engaging = asyncio.create_task(scene.bridge.engage("lauv-x"))
+    await asyncio.sleep(0)
+    control = scene.bridge._controls.of(first)
+    while control.phase in (Phase.WAITING, Phase.STARTING):
+        scene.live(0.2, (0x1E, HERE), announced=True)
+        asked = [message.plan_id for message, _ in scene.sent if isinstance(message, imcpy.PlanControl)]
+        scene.plan = asked[-1] if asked else ""
+    assert control.phase is Phase.FOLLOWING
+    engaging.cancel()
+    scene.depth_m = 5.0
+    scene.live(2.0, (0x1E, HERE), announced=True)
+    scene.plan, scene.depth_m = "", 0.0
+    elsewhere = ("10.0.0.2", 6002)
+    scene.announce(0x1F, elsewhere, uid=2)
+    scene.live(300.0, (0x1F, elsewhere), announced=True)
+    assert first.given_up(scene.now_s)
+    assert not scene.bridge._controls.engaged(first)
+    assert {node.imc_id: node.name for node in scene.bridge.nodes()} == {0x1E: "lauv-x", 0x1F: "lauv-x (0x001F)"}
+
+
+def test_a_vehicle_that_is_led_is_not_called_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, elsewhere = Scene(), ("10.0.0.2", 6002)
+    registry = scene.bridge._registry
+    dived(scene)
+    scene.announce(0x1F, elsewhere)
+    scene.live(1.0, (0x1F, elsewhere))
+    monkeypatch.setattr(registry.capacity, "in_use", lambda node: node.imc_id == 0x1F)
+    scene.now_s += LONGEST_DIVE_S
+    scene.live(1.0, (0x1F, elsewhere))
+    assert registry[0x1F].name == "lauv-x (0x001F)"
+    monkeypatch.setattr(registry.capacity, "in_use", lambda _node: False)
+    scene.live(1.0, (0x1F, elsewhere))
+    assert registry[0x1F].name == "lauv-x"
 
 
 def test_a_vehicle_that_was_given_up_leaves_its_name_to_the_one_that_is_heard() -> None:

@@ -521,6 +521,55 @@ async def test_a_vehicle_that_asks_on_and_does_not_tell_where_it_is_is_blind_onc
     await link.close()
 
 
+async def test_a_vehicle_that_is_sent_elsewhere_on_its_way_has_the_time_for_both_ways() -> None:
+    link = RestFleetLink(1000.0, lost_after_s=0.5)
+    await link.start(lambda _event: None)
+    here, far, near = (Position(LAT + away, LON, 1.0) for away in (0.0, 3e-3, 1e-4))
+    loop, back_m = asyncio.get_running_loop(), horizontal_distance_m(far.lat_lon, near.lat_lon)
+    way_s = leg_time_s(horizontal_distance_m(here.lat_lon, far.lat_lon) + back_m, 1.0, 1.0) / 1000.0
+    link.heard(VehicleReport("r", 1000.0, here))
+    await link.engage("r")
+    sent_s = loop.time()
+    for step, place in enumerate((far, near), start=1):
+        await link.order(WaypointOrder(MISSION, step, "r", place, 1.0, 3.0, 1.0))
+        link.has_waypoint("r", step)
+
+    def is_blind() -> bool:
+        link.has_waypoint("r", 2)
+        return link.vehicles()[0].without_position
+
+    await until(is_blind, "it never told where it is")
+    assert loop.time() - sent_s > way_s
+    await link.close()
+
+
+async def test_a_vehicle_that_waits_where_it_was_sent_or_comes_back_after_silence_owes_no_place() -> None:
+    link = RestFleetLink(1000.0, lost_after_s=0.5)
+    await link.start(lambda _event: None)
+    here, there = Position(LAT, LON, 1.0), Position(LAT + 1e-4, LON, 1.0)
+    link.heard(VehicleReport("r", 1000.0, here))
+    await link.engage("r")
+    await link.order(WaypointOrder(MISSION, 1, "r", there, 1.0, 3.0, 1.0))
+    loop = asyncio.get_running_loop()
+    allowed_s = 0.5 + leg_time_s(horizontal_distance_m(here.lat_lon, there.lat_lon), 1.0, 1.0) / 1000.0
+    link.has_waypoint("r", 1)
+    await until(lambda: link.vehicles()[0].state is LinkState.LOST, "it is silent")
+    silent_s = loop.time()
+    await until(lambda: loop.time() - silent_s > allowed_s, "it is silent for longer than its way takes")
+    link.has_waypoint("r", 1)
+    assert not link.vehicles()[0].without_position, "it could not tell"
+    link.heard(VehicleReport("r", 1001.0, there))
+    arrived_s = loop.time()
+
+    def has_waited() -> bool:
+        link.has_waypoint("r", 1)
+        assert not link.vehicles()[0].without_position
+        return loop.time() - arrived_s > 2 * allowed_s
+
+    await until(has_waited, "it waits for its next waypoint")
+    await link.close()
+
+
 async def test_a_vehicle_that_posts_only_what_it_kept_is_not_blind() -> None:
     link = RestFleetLink(lost_after_s=0.1)
     await link.start(lambda _event: None)

@@ -44,7 +44,11 @@ class _Poller(Visitor):
     doubtful_since_s: float | None = None
     """Since when it has told only of places where it cannot be, the event loop's time; None: it has not."""
     unplaced_since_s: float | None = None
-    """Since when it asks for more than the waypoint that it has, without a place told, the event loop's time."""
+    """Since when it has a waypoint to go to and asks on without telling where it is, the event loop's time."""
+    unplaced_order: WaypointOrder | None = None
+    """The newest of the waypoints that it has got since then."""
+    unplaced_way_m: float = 0.0
+    """How far it is from where it told to be last over all of these, one after the other."""
     newest_s: float = -math.inf
     """The newest time by its clock: what is older was kept until now."""
     newest_heard_s: float = 0.0
@@ -53,6 +57,10 @@ class _Poller(Visitor):
     """Since when its times have been too far ahead, the event loop's time; None: they are not."""
     stopping: bool = False
     told: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def owes_no_place(self) -> None:
+        """Begin to wait for a place anew."""
+        self.unplaced_since_s = self.unplaced_order = None
 
     def latest_s(self, now_s: float, time_scale: float) -> float:
         """Return the latest time that its clock can tell, at the event loop's time ``now_s``."""
@@ -114,12 +122,11 @@ class RestFleetLink(VisitedLink):
     def _without_position(self, poller: _Poller) -> bool:
         if poller.doubtful_since_s is not None and poller.heard_s - poller.doubtful_since_s > self._lost_after_s:
             return True
-        order, report = poller.order, poller.report
-        if order is None or report is None or poller.unplaced_since_s is None:
+        order = poller.unplaced_order
+        if poller.order is None or order is None or poller.unplaced_since_s is None:
             return False
-        away_m = horizontal_distance_m(report.position.lat_lon, order.position.lat_lon)
-        leg_s = leg_time_s(away_m, order.position.depth_m, order.speed_mps) / self._time_scale
-        return poller.heard_s - poller.unplaced_since_s > self._lost_after_s + leg_s
+        way_s = leg_time_s(poller.unplaced_way_m, order.position.depth_m, order.speed_mps) / self._time_scale
+        return poller.heard_s - poller.unplaced_since_s > self._lost_after_s + way_s
 
     async def engage(self, vehicle: str) -> None:
         """Let a vehicle follow. Raises VehicleRefusedError when it was never heard or is silent."""
@@ -202,7 +209,8 @@ class RestFleetLink(VisitedLink):
         """
         poller = self._touch(report.vehicle)
         now_s = asyncio.get_running_loop().time()
-        poller.doubtful_since_s = poller.unplaced_since_s = None
+        poller.doubtful_since_s = None
+        poller.owes_no_place()
         older_s = poller.newest_s - report.time_s
         if 0.0 < older_s < KEPT_S and now_s - poller.newest_heard_s < self._lost_after_s:
             return
@@ -226,8 +234,21 @@ class RestFleetLink(VisitedLink):
         if poller.order is not None and poller.order.step <= step and poller.status is WaypointStatus.SENT:
             self._report(poller, WaypointStatus.ACKNOWLEDGED)
             self._check_arrival(poller)
-        if poller.order is not None and poller.status is not WaypointStatus.SENT and poller.unplaced_since_s is None:
-            poller.unplaced_since_s = poller.heard_s
+        self._count_unplaced(poller)
+
+    def _count_unplaced(self, poller: _Poller) -> None:
+        """Note that a vehicle has its waypoint: it owes a place once it can have gone there."""
+        order, report = poller.order, poller.report
+        if order is None or report is None or order == poller.unplaced_order:
+            return
+        if poller.status in (WaypointStatus.SENT, WaypointStatus.REACHED) or self._without_position(poller):
+            return
+        before = poller.unplaced_order
+        if before is None:
+            poller.unplaced_since_s, poller.unplaced_way_m = poller.heard_s, 0.0
+        begins = report.position if before is None else before.position
+        poller.unplaced_way_m += horizontal_distance_m(begins.lat_lon, order.position.lat_lon)
+        poller.unplaced_order = order
 
     def _check_arrival(self, poller: _Poller) -> None:
         order, report = poller.order, poller.report
@@ -238,8 +259,7 @@ class RestFleetLink(VisitedLink):
 
     def told_to_wait(self, vehicle: str) -> None:
         """Note that a vehicle was told to hold for now: it need not tell again and again where."""
-        poller = self._touch(vehicle)
-        poller.unplaced_since_s = None
+        self._touch(vehicle).owes_no_place()
 
     def told_to_stop(self, vehicle: str, mission_id: str) -> None:
         """Note that a vehicle was told to stop, which acknowledges the stop, also one that is yet to come."""
@@ -247,7 +267,7 @@ class RestFleetLink(VisitedLink):
             return
         poller = self._touch(vehicle)
         poller.stopping = False
-        poller.unplaced_since_s = None
+        poller.owes_no_place()
         poller.told.set()
         if poller.order is not None and poller.order.mission_id == mission_id:
             poller.order = None
@@ -261,6 +281,7 @@ class RestFleetLink(VisitedLink):
             poller = self._pollers[vehicle] = _Poller(vehicle, LinkState.UNKNOWN)
         poller.heard_s = now_s
         if poller.state in (LinkState.UNKNOWN, LinkState.LOST):
+            poller.owes_no_place()  # what it could not tell while it was not heard
             self._set_state(poller, LinkState.READY)
         return poller
 

@@ -10,7 +10,7 @@ import structlog
 
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.fleet.hub import FleetHub
-from app.missions.fleet.interface import FaultKind, LinkState
+from app.missions.fleet.interface import FaultKind, LinkState, VehicleInfo
 from app.missions.flight.legs.energy_range import EnergyRange
 from app.missions.flight.observation.waiting import until_next_look
 from app.missions.live.mission import LiveMission
@@ -130,12 +130,19 @@ class FailsafeWatch:
         judge = self._judges.get(member.name)
         if judge is None:
             judge = self._judges[member.name] = FailsafeJudge(overrides(self._live.spec, member))
-        unknown = TOLD_BY_VEHICLES if Failsafe.LINK_LOST in detected else frozenset()
-        found = judge.judge(detected, now_s, unknown)
+        found = judge.judge(detected, now_s, self._unknown(member))
         if self._live.spec.recovery_of(member.spec) is not None:
             return found
         # Nobody can be sent home who has none.
         return [replace(one, response=Response.WARN) if one.response is Response.RETURN else one for one in found]
+
+    def _unknown(self, member: Member) -> frozenset[Failsafe]:
+        """Return what cannot be told of a vehicle now, since it is not heard."""
+        link = self._hub.info(member.key)
+        if link.state is LinkState.LOST or (link.state is LinkState.EXPECTED_OFFLINE and not _is_heard(link)):
+            return TOLD_BY_VEHICLES
+        # Whom it obeys is asked of who is there at this moment.
+        return frozenset() if _is_heard(link) else frozenset({Failsafe.OTHER_CONSOLE})
 
     def _act(self, member: Member, found: list[Active]) -> None:
         strongest = next(iter(found), None)
@@ -205,8 +212,8 @@ class FailsafeWatch:
         breach = self._live.boundaries.breach(member.name)
         if breach and member.legs and member.withdrawal is None:
             found[Failsafe.GEOFENCE_LEFT] = f"it is {breach}"
-        is_heard = link.age_s is not None and link.age_s <= HEARD_S
-        if member.followed and not member.engaged and member.refusal and is_heard and not link.without_position:
+        refuses = member.followed and not member.engaged and member.refusal
+        if refuses and _is_heard(link) and not link.without_position:
             found[Failsafe.OTHER_CONSOLE] = member.refusal.removeprefix(f"{member.name}: ")
         return found
 
@@ -364,3 +371,7 @@ def overrides(spec: MissionSpec, member: Member) -> dict[Failsafe, Response]:
     if recovery is not None and recovery.on_lost_link is Homecoming.STOP:
         found[Failsafe.LINK_LOST] = Response.SURFACE
     return found | spec.failsafes
+
+
+def _is_heard(link: VehicleInfo) -> bool:
+    return link.age_s is not None and link.age_s <= HEARD_S

@@ -79,12 +79,13 @@ async def test_only_who_is_heard_can_follow_another_console(
     await act(service, mission.id, "abort")
 
 
+@pytest.mark.parametrize("silent", [LinkState.LOST, LinkState.EXPECTED_OFFLINE])
 async def test_what_a_silent_vehicle_told_last_is_not_over_until_it_tells_otherwise(
-    service: MissionService, monkeypatch: pytest.MonkeyPatch
+    service: MissionService, monkeypatch: pytest.MonkeyPatch, silent: LinkState
 ) -> None:
     monkeypatch.setitem(failsafes.TABLE, Failsafe.TOO_DEEP, replace(TABLE[Failsafe.TOO_DEEP], after_s=0.0, over_s=0.0))
-    info, state = FleetHub.info, LinkState.ENGAGED
-    monkeypatch.setattr(FleetHub, "info", lambda hub, key: replace(info(hub, key), state=state))
+    info, state, age_s = FleetHub.info, LinkState.ENGAGED, 0.0
+    monkeypatch.setattr(FleetHub, "info", lambda hub, key: replace(info(hub, key), state=state, age_s=age_s))
     live = await service.get((await service.create(sim_spec("a"))).id)
     watch, a = watch_of(live, service), live.team.members["a"]
     a.followed = True
@@ -96,10 +97,10 @@ async def test_what_a_silent_vehicle_told_last_is_not_over_until_it_tells_otherw
         return {one.failsafe for one in a.failsafes}
 
     assert in_force(40.0) == {Failsafe.TOO_DEEP}
-    state = LinkState.LOST
+    state, age_s = silent, 60.0
     for _ in range(3):
-        assert in_force(40.0) == {Failsafe.TOO_DEEP}
-    state = LinkState.ENGAGED
+        assert in_force(2.0) == {Failsafe.TOO_DEEP}
+    state, age_s = LinkState.ENGAGED, 0.0
     assert in_force(2.0) == set()
 
 

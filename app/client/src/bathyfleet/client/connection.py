@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import ssl
 import uuid
@@ -31,7 +32,8 @@ def root(address: str) -> str:
     url = httpx.URL(address)
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"address: {address!r} is not like {ADDRESS} or https://host:port")
-    return address.rstrip("/").removesuffix("/api/v1")
+    # Scheme and host in small letters: by the scheme certificates are checked.
+    return str(url).rstrip("/").removesuffix("/api/v1")
 
 
 def trust(address: str, verify: bool | ssl.SSLContext) -> ssl.SSLContext | None:
@@ -44,7 +46,7 @@ def trust(address: str, verify: bool | ssl.SSLContext) -> ssl.SSLContext | None:
     if isinstance(verify, ssl.SSLContext):
         return verify
     context = httpx.create_ssl_context(verify)
-    if verify:
+    if verify and not os.environ.keys() & {"SSL_CERT_FILE", "SSL_CERT_DIR"}:
         context.load_default_certs()  # what this machine trusts beside the public authorities
     return context
 

@@ -140,7 +140,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
           </div>
           <div class={vehicle.stale && !away ? "late" : ""} title={say("cards.sinceItToldWhereItIs")}>
             <dt>{say("cards.positionAge")}</dt>
-            <dd data-testid={`position-age-${v.name}`}>{age(vehicle.age_s)}</dd>
+            <dd data-testid={`position-age-${v.name}`}>{age(v.lat_deg === null ? null : vehicle.age_s)}</dd>
           </div>
         </dl>
       </Steady>

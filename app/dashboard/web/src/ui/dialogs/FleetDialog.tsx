@@ -71,7 +71,7 @@ function Line({ vehicle: v }: { vehicle: VehicleView }) {
           <a href={`#/missions/${v.mission_id}`}>{name ?? say("fleet.shownBelow")}</a>
         )}
       </td>
-      <td>{age(ageSeconds(v, listedAt.value, now.value))}</td>
+      <td>{age(v.lat_deg === null ? null : ageSeconds(v, listedAt.value, now.value))}</td>
       <td>{batteryWords(v)}</td>
       <td>{metres(v.depth_m)}</td>
       <td>{metres(v.altitude_m)}</td>

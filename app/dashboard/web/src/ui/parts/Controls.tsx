@@ -57,6 +57,7 @@ export function Button({
   // The second click of a double click is no second command, and none for what has come to lie under it.
   const once = (event: MouseEvent) => {
     if (event.detail < 2) onClick?.(event);
+    else event.preventDefault();
   };
   return (
     <button
