@@ -118,6 +118,12 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
         ('imc = "on"', {}, {}, "imc is 'on' (from bathyfleet.toml): input should be"),
         ("port = ", {}, {}, "bathyfleet.toml is not TOML"),
         (
+            '[simulation]\nfamily = "harbor"',
+            {},
+            {},
+            "simulation.family is 'harbor' (from bathyfleet.toml): use one of ",
+        ),
+        (
             "",
             {"BATHYFLEET_PROT": "1"},
             {},

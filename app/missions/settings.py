@@ -116,6 +116,15 @@ class SimulationSettings(Section):
         default=1.0, gt=0, le=10, description="How much more energy vehicles use than their endurance says"
     )
 
+    @field_validator("family")
+    @classmethod
+    def _is_a_family(cls, family: str) -> str:
+        from simulator.floors.seafloors import FAMILIES  # few set it, and settings are read without the mathematics
+
+        if family not in FAMILIES:
+            raise ValueError(f"use one of {', '.join(sorted(FAMILIES))}")
+        return family
+
 
 class AisSettings(Section):
     """Ships about, by AIS. Without udp_port, tcp_host and file nothing is listened for."""
