@@ -40,6 +40,7 @@ from app.api.http import error_handlers, openapi
 from app.api.maps import maps, profiles, sites, tiles
 from app.api.maps.ogc import routes as features
 from app.api.maps.wms import routes as web_maps
+from app.api.middleware.addresses import AddressMiddleware
 from app.api.middleware.connections import Sockets, is_shared_host, patient_http
 from app.api.middleware.direct import DirectRoutes
 from app.api.middleware.forwarding import ForwardingMiddleware, PeerMiddleware
@@ -216,6 +217,7 @@ def _add_middleware(app: FastAPI, settings: Settings, limits: RequestLimits) -> 
     app.add_middleware(RequestMiddleware)
     app.add_middleware(UnreadBodyMiddleware)
     app.add_middleware(AddressKeyMiddleware)
+    app.add_middleware(AddressMiddleware, proxies=settings.trusted_proxies)
 
 
 async def _begin(service: MissionService) -> None:
@@ -267,9 +269,7 @@ class Server(uvicorn.Server):
                 access_log=False,
                 timeout_graceful_shutdown=GRACE_S,
                 server_header=False,
-                # Believed of nobody but those who were named: else anyone could speak under another's address.
-                proxy_headers=bool(settings.trusted_proxies),
-                forwarded_allow_ips=list(settings.trusted_proxies),
+                proxy_headers=False,  # see AddressMiddleware
                 ssl_certfile=settings.tls_certificate,
                 ssl_keyfile=settings.tls_key,
                 # Viewers have nothing to say.

@@ -19,6 +19,7 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
+from app.file_choices import OptionalFile
 from app.log_choices import LogFormat, LogLevel
 from app.missions.settings import ServiceSettings
 
@@ -83,7 +84,7 @@ class Settings(BaseSettings, ServiceSettings):
     tls_certificate: Path | None = Field(
         default=None, description="File with the certificate and its chain (PEM): serve HTTPS instead of HTTP"
     )
-    tls_key: Path | None = Field(
+    tls_key: OptionalFile = Field(
         default=None, description="File with the certificate's private key (PEM); empty: in the same file"
     )
     trusted_proxies: tuple[str, ...] = Field(

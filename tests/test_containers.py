@@ -125,7 +125,7 @@ def test_the_image_has_what_the_guides_offer_on_top() -> None:
     # Debian 13 has the programs of PostgreSQL 17; older ones refuse a newer server.
     server = re.fullmatch(r"postgres:(\d+)-\w+", COMPOSE["services"]["database"]["image"])
     assert server is not None
-    assert ({"trixie": 17}[last.image.rpartition("-")[2]]) >= int(server[1])
+    assert {"trixie": 17}[last.debian] >= int(server[1])
     assert any("postgresql-client" in value for word, value in last.instructions if word == "RUN")
 
 
@@ -141,6 +141,7 @@ def test_a_stand_in_for_a_container_engine_understands_every_step() -> None:
     build, last = stages_of((PROJECT / "Dockerfile").read_text())
     assert (build.name, [word for word, _ in last.instructions][-2:]) == ("build", ["ENTRYPOINT", "CMD"])
     said = dict(last.instructions)
+    assert build.debian == last.debian == "trixie"
     assert words_of(said["ENTRYPOINT"]) + words_of(said["CMD"]) == ["bathyfleet", "serve"]
     assert ("from", "build") in options_of(said["COPY"])[0]
     assert variables_of("PATH=/opt/x:$PATH A=1", {"PATH": "/bin"}) == {"PATH": "/opt/x:/bin", "A": "1"}
@@ -157,6 +158,13 @@ def test_what_the_image_is_built_from_is_the_source_and_nothing_that_was_built(t
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     assert [str(path) for path in context_of(tmp_path)] == sorted(kept, key=Path)
+
+
+def test_the_service_waits_until_the_database_is_reached_as_it_reaches_it() -> None:
+    """While the server's image sets its data up a server is there that listens on its socket only."""
+    (_, asked) = COMPOSE["services"]["database"]["healthcheck"]["test"]
+    assert shlex.split(asked)[:3] == ["pg_isready", "--host", "127.0.0.1"]
+    assert COMPOSE["services"]["bathyfleet"]["depends_on"]["database"]["condition"] == "service_healthy"
 
 
 def test_the_service_has_no_rights_that_it_does_not_need() -> None:

@@ -118,6 +118,12 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
         ('imc = "on"', {}, {}, "imc is 'on' (from bathyfleet.toml): input should be"),
         ("port = ", {}, {}, "bathyfleet.toml is not TOML"),
         (
+            '[simulation]\nfamily = "harbor"',
+            {},
+            {},
+            "simulation.family is 'harbor' (from bathyfleet.toml): use one of ",
+        ),
+        (
             "",
             {"BATHYFLEET_PROT": "1"},
             {},
@@ -174,6 +180,17 @@ def test_a_mistake_names_the_setting_its_source_and_what_would_be_right(
         load_settings(**overrides)
     assert len(caught.value.problems) == 1
     assert message in caught.value.problems[0]
+
+
+@pytest.mark.usefixtures("no_settings_around")
+def test_a_file_that_is_named_by_nothing_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a line like BATHYFLEET_TLS_KEY= has it; the folder that the service runs in is meant by nobody."""
+    (tmp_path / "bathyfleet.toml").write_text(
+        'tls_certificate = "both.pem"\ntls_key = ""\n[ais]\nfile = ""\n[alarms]\nca_file = ""\n'
+    )
+    monkeypatch.setenv("BATHYFLEET_SIMULATION__TERRAIN", "")
+    settings = load_settings()
+    assert settings.tls_key is settings.ais.file is settings.alarms.ca_file is settings.simulation.terrain is None
 
 
 def test_a_password_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:

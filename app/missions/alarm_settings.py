@@ -2,12 +2,12 @@
 
 import base64
 import binascii
-from pathlib import Path
 from typing import Annotated, Literal, Self
 from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
 
+from app.file_choices import OptionalFile
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 
 SECRET_PREFIX = "whsec_"  # noqa: S105 - of the standard, before the secret
@@ -144,7 +144,7 @@ class AlarmSettings(_Section):
     give_up_after_s: float = Field(
         default=86_400.0, ge=60, le=2_592_000, description="A delivery that fails is tried again for so long"
     )
-    ca_file: Path | None = Field(
+    ca_file: OptionalFile = Field(
         default=None, description="File with certificates (PEM) of authorities that are trusted beside the usual ones"
     )
     smtp: MailServer = Field(default=MailServer(), description="The mail server")

@@ -1,12 +1,12 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 import ipaddress
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from app.compute.settings import ComputeSettings
+from app.file_choices import OptionalFile
 from app.missions.alarm_settings import AlarmSettings
 from imc_bridge.settings import ConsoleSettings
 
@@ -100,7 +100,7 @@ class NeptusSettings(Section):
 class SimulationSettings(Section):
     """The sea floor under vehicles of kind ``sim``, which are simulated inside the service."""
 
-    terrain: Path | None = Field(default=None, description="Terrain file; without one a sea floor is generated")
+    terrain: OptionalFile = Field(default=None, description="Terrain file; without one a sea floor is generated")
     family: str = Field(default="harbour", description="Kind of the generated sea floor")
     seed: int = Field(default=0, description="Seed of the generated sea floor and of the vehicles' noise")
     drift_m2ps: float = Field(
@@ -116,6 +116,15 @@ class SimulationSettings(Section):
         default=1.0, gt=0, le=10, description="How much more energy vehicles use than their endurance says"
     )
 
+    @field_validator("family")
+    @classmethod
+    def _is_a_family(cls, family: str) -> str:
+        from simulator.floors.seafloors import FAMILIES  # few set it, and settings are read without the mathematics
+
+        if family not in FAMILIES:
+            raise ValueError(f"use one of {', '.join(sorted(FAMILIES))}")
+        return family
+
 
 class AisSettings(Section):
     """Ships about, by AIS. Without udp_port, tcp_host and file nothing is listened for."""
@@ -129,7 +138,7 @@ class AisSettings(Section):
     )
     tcp_host: str = Field(default="", max_length=253, description="Server that sends NMEA sentences; empty: none")
     tcp_port: int = Field(default=10110, ge=1, le=65535, description="Its TCP port")
-    file: Path | None = Field(
+    file: OptionalFile = Field(
         default=None,
         description="File that a receiver's program adds NMEA sentences to, or a serial device that is set up",
     )

@@ -24,6 +24,11 @@ class Stage:
     name: str
     instructions: list[tuple[str, str]] = field(default_factory=list)
 
+    @property
+    def debian(self) -> str:
+        """Of which Debian the image is, as in ``python:3.12-slim-trixie``."""
+        return self.image.rpartition("-")[2]
+
 
 def stages_of(text: str) -> list[Stage]:
     """Return the stages in their order. Raises DockerfileError."""

@@ -72,11 +72,12 @@ class Image:
 
     def build(self) -> tuple[Root, "Image"]:
         """Carry out every step; returns the last stage's root. Raises StepError."""
+        stages = stages_of((PROJECT / "Dockerfile").read_text())
         if self._base is None:
             self._base = self._folder / "base"
             with Step("a root of Debian's packages"):
-                base(self._base)
-        for stage in stages_of((PROJECT / "Dockerfile").read_text()):
+                base(self._base, stages[-1].debian)
+        for stage in stages:
             self._stage(stage)
         return self._roots[stage.name], self
 

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-SUITE = "bookworm"
 PACKAGES = ("ca-certificates", "python3", "python3-venv")
 NEEDS = ("unshare", "chroot", "setpriv", "ip", "mount")
 
@@ -118,10 +117,10 @@ def serving(command: Sequence[str], log: Path) -> Iterator[Service]:
             process.kill()
 
 
-def base(folder: Path, packages: Sequence[str] = ()) -> None:
-    """Make a root of Debian's packages with Python, as images of Python are."""
+def base(folder: Path, suite: str, packages: Sequence[str] = ()) -> None:
+    """Make a root of the packages of one of Debian's suites with Python, as images of Python are."""
     included = ",".join((*PACKAGES, *packages))
-    words = ["mmdebstrap", "--quiet", "--variant=minbase", f"--include={included}", SUITE, str(folder)]
+    words = ["mmdebstrap", "--quiet", "--variant=minbase", f"--include={included}", suite, str(folder)]
     subprocess.run(words, check=True)
     (folder / "usr/local/bin/python").symlink_to("/usr/bin/python3")
 

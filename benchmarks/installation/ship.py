@@ -27,6 +27,8 @@ from typing import Any
 from benchmarks.installation.rooted import base, missing
 from benchmarks.installation.steps import Step, StepError
 
+SUITE = "bookworm"
+"""The oldest Debian that the units are for, with the oldest Python that the service runs on."""
 PATIENCE_S = 600.0
 PROGRAM = "/opt/bathyfleet/bin/bathyfleet"
 UNITS = "/opt/bathyfleet/lib/systemd/system"
@@ -105,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             with Step("a root of Debian's packages, with systemd"):
                 if options.base is None:
-                    base(root, packages=("systemd", "systemd-sysv", "dbus"))
+                    base(root, SUITE, packages=("systemd", "systemd-sysv", "dbus"))
                 else:
                     subprocess.run(["cp", "--archive", "--reflink=auto", str(options.base), str(root)], check=True)
             shutil.copy(options.file, root / "root")

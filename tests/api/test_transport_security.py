@@ -114,6 +114,21 @@ async def test_nobody_but_a_trusted_proxy_says_for_whom_it_speaks(make_settings:
     assert bare.status_code == 403  # a proxy that tells nothing is still not the local user
 
 
+async def test_a_proxy_that_comes_by_ipv4_is_trusted_where_both_are_listened_on(
+    make_settings: Callable[..., Settings],
+) -> None:
+    """Such a socket sees it as ::ffff:127.0.0.1."""
+    settings = make_settings(host="::", trusted_proxies=("127.0.0.1",), insecure=True)
+    async with running(settings) as server, make_client(server) as asking:
+        port = server.url.rpartition(":")[2]
+        claimed = {"X-Forwarded-For": "192.0.2.7", "X-Forwarded-Proto": "https"}
+        answer = await asking.post(f"http://127.0.0.1:{port}/api/v1/missions/none/abort", headers=claimed)
+        assert HTTPS_ONLY in answer.headers
+        await asking.post(f"http://127.0.0.1:{port}/api/v1/missions/none/abort")
+        written = await server._app.state.edge.audit.newest(limit=2)
+        assert [entry.origin for entry in written] == ["127.0.0.1", "192.0.2.7"]
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can speak as another user")
 async def test_another_user_of_this_machine_is_not_the_local_operator(make_settings: Callable[..., Settings]) -> None:
     async with running(make_settings()) as server:
