@@ -1,10 +1,10 @@
 """The page without a mouse, and heard instead of seen: where the keyboard is after a command, what is told once."""
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, picture
+from tests.support.dashboard.steps import by_id, expect_state, picture, show
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
 
@@ -29,3 +29,84 @@ def test_that_the_map_cannot_be_drawn_is_told_where_nothing_covers_it(page: Page
                 .every(([x, y]) => fault.contains(document.elementFromPoint(x, y)));
         }"""
     )
+
+
+def test_a_second_enter_discards_nothing_that_was_typed(page: Page) -> None:
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Long thought about")
+    by_id(page, "cancel-mission").focus()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "discard-mission")).to_be_visible()
+    expect(by_id(page, "keep-describing")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "cancel-mission")).to_be_focused()
+    expect(by_id(page, "field-name")).to_have_value("Long thought about")
+
+
+def test_a_second_enter_deletes_no_mission(page: Page, service: Service) -> None:
+    mission = service.create(name="Kept")
+    show(page, mission)
+    by_id(page, "delete-mission").focus()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "confirm-delete")).to_be_visible()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "delete-mission")).to_be_focused()
+    assert mission in [one["id"] for one in service.get("/missions")]
+
+
+def test_the_keyboard_stays_where_a_mission_was_paused(page: Page, service: Service) -> None:
+    mission = service.create(name="By keyboard")
+    service.act(mission, "start")
+    show(page, mission)
+    held: list[Route] = []
+    page.route("**/pause", lambda route: held.append(route))
+    by_id(page, "pause").focus()
+    with page.expect_request("**/pause"):
+        page.keyboard.press("Enter")
+    # While it is on its way its button keeps the keyboard and sends nothing more.
+    expect(by_id(page, "pause")).to_be_disabled()
+    expect(by_id(page, "pause")).to_be_focused()
+    page.keyboard.press("Enter")
+    held[0].continue_()
+    expect_state(page, "paused")
+    expect(by_id(page, "resume")).to_be_focused()
+    assert len(held) == 1
+    # The new state is told before the answer to the command.
+    expect(by_id(page, "resume")).to_be_enabled()
+    page.keyboard.press("Enter")
+    expect_state(page, "running")
+    expect(by_id(page, "pause")).to_be_focused()
+
+
+def test_the_keyboard_stays_at_the_vehicle_that_was_ordered(page: Page, service: Service) -> None:
+    mission = service.create(name="Held by keyboard")
+    service.act(mission, "start")
+    show(page, mission)
+    by_id(page, "hold-sim-1").focus()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "hold-sim-1")).to_be_hidden()
+    expect(by_id(page, "card-sim-1")).to_be_focused()
+    expect(by_id(page, "resume-sim-1")).to_be_visible()
+    page.keyboard.press("Tab")
+    expect(by_id(page, "resume-sim-1")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "hold-sim-1")).to_be_visible()
+    expect(by_id(page, "card-sim-1")).to_be_focused()
+
+
+def test_escape_closes_the_field_for_a_position(page: Page) -> None:
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "go-to").focus()
+    page.keyboard.press("Enter")
+    expect(by_id(page, "go-to-position")).to_be_focused()
+    page.keyboard.type("leix")
+    expect(by_id(page, "harbour-0")).to_be_visible()
+    # First what it offers, then the field itself.
+    page.keyboard.press("Escape")
+    expect(by_id(page, "harbour-0")).to_be_hidden()
+    expect(by_id(page, "go-to-position")).to_have_value("leix")
+    page.keyboard.press("Escape")
+    expect(by_id(page, "go-to-position")).to_be_hidden()
+    expect(by_id(page, "go-to")).to_be_focused()

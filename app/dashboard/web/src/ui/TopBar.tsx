@@ -1,5 +1,4 @@
 import "./TopBar.css";
-import type { MissionAction } from "../api/types";
 import { whyNotCommand } from "../state/access";
 import { decidingFor } from "../state/alarms/waiting";
 import { age, clock, duration } from "../state/format";
@@ -100,9 +99,7 @@ export function TopBar() {
       </Button>
       <AccountButton />
       <div class="commands">
-        <Command action="start" label={say("topBar.start")} />
-        {present?.ending ? null : <Command action="pause" label={say("topBar.pause")} />}
-        <Command action="resume" label={say("topBar.resume")} />
+        <WayForward />
         <StopNow />
       </div>
       <Button
@@ -239,15 +236,23 @@ function LinkSummary() {
   );
 }
 
-/** Shown only when the state allows it, so that there is never more than one way forward. */
-function Command({ action, label }: { action: MissionAction; label: string }) {
-  if (!mission.value || !isAllowed(action, mission.value)) return null;
+const WAYS = { start: "topBar.start", pause: "topBar.pause", resume: "topBar.resume" } as const;
+
+/** What the mission's state allows, never more than one: always the same button, so that the keyboard stays on it. */
+function WayForward() {
+  const present = mission.value;
+  if (!present) return null;
+  const [action] = (["start", "pause", "resume"] as const).filter(
+    (one) => isAllowed(one, present) && !(one === "pause" && present.ending),
+  );
+  if (!action) return null;
+  const label = say(WAYS[action]);
   return (
     <Button
       id={action}
       kind="command primary"
       commands
-      disabled={busyWith.value !== null}
+      busy={busyWith.value !== null}
       onClick={() => {
         if (action === "start") preflightOpen.value = true;
         else void act(action);

@@ -62,7 +62,8 @@ export function PreflightDialog() {
       id="confirm-start"
       kind="command primary"
       commands
-      disabled={!view?.ready || busyWith.value !== null}
+      disabled={!view?.ready}
+      busy={busyWith.value !== null}
       onClick={() => void start()}
     >
       {busyWith.value === "start"
