@@ -1,5 +1,8 @@
 """The page without a mouse, and heard instead of seen: where the keyboard is after a command, what is told once."""
 
+import re
+from typing import Any
+
 import pytest
 from playwright.sync_api import Page, Route, expect
 
@@ -110,3 +113,45 @@ def test_escape_closes_the_field_for_a_position(page: Page) -> None:
     page.keyboard.press("Escape")
     expect(by_id(page, "go-to-position")).to_be_hidden()
     expect(by_id(page, "go-to")).to_be_focused()
+
+
+def test_a_link_that_is_gone_is_told_once_and_not_each_second(page: Page, service: Service) -> None:
+    mission = service.create(name="Told once")
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "heard-link")).to_have_text("Live")
+    service.kill()
+    try:
+        expect(by_id(page, "link")).to_contain_text("trying again in")
+        # What counts is seen, not heard.
+        expect(by_id(page, "heard-link")).to_have_text("Service gone")
+        told = "element => element.closest('[role=status], [role=alert], [aria-live]') === null"
+        assert by_id(page, "link").evaluate(told)
+    finally:
+        service.start()
+    expect(by_id(page, "heard-link")).to_have_text("Live")
+
+
+def test_an_alarm_is_told_once(page: Page, service: Service) -> None:
+    zone = [[-8.7047, 41.1852], [-8.7045, 41.1852], [-8.7045, 41.1853], [-8.7047, 41.1853], [-8.7047, 41.1852]]
+    mission = service.create(
+        name="Told zone",
+        vehicles=[{"name": "rover", "kind": "rest"}],
+        keep_out=[{"type": "Polygon", "coordinates": [zone]}],
+    )
+
+    def heard(time_s: float, lat_deg: float, lon_deg: float) -> None:
+        place = {"lat_deg": lat_deg, "lon_deg": lon_deg, "depth_m": 2.0, "range_m": 5.0}
+        item: dict[str, Any] = place | {"vehicle": "rover", "time_s": time_s}
+        service.post(f"/missions/{mission}/measurements", {"items": [item]})
+
+    heard(1_795_225_140.0, 41.1851, -8.7049)
+    service.act(mission, "start")
+    show(page, mission)
+    expect(by_id(page, "step")).not_to_have_text("0")
+    heard(1_795_225_150.0, 41.18525, -8.7046)
+    expect(by_id(page, "alarms")).to_contain_text("rover is in keep-out zone 1")
+    expect(by_id(page, "heard-alarms")).to_contain_text(re.compile("rover"))
+    picture(page, "attention")
+    # How long ago it was goes on counting there.
+    expect(by_id(page, "attention")).not_to_have_attribute("role", "alert")

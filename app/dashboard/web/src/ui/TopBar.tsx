@@ -1,5 +1,6 @@
 import "./TopBar.css";
 import { whyNotCommand } from "../state/access";
+import { linkAnnounced } from "../state/alarms/announced";
 import { decidingFor } from "../state/alarms/waiting";
 import { age, clock, duration } from "../state/format";
 import { elapsedThen } from "../state/past/replay";
@@ -185,12 +186,6 @@ function Figure({
   );
 }
 
-const WAITING = {
-  gone: "topBar.serviceGoneTryingAgainInS",
-  missing: "topBar.noLongerThere",
-  crowded: "topBar.tooManyViewers",
-} as const;
-
 function LinkSummary() {
   const status = socketStatus.value;
   const team = vehicles.value.filter((v) => v.view.active);
@@ -213,7 +208,7 @@ function LinkSummary() {
     tone = heard < all ? "warning" : "good";
   } else if (status.kind === "waiting") {
     const wait = Math.max(0, Math.ceil((status.retryAt - now.value) / 1000));
-    words = say(WAITING[status.why ?? "gone"], { old, wait });
+    words = say("topBar.tryingAgainInS", { what: linkAnnounced.value, old, wait });
     tone = status.why === "missing" ? "warning" : "alarm";
   } else if (status.kind === "refused") {
     words = say("topBar.notSignedIn");
@@ -228,7 +223,7 @@ function LinkSummary() {
       <dt>{say("fleet.link")}</dt>
       <dd class={`link ${tone}`}>
         <span aria-hidden="true">{tone === "good" ? "●" : tone === "alarm" ? "✕" : "◐"}</span>{" "}
-        <span role="status" data-testid="link" data-status={status.kind}>
+        <span data-testid="link" data-status={status.kind}>
           {words}
         </span>
       </dd>
