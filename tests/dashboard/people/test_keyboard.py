@@ -1,11 +1,13 @@
 """The page without a mouse, and heard instead of seen: where the keyboard is after a command, what is told once."""
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
+from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, picture, show
 
@@ -17,6 +19,15 @@ NO_WEBGL = """() => {
         return kind.startsWith("webgl") ? null : context.call(this, kind, ...rest);
     };
 }"""
+
+
+@pytest.fixture
+def portuguese(browser: Browser, service: Service) -> Iterator[Page]:
+    context = browser.new_context(base_url=service.url, locale="pt-PT")
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    yield page
+    context.close()
 
 
 def test_that_the_map_cannot_be_drawn_is_told_where_nothing_covers_it(page: Page, service: Service) -> None:
@@ -155,3 +166,12 @@ def test_an_alarm_is_told_once(page: Page, service: Service) -> None:
     picture(page, "attention")
     # How long ago it was goes on counting there.
     expect(by_id(page, "attention")).not_to_have_attribute("role", "alert")
+
+
+def test_the_checklist_is_told_in_the_pages_language(portuguese: Page, service: Service) -> None:
+    page = portuguese
+    show(page, service.create(name="Lista"))
+    by_id(page, "start").click()
+    expect(by_id(page, "preflight")).to_have_attribute("data-ready", "true")
+    heard = by_id(page, "preflight").locator(".checklist .tone .visually-hidden")
+    assert {"Em ordem:"} <= set(heard.all_text_contents()) <= {"Em ordem:", "Nota:", "Aviso:", "Problema:"}

@@ -177,6 +177,10 @@ export const FRAME = {
   "fleet.link": { en: "Link", pt: "Ligação" },
   "fleet.free": { en: "free", pt: "livre" },
   "fleet.shownBelow": { en: "shown below", pt: "visível abaixo" },
+  "preflight.inOrder": { en: "In order", pt: "Em ordem" },
+  "preflight.note": { en: "Note", pt: "Nota" },
+  "preflight.warning": { en: "Warning", pt: "Aviso" },
+  "preflight.problem": { en: "Problem", pt: "Problema" },
   "preflight.starting": { en: "Starting…", pt: "A iniciar…" },
   "preflight.problemToSolveFirst": {
     en: "{problems} {problems|problem|problems} to solve first",
