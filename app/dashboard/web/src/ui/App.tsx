@@ -32,6 +32,7 @@ import { MissionPanel } from "./MissionPanel";
 import { Attention } from "./notices/Attention";
 import { Heard, Others } from "./notices/Heard";
 import { Notices } from "./notices/Notices";
+import { keepFocus } from "./parts/keptFocus";
 import { watchPrinting } from "./parts/printMap";
 import { SpaceView } from "./space/SpaceView";
 import { BottomStrip } from "./strip/BottomStrip";
@@ -61,6 +62,7 @@ export function App() {
   }, []);
   useEffect(() => (root.current ? watchRoom(root.current) : undefined), []);
   useEffect(watchKeys, []);
+  useEffect(() => (root.current ? keepFocus(root.current) : undefined), []);
   useEffect(() => (root.current ? watchPrinting(root.current) : undefined), []);
   // What lies under a dialog is out of reach; the top bar with the stop never is.
   const covered = dialogOpen.value;

@@ -29,7 +29,7 @@ import {
 import { say, sayWith } from "../words/say";
 import { panelWidth } from "./chart/layout";
 import { NewMissionForm } from "./form/NewMissionForm";
-import { Button, sets } from "./parts/Controls";
+import { AskedTwice, Button, sets } from "./parts/Controls";
 import { saveText } from "./parts/download";
 import { Grip } from "./parts/Grip";
 
@@ -170,23 +170,22 @@ function Actions({ of: { id, state, progress } }: { of: MissionSummary }) {
       >
         {say("beginnings.export")}
       </Button>
-      {asked.value ? (
-        <>
-          <Button id="confirm-delete" onClick={() => void deleteMission(id)}>
-            {say("missions.deleteItForGood")}
-          </Button>
-          <Button onClick={sets(asked, false)}>{say("missions.keepIt")}</Button>
-        </>
-      ) : (
-        <Button
-          id="delete-mission"
-          disabled={forbidden !== "" || !empty || atSea}
-          title={forbidden || (empty && !atSea ? "" : say("missions.whatWasMeasuredIsKept"))}
-          onClick={sets(asked, true)}
-        >
-          {say("missions.delete")}
-        </Button>
-      )}
+      <AskedTwice
+        asked={asked}
+        first={{
+          id: "delete-mission",
+          disabled: forbidden !== "" || !empty || atSea,
+          title: forbidden || (empty && !atSea ? "" : say("missions.whatWasMeasuredIsKept")),
+          onClick: sets(asked, true),
+          children: say("missions.delete"),
+        }}
+        last={{
+          id: "confirm-delete",
+          onClick: () => void deleteMission(id),
+          children: say("missions.deleteItForGood"),
+        }}
+        keep={{ id: "keep-mission", children: say("missions.keepIt") }}
+      />
     </div>
   );
 }

@@ -1,6 +1,6 @@
 import "./TopBar.css";
-import type { MissionAction } from "../api/types";
 import { whyNotCommand } from "../state/access";
+import { linkAnnounced } from "../state/alarms/announced";
 import { decidingFor } from "../state/alarms/waiting";
 import { age, clock, duration } from "../state/format";
 import { elapsedThen } from "../state/past/replay";
@@ -100,9 +100,7 @@ export function TopBar() {
       </Button>
       <AccountButton />
       <div class="commands">
-        <Command action="start" label={say("topBar.start")} />
-        {present?.ending ? null : <Command action="pause" label={say("topBar.pause")} />}
-        <Command action="resume" label={say("topBar.resume")} />
+        <WayForward />
         <StopNow />
       </div>
       <Button
@@ -188,12 +186,6 @@ function Figure({
   );
 }
 
-const WAITING = {
-  gone: "topBar.serviceGoneTryingAgainInS",
-  missing: "topBar.noLongerThere",
-  crowded: "topBar.tooManyViewers",
-} as const;
-
 function LinkSummary() {
   const status = socketStatus.value;
   const team = vehicles.value.filter((v) => v.view.active);
@@ -216,7 +208,7 @@ function LinkSummary() {
     tone = heard < all ? "warning" : "good";
   } else if (status.kind === "waiting") {
     const wait = Math.max(0, Math.ceil((status.retryAt - now.value) / 1000));
-    words = say(WAITING[status.why ?? "gone"], { old, wait });
+    words = say("topBar.tryingAgainInS", { what: linkAnnounced.value, old, wait });
     tone = status.why === "missing" ? "warning" : "alarm";
   } else if (status.kind === "refused") {
     words = say("topBar.notSignedIn");
@@ -231,7 +223,7 @@ function LinkSummary() {
       <dt>{say("fleet.link")}</dt>
       <dd class={`link ${tone}`}>
         <span aria-hidden="true">{tone === "good" ? "●" : tone === "alarm" ? "✕" : "◐"}</span>{" "}
-        <span role="status" data-testid="link" data-status={status.kind}>
+        <span data-testid="link" data-status={status.kind}>
           {words}
         </span>
       </dd>
@@ -239,15 +231,23 @@ function LinkSummary() {
   );
 }
 
-/** Shown only when the state allows it, so that there is never more than one way forward. */
-function Command({ action, label }: { action: MissionAction; label: string }) {
-  if (!mission.value || !isAllowed(action, mission.value)) return null;
+const WAYS = { start: "topBar.start", pause: "topBar.pause", resume: "topBar.resume" } as const;
+
+/** What the mission's state allows, never more than one: always the same button, so that the keyboard stays on it. */
+function WayForward() {
+  const present = mission.value;
+  if (!present) return null;
+  const [action] = (["start", "pause", "resume"] as const).filter(
+    (one) => isAllowed(one, present) && !(one === "pause" && present.ending),
+  );
+  if (!action) return null;
+  const label = say(WAYS[action]);
   return (
     <Button
       id={action}
       kind="command primary"
       commands
-      disabled={busyWith.value !== null}
+      busy={busyWith.value !== null}
       onClick={() => {
         if (action === "start") preflightOpen.value = true;
         else void act(action);

@@ -87,6 +87,7 @@ const SAME =
 
 /** Keys, types and fonts that look like words. */
 const NO_WORDS = new Set([
+  "ui/parts/Controls.tsx: Enter",
   "ui/parts/Controls.tsx: Escape",
   "ui/parts/Dialog.tsx: Escape",
   "ui/keys.ts: Shift A",

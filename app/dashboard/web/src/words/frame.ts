@@ -33,17 +33,19 @@ export const FRAME = {
     pt: "Em direto · {heard} de {all} veículos",
   },
   "topBar.dataOld": { en: ", data {now} old", pt: ", dados com {now}" },
-  "topBar.serviceGoneTryingAgainInS": {
-    en: "Service gone{old}; trying again in {wait} s",
-    pt: "Sem serviço{old}; nova tentativa em {wait} s",
+  "topBar.serviceGone": { en: "Service gone", pt: "Sem serviço" },
+  "topBar.noSuchMission": {
+    en: "The service has no such mission any more",
+    pt: "O serviço já não tem esta missão",
   },
-  "topBar.noLongerThere": {
-    en: "The service has no such mission any more{old}; trying again in {wait} s",
-    pt: "O serviço já não tem esta missão{old}; nova tentativa em {wait} s",
+  "topBar.crowded": {
+    en: "Too many pages are open on the service",
+    pt: "Há demasiadas páginas abertas no serviço",
   },
-  "topBar.tooManyViewers": {
-    en: "Too many pages are open on the service{old}; trying again in {wait} s",
-    pt: "Há demasiadas páginas abertas no serviço{old}; nova tentativa em {wait} s",
+  "topBar.silent": { en: "Service silent", pt: "Serviço sem dar sinal" },
+  "topBar.tryingAgainInS": {
+    en: "{what}{old}; trying again in {wait} s",
+    pt: "{what}{old}; nova tentativa em {wait} s",
   },
   "topBar.serviceSilent": {
     en: "Service silent for {silent}",
@@ -175,6 +177,10 @@ export const FRAME = {
   "fleet.link": { en: "Link", pt: "Ligação" },
   "fleet.free": { en: "free", pt: "livre" },
   "fleet.shownBelow": { en: "shown below", pt: "visível abaixo" },
+  "preflight.inOrder": { en: "In order", pt: "Em ordem" },
+  "preflight.note": { en: "Note", pt: "Nota" },
+  "preflight.warning": { en: "Warning", pt: "Aviso" },
+  "preflight.problem": { en: "Problem", pt: "Problema" },
   "preflight.starting": { en: "Starting…", pt: "A iniciar…" },
   "preflight.problemToSolveFirst": {
     en: "{problems} {problems|problem|problems} to solve first",

@@ -84,14 +84,14 @@ export function SystematicErrors() {
         </>
       ) : null}
       <p class="row">
-        <Button id="look-for-errors" disabled={busy.value} onClick={() => look()}>
+        <Button id="look-for-errors" busy={busy.value} onClick={() => look()}>
           {found ? say("systematicErrors.lookAgain") : say("systematicErrors.lookForSystematicErrors")}
         </Button>
         {proposal ? (
           <Button
             id="take-out-errors"
             commands
-            disabled={busy.value}
+            busy={busy.value}
             onClick={() => look((id) => api.setSystematicErrors(id, proposal))}
           >
             {say("systematicErrors.takeOutWhatIsProposed")}
@@ -101,7 +101,7 @@ export function SystematicErrors() {
           <Button
             id="undo-errors"
             commands
-            disabled={busy.value}
+            busy={busy.value}
             onClick={() => look(api.deleteSystematicErrors)}
           >
             {say("systematicErrors.takeNothingOut")}

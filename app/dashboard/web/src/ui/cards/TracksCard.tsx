@@ -79,7 +79,7 @@ export function TracksCard() {
         {found ? null : (
           <Button
             id="look-at-tracks"
-            disabled={working}
+            busy={working}
             onClick={() => ask(say("tracks.looking"), api.adjustment)}
           >
             {say("tracks.lookAtThem")}
@@ -89,7 +89,7 @@ export function TracksCard() {
           <Button
             id="adjust-tracks"
             commands
-            disabled={working}
+            busy={working}
             onClick={() => ask(say("tracks.adjusting"), api.adjust)}
           >
             {found.applied ? say("tracks.adjustAgain") : say("tracks.adjust")}
@@ -99,7 +99,7 @@ export function TracksCard() {
           <Button
             id="undo-adjustment"
             commands
-            disabled={working}
+            busy={working}
             onClick={() => ask(say("tracks.undoing"), api.undoAdjustment)}
           >
             {say("tracks.undo")}

@@ -81,8 +81,8 @@ export function LineOrders({ of: v }: { of: VehicleView }) {
 export function TypedPlace({ name }: { name: string }) {
   const text = useSignal("");
   const fault = useSignal("");
-  useEscape(typingFor);
-  useEscape(picking);
+  useEscape(typingFor, null);
+  useEscape(picking, null);
   useSignalEffect(() => {
     // The click on the map came.
     if (!picking.value) typingFor.value = null;
@@ -122,8 +122,8 @@ export function DenserQuestion() {
   const spacing = useSignal("");
   const who = useSignal("");
   const fault = useSignal("");
-  useEscape(denserRing);
-  useEscape(drawing);
+  useEscape(denserRing, null);
+  useEscape(drawing, null);
   const present = mission.value;
   if (drawing.value && drawingReady.value && !describing.value && present)
     return (

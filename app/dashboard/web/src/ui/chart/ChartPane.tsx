@@ -20,7 +20,7 @@ import { say } from "../../words/say";
 import { fitAsked } from "../keys";
 import { overlaid } from "./layout";
 import { MapTools } from "./MapTools";
-import { shownChart } from "./mapPicture";
+import { chartFault, shownChart } from "./mapPicture";
 import { follow } from "./mapUpdates";
 
 // Most of the page's code: it is read while the service is asked, not before.
@@ -31,7 +31,6 @@ export function ChartPane() {
   const container = useRef<HTMLDivElement>(null);
   const chart = useSignal<Chart | null>(null);
   const frame = useSignal<GridFrame | null>(null);
-  const fault = useSignal("");
 
   useEffect(() => {
     const element = container.current;
@@ -72,7 +71,7 @@ export function ChartPane() {
         stop = follow(made);
       })
       .catch((error: unknown) => {
-        fault.value = String(error);
+        chartFault.value = String(error);
       });
     return () => {
       ended = true;
@@ -91,11 +90,6 @@ export function ChartPane() {
       <div ref={container} class="chart-canvas" data-testid="map" data-ready={chart.value !== null} />
       {frame.value ? <GridLabels frame={frame.value} /> : null}
       <MapTools onFit={() => chart.value?.fit(overlaid)} />
-      {fault.value ? (
-        <p class="notice alarm" role="alert">
-          {say("chartPane.theMapCannotBeDrawnIt", { fault: fault.value })}
-        </p>
-      ) : null}
     </section>
   );
 }

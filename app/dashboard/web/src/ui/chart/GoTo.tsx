@@ -4,10 +4,10 @@ import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../../api/types";
 import { type Harbour, harbours, harboursNamed } from "../../map/harbours";
 import { placeOf, placeSample } from "../../state/coordinates";
-import { destination, marked } from "../../state/store";
+import { destination, goingTo, marked } from "../../state/store";
 import { say } from "../../words/say";
 import { OwnShip } from "../OwnShip";
-import { Button, sets } from "../parts/Controls";
+import { Button, sets, useEscape } from "../parts/Controls";
 
 /** As much about a place, and about a harbour, as is shown of it, degrees. */
 const ABOUT = 0.002;
@@ -30,7 +30,15 @@ export function GoTo() {
   const chosen = useSignal<number | null>(null);
   const field = useRef<HTMLInputElement>(null);
   // Before the first picture of it: who types at once types into the field, not the page's single keys.
-  useLayoutEffect(() => field.current?.focus(), []);
+  useLayoutEffect(() => {
+    const before = document.activeElement;
+    field.current?.focus();
+    return () => {
+      const isHere = field.current?.form?.contains(document.activeElement);
+      if (isHere && before instanceof HTMLElement) before.focus();
+    };
+  }, []);
+  useEscape(goingTo, false);
   useEffect(() => {
     // Without the service there are no names, which is told elsewhere.
     harbours().then(

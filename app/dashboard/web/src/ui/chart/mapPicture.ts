@@ -30,6 +30,8 @@ import { look } from "./mapUpdates";
 
 /** The map that is on the page, once it is. */
 export const shownChart = signal<Chart | null>(null);
+/** Why there is none: a browser without WebGL 2; empty while all is well. */
+export const chartFault = signal("");
 
 /** Pixels of the picture for each of the page's: sharp on paper at 192 to the inch. */
 const RATIO = 2;

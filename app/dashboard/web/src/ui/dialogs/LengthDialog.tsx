@@ -64,7 +64,7 @@ export function LengthDialog() {
       heading={say("length.howLong", { name: present?.name ?? "" })}
       fault={fault.value}
       actions={
-        <Button id="set-length" kind="command primary" commands disabled={sending.value} form={FORM}>
+        <Button id="set-length" kind="command primary" commands busy={sending.value} form={FORM}>
           {sending.value ? say("length.setting") : say("length.set")}
         </Button>
       }

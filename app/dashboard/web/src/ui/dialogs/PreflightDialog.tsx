@@ -15,6 +15,12 @@ import { Dialog } from "../parts/Dialog";
 
 const SIGNS: Record<CheckStatus, string> = { ok: "✓", note: "•", warning: "▲", problem: "✕" };
 const TONES: Record<CheckStatus, string> = { ok: "good", note: "calm", warning: "warning", problem: "alarm" };
+const HEARD = {
+  ok: "preflight.inOrder",
+  note: "preflight.note",
+  warning: "preflight.warning",
+  problem: "preflight.problem",
+} as const;
 const AGAIN_MS = 3000;
 
 /** The checklist before a start; starts the mission when nothing stands in its way. */
@@ -62,7 +68,8 @@ export function PreflightDialog() {
       id="confirm-start"
       kind="command primary"
       commands
-      disabled={!view?.ready || busyWith.value !== null}
+      disabled={!view?.ready}
+      busy={busyWith.value !== null}
       onClick={() => void start()}
     >
       {busyWith.value === "start"
@@ -91,7 +98,7 @@ export function PreflightDialog() {
           <li key={check.id} data-testid={`check-${check.id}`} data-status={check.status}>
             <span class={`tone ${TONES[check.status]}`}>
               <span aria-hidden="true">{SIGNS[check.status]}</span>
-              <span class="visually-hidden">{check.status}:</span>
+              <span class="visually-hidden">{say(HEARD[check.status])}:</span>
             </span>
             <span>
               <b>{check.title}</b> {check.message}

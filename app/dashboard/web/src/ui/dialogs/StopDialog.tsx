@@ -70,7 +70,7 @@ export function StopDialog({
       {sendHome ? (
         <Button
           id={`${name}-return`}
-          disabled={sending.value !== null}
+          busy={sending.value !== null}
           onClick={() => void ask("home", sendHome)}
         >
           {say("abort.returnHome")}
@@ -79,7 +79,7 @@ export function StopDialog({
       <Button
         id={confirmId}
         kind={name === "abort" ? "abort" : "command primary"}
-        disabled={waiting}
+        busy={waiting}
         onClick={() => void ask("stop", send)}
       >
         {confirm(waiting)}

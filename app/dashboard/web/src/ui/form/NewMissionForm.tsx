@@ -35,7 +35,7 @@ import {
   picking,
 } from "../../state/store";
 import { say } from "../../words/say";
-import { Button, FileButton, into, sets, useEscape } from "../parts/Controls";
+import { AskedTwice, FileButton, into, useEscape } from "../parts/Controls";
 import { AreaFields } from "./AreaFields";
 import { BlockFields } from "./BlockFields";
 import { ExpertFields } from "./ExpertFields";
@@ -91,8 +91,8 @@ export function NewMissionForm() {
       marks: draftMarks(draft.value),
     };
   });
-  useEscape(drawing);
-  useEscape(picking);
+  useEscape(drawing, null);
+  useEscape(picking, null);
   useEffect(() => {
     const ask = (event: BeforeUnloadEvent) => {
       if (isChanged()) event.preventDefault();
@@ -274,28 +274,18 @@ function unplacedIn(form: HTMLFormElement, faults: Faults): FaultKey[] {
 /** Leaves the form; what was typed is lost only after a second click. */
 function Cancel(of: { isChanged: () => boolean; isSaving: boolean; onCancel: () => void }) {
   const asked = useSignal(false);
-  if (!asked.value)
-    return (
-      <Button
-        id="cancel-mission"
-        disabled={of.isSaving}
-        onClick={() => {
-          if (of.isChanged()) asked.value = true;
-          else of.onCancel();
-        }}
-      >
-        {say("mission.cancel")}
-      </Button>
-    );
+  const busy = of.isSaving;
+  const cancel = () => {
+    if (of.isChanged()) asked.value = true;
+    else of.onCancel();
+  };
   return (
-    <>
-      <Button id="discard-mission" disabled={of.isSaving} onClick={of.onCancel}>
-        {say("mission.discard")}
-      </Button>
-      <Button id="keep-describing" onClick={sets(asked, false)}>
-        {say("mission.goOn")}
-      </Button>
-    </>
+    <AskedTwice
+      asked={asked}
+      first={{ id: "cancel-mission", busy, onClick: cancel, children: say("mission.cancel") }}
+      last={{ id: "discard-mission", busy, onClick: of.onCancel, children: say("mission.discard") }}
+      keep={{ id: "keep-describing", children: say("mission.goOn") }}
+    />
   );
 }
 

@@ -33,7 +33,6 @@ export function Attention() {
         class={`attention ${shown[0]?.tone}`}
         aria-label={say("attention.needsAttention")}
         data-testid="attention"
-        {...(alarms.length > 0 ? { role: "alert" } : {})}
       >
         <ul data-testid={alarms.length > 0 ? "alarms" : undefined}>
           {shown.map((matter) => (
@@ -94,7 +93,7 @@ function Line({ matter: m, onTake }: { matter: Matter; onTake: (id: string) => v
             })}{" "}
           </>
         )}
-        {m.todo === "" ? null : <>{say("attention.whatToDo", { todo: m.todo })}</>}{" "}
+        {m.todo === "" ? null : say("attention.whatToDo", { todo: m.todo })}{" "}
         {m.alarm ? <Told id={m.alarm.id} /> : null}{" "}
         {m.vehicle ? (
           <Button kind="link-button" onClick={() => void showWhere(m.vehicle as string, m.since)}>

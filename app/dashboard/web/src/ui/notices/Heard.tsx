@@ -1,4 +1,4 @@
-import { missionAnnounced } from "../../state/alarms/announced";
+import { linkAnnounced, missionAnnounced } from "../../state/alarms/announced";
 import { othersWords } from "../../state/orders/otherUsers";
 import { openAlarms } from "../../state/store";
 import { say } from "../../words/say";
@@ -14,6 +14,9 @@ export function Heard() {
       </div>
       <div aria-live="polite" aria-atomic="true" data-testid="heard">
         {othersWords.value || missionAnnounced.value}
+      </div>
+      <div aria-live="polite" aria-atomic="true" data-testid="heard-link">
+        {linkAnnounced.value}
       </div>
     </div>
   );

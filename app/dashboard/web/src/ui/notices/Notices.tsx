@@ -18,6 +18,7 @@ import {
 } from "../../state/store";
 import { say, sayWith } from "../../words/say";
 import { SignIn } from "../Account";
+import { chartFault } from "../chart/mapPicture";
 import { Button, sets } from "../parts/Controls";
 import { beginTour } from "../Tour";
 
@@ -28,6 +29,11 @@ export function Notices() {
   return (
     <div class="notices">
       {signedOut.value ? <SignIn /> : null}
+      {chartFault.value ? (
+        <p class="notice alarm" role="alert" data-testid="map-fault">
+          {say("chartPane.theMapCannotBeDrawnIt", { fault: chartFault.value })}
+        </p>
+      ) : null}
       {fault && !signedOut.value ? (
         <p class="notice alarm" role="alert" data-testid="service-fault">
           {sayWith("notices.thisPageConnectsAgainBy", {

@@ -22,3 +22,30 @@ it("the second click of a double click is no second command", async () => {
   expect(clicks(true)).toBe(2);
   expect(clicks(false)).toBe(3);
 });
+
+it("a button that waits for its answer asks for nothing more and sends no form", async () => {
+  const { Button } = await import("./Controls");
+  const onClick = vi.fn();
+  const preventDefault = vi.fn();
+  const button = Button({ busy: true, onClick, children: "Set" }) as unknown as {
+    props: { onClick: (event: object) => void; disabled: boolean; "aria-disabled": boolean };
+  };
+  button.props.onClick({ detail: 0, preventDefault });
+  expect(onClick).not.toHaveBeenCalled();
+  expect(preventDefault).toHaveBeenCalledOnce();
+  // It keeps the keyboard: one that is disabled would lose it.
+  expect(button.props).toMatchObject({ disabled: false, "aria-disabled": true });
+});
+
+it("a key that is held down commands once", async () => {
+  const { Button } = await import("./Controls");
+  const pressed = (commands: boolean, repeat: boolean) => {
+    const preventDefault = vi.fn();
+    const button = Button({ commands, children: "Pause" }) as unknown as {
+      props: { onKeyDown?: (event: object) => void };
+    };
+    button.props.onKeyDown?.({ key: "Enter", repeat, preventDefault });
+    return preventDefault.mock.calls.length;
+  };
+  expect([pressed(true, false), pressed(true, true), pressed(false, true)]).toEqual([0, 1, 0]);
+});

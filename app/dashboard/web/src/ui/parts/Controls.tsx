@@ -4,6 +4,7 @@ import type { Signal } from "@preact/signals";
 import type { AriaAttributes, ComponentChildren } from "preact";
 import { useLayoutEffect } from "preact/hooks";
 import { whyNotCommand } from "../../state/access";
+import { dialogOpen } from "../../state/store";
 
 /** Handlers that give a signal this value, the opposite of what it has, or what they are called with. */
 export const sets =
@@ -36,6 +37,8 @@ interface ButtonProps extends AriaAttributes {
   /** Whether it commands: it says why where this user may not. */
   commands?: boolean;
   disabled?: boolean;
+  /** Whether what it asked for is on its way: it does nothing meanwhile, and keeps the keyboard. */
+  busy?: boolean;
   title?: string;
   /** Id of the form that it sends, as Enter in one of its fields does: only where the button may be pressed. */
   form?: string;
@@ -48,16 +51,29 @@ export function Button({
   kind = "command",
   commands = false,
   disabled,
+  busy = false,
   title,
   form,
   onClick,
   ...rest
 }: ButtonProps) {
   const why = commands ? whyNotCommand.value : "";
+<<<<<<< HEAD
   // The second click of a double click is no second command, and none for what has come to lie under it.
   const once = (event: MouseEvent) => {
     if (event.detail < 2) onClick?.(event);
     else event.preventDefault();
+=======
+  const click = (event: MouseEvent) => {
+    // A form is not sent, either.
+    if (busy) event.preventDefault();
+    // The second click of a double click is no second command, and none for what has come to lie under it.
+    else if (!commands || event.detail < 2) onClick?.(event);
+  };
+  // Nor is a key that is held down.
+  const press = (event: KeyboardEvent) => {
+    if (event.repeat && event.key === "Enter") event.preventDefault();
+>>>>>>> 59c8f842d0dbe2dec7d4623b5e06fe134e2bf150
   };
   return (
     <button
@@ -66,10 +82,35 @@ export function Button({
       class={kind}
       data-testid={id}
       disabled={disabled || why !== ""}
+      aria-disabled={busy || undefined}
       title={why || title}
-      onClick={commands ? once : onClick}
+      onClick={click}
+      onKeyDown={commands ? press : undefined}
       {...rest}
     />
+  );
+}
+
+interface AskedTwiceProps {
+  asked: Signal<boolean>;
+  /** What asks, before it is asked. */
+  first: ButtonProps;
+  /** What does it. */
+  last: ButtonProps;
+  /** What leaves all as it is. */
+  keep: ButtonProps;
+}
+
+/**
+ * Does what cannot be taken back only by a second button. The first one becomes the one that keeps all: it has the
+ * keyboard and the pointer, so that nobody goes on by pressing twice.
+ */
+export function AskedTwice({ asked, first, last, keep }: AskedTwiceProps) {
+  return (
+    <>
+      {asked.value ? <Button key="last" {...last} /> : null}
+      <Button key="first" {...(asked.value ? { onClick: sets(asked, false), ...keep } : first)} />
+    </>
   );
 }
 
@@ -177,15 +218,16 @@ export function Trouble({ words }: { words: string }) {
 }
 
 /** Lets Escape, and the end of the part that waits, take back what is waited for, as soon as that is seen. */
-export function useEscape<T>(waiting: Signal<T | null>): void {
+export function useEscape<T>(waiting: Signal<T>, none: T): void {
   useLayoutEffect(() => {
     const stop = (event: KeyboardEvent) => {
-      if (event.key === "Escape") waiting.value = null;
+      // A dialog over it, and what a field offers, are closed first.
+      if (event.key === "Escape" && !event.defaultPrevented && !dialogOpen.peek()) waiting.value = none;
     };
     window.addEventListener("keydown", stop);
     return () => {
       window.removeEventListener("keydown", stop);
-      waiting.value = null;
+      waiting.value = none;
     };
   }, []);
 }

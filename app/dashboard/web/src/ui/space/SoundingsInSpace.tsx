@@ -138,7 +138,8 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
             id="points-reject"
             kind="command primary"
             commands
-            disabled={chosen === 0 || busy.value}
+            disabled={chosen === 0}
+            busy={busy.value}
             onClick={() => rule("reject")}
           >
             {say("review.reject")}
@@ -146,7 +147,8 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
           <Button
             id="points-restore"
             commands
-            disabled={chosen === 0 || busy.value}
+            disabled={chosen === 0}
+            busy={busy.value}
             onClick={() => rule("restore")}
           >
             {say("review.restore")}
@@ -154,7 +156,8 @@ export function SoundingsInSpace({ scene }: { scene: SeaFloorScene }) {
           <Button
             id="points-undo"
             commands
-            disabled={donePoints.value.length === 0 || busy.value}
+            disabled={donePoints.value.length === 0}
+            busy={busy.value}
             onClick={undo}
           >
             {say("space.undo")}

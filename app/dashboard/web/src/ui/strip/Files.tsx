@@ -104,7 +104,8 @@ export function Files() {
           <li key={product.name}>
             <Button
               id={`file-${product.name}`}
-              disabled={making.value[product.name] !== undefined || (product.needs_map && !hasMap.value)}
+              disabled={product.needs_map && !hasMap.value}
+              busy={making.value[product.name] !== undefined}
               onClick={() => download(product)}
             >
               {product.name}

@@ -156,7 +156,7 @@ function Row({ sounding: s, busy, onRule }: RowProps) {
       <Button
         id={`rule-${s.id}`}
         commands
-        disabled={busy}
+        busy={busy}
         onClick={() => onRule(s, counts ? "reject" : "restore")}
       >
         {busy ? "…" : counts ? say("review.reject") : say("review.restore")}
