@@ -11,7 +11,7 @@ from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, picture, show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 NO_WEBGL = """() => {
     const context = HTMLCanvasElement.prototype.getContext;

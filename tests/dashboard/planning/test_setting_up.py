@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from playwright.sync_api import FilePayload, Page, expect
+from playwright.sync_api import FilePayload, Page, Route, expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
@@ -53,6 +53,22 @@ def test_the_form_names_wrong_values_and_creates_nothing(page: Page, service: Se
     by_id(page, "create-mission").click()
     expect(by_id(page, "fault-max_depth_m")).to_be_in_viewport()
     assert len(service.get("/missions")) == before
+
+
+def test_a_name_that_is_being_typed_stays_while_the_form_is_drawn_anew(page: Page) -> None:
+    held: list[Route] = []
+    page.route("**/api/v1/planners", lambda route: held.append(route))
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    name = by_id(page, "sim-name-1")
+    name.select_text()
+    name.press_sequentially("north")
+    with page.expect_response("**/api/v1/planners"):
+        held[0].continue_()
+    page.evaluate("() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+    expect(name).to_have_value("north")
+    name.blur()
+    expect(name).to_have_value("north")
 
 
 def test_an_area_is_drawn_with_a_keep_out_zone_and_judged_at_once(page: Page, service: Service) -> None:

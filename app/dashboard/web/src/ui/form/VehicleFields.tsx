@@ -1,3 +1,4 @@
+import { useSignal } from "@preact/signals";
 import type { Sensor, VehicleSpec, VehicleView } from "../../api/types";
 import { type Own, ownKey, sensorOf, simulatedNames, vehicleNames } from "../../state/form/draft";
 import { SENSORS, schemaOf, vehicleFieldsOf } from "../../state/form/missionFields";
@@ -63,18 +64,26 @@ function VehicleName({ place, id, label }: { place: number; id: string; label: s
   const asked = draft.wanted[name];
   // A name that waits is shown while another vehicle has it; after that, what is sent is shown again.
   const shown = asked && names.some((other, i) => i !== place && other === asked) ? asked : name;
+  // What is being typed stays whatever is drawn anew meanwhile.
+  const typing = useSignal<string | null>(null);
   return (
     <input
       type="text"
       autocomplete="off"
       aria-label={label}
       aria-invalid={shown === name ? "false" : "true"}
-      value={shown}
+      value={typing.value ?? shown}
       data-testid={id}
+      onInput={({ currentTarget }) => {
+        typing.value = currentTarget.value;
+      }}
       onChange={({ currentTarget }) => {
         const typed = currentTarget.value.replaceAll(",", " ").trim();
+        typing.value = null;
         if (typed) set((now) => withVehicleCalled(now, place, typed));
-        else currentTarget.value = shown;
+      }}
+      onBlur={() => {
+        typing.value = null;
       }}
     />
   );

@@ -13,14 +13,15 @@ it("the second click of a double click is no second command", async () => {
   const clicks = (commands: boolean) => {
     const onClick = vi.fn();
     const button = Button({ commands, onClick, children: "Skip line" }) as unknown as {
-      props: { onClick: (event: { detail: number }) => void };
+      props: { onClick: (event: { detail: number; preventDefault: () => void }) => void };
     };
+    const preventDefault = vi.fn();
     // 0: by the keyboard.
-    for (const detail of [1, 2, 0]) button.props.onClick({ detail });
-    return onClick.mock.calls.length;
+    for (const detail of [1, 2, 0]) button.props.onClick({ detail, preventDefault });
+    return [onClick.mock.calls.length, preventDefault.mock.calls.length];
   };
-  expect(clicks(true)).toBe(2);
-  expect(clicks(false)).toBe(3);
+  expect(clicks(true)).toEqual([2, 1]);
+  expect(clicks(false)).toEqual([3, 0]);
 });
 
 it("a button that waits for its answer asks for nothing more and sends no form", async () => {

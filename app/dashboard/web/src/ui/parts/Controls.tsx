@@ -58,22 +58,16 @@ export function Button({
   ...rest
 }: ButtonProps) {
   const why = commands ? whyNotCommand.value : "";
-<<<<<<< HEAD
-  // The second click of a double click is no second command, and none for what has come to lie under it.
-  const once = (event: MouseEvent) => {
-    if (event.detail < 2) onClick?.(event);
-    else event.preventDefault();
-=======
   const click = (event: MouseEvent) => {
-    // A form is not sent, either.
-    if (busy) event.preventDefault();
     // The second click of a double click is no second command, and none for what has come to lie under it.
-    else if (!commands || event.detail < 2) onClick?.(event);
+    const isSecond = commands && event.detail > 1;
+    if (!busy && !isSecond) onClick?.(event);
+    // A form is not sent, either.
+    else event.preventDefault();
   };
   // Nor is a key that is held down.
   const press = (event: KeyboardEvent) => {
     if (event.repeat && event.key === "Enter") event.preventDefault();
->>>>>>> 59c8f842d0dbe2dec7d4623b5e06fe134e2bf150
   };
   return (
     <button
