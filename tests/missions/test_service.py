@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,7 +38,7 @@ from app.missions.operations.measurements import measure
 from app.missions.operations.polling import waypoint
 from app.missions.running.mission_views import planner_views, watched
 from app.missions.service import MissionService
-from app.missions.settings import ServiceSettings
+from app.missions.settings import ServiceSettings, SimulationSettings
 from app.missions.soundings.measurement import Measurement
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleKind, VehicleSpec
@@ -492,6 +493,15 @@ async def test_a_start_that_fails_half_way_claims_nothing(service: MissionServic
         )
     assert [v.name for v in (await view_of(service, running)).vehicles] == ["b"]
     await act(service, running, "abort", actor="Ana")
+
+
+async def test_a_terrain_file_that_is_missing_is_named_at_the_start(harbour_closed: Harbour, tmp_path: Path) -> None:
+    simulation = SimulationSettings(terrain=tmp_path / "bank.npz")
+    service = await harbour_closed.open(simulation=simulation)
+    mission = await service.create(sim_spec("a"))
+    with pytest.raises(ConflictError, match=r"bank\.npz: no such file") as caught:
+        await act(service, mission.id, "start", actor="Ana")
+    assert "simulation.terrain" in caught.value.remedy
 
 
 async def test_a_vehicle_taken_out_is_told_at_its_next_poll(service: MissionService) -> None:

@@ -35,7 +35,7 @@ from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor
 from simulator.equipment import Equipment
-from simulator.floors.terrain import Terrain
+from simulator.floors.terrain import Terrain, TerrainError
 from simulator.obstacles.scanning import Scanning
 from simulator.sonars.raycasting import warm_up
 from simulator.sonars.sensors import SensorKind, SonarNoise
@@ -167,6 +167,9 @@ class SimFleetLink(FleetLink):
         )
         try:
             self.launch(launch)
+        except TerrainError as error:
+            remedy = "name a terrain file in simulation.terrain that can be read, or none"
+            raise VehicleRefusedError(vehicle.name, f"cannot be launched: {error}", remedy) from error
         except ValueError as error:
             raise VehicleRefusedError(vehicle.name, f"cannot be launched: {error}", "change its start") from error
 
