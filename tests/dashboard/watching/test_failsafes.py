@@ -316,8 +316,13 @@ def test_the_place_of_the_own_ship_is_taken_as_it_is_now(scene: Scene) -> None:
     expect(by_id(page, "own-ship-fault-go-to")).to_contain_text("The own ship is not heard")
     tell()
     scene.wait(lambda: scene.service.get("/traffic")["own_ship"], "she is heard")
-    by_id(page, "own-ship-go-to").click()
-    expect(page.get_by_role("button", name="Unmark")).to_be_visible()
+
+    def is_marked() -> bool:
+        # The page hears of her a moment after the service.
+        by_id(page, "own-ship-go-to").click()
+        return page.get_by_role("button", name="Unmark").is_visible()
+
+    scene.wait(is_marked, "her place is marked")
     expect(by_id(page, "own-ship-fault-go-to")).to_have_count(0)
     by_id(page, "go-to").click()
     by_id(page, "new-mission").click()
