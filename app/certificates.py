@@ -1,4 +1,4 @@
-"""Certificates: how a service's own one is recognised, and why one was refused."""
+"""Certificates: how a service's own one is recognised."""
 
 import re
 import ssl
@@ -38,10 +38,3 @@ def _first(certificates: str) -> str:
     if found is None:
         raise ValueError("it holds no certificate (PEM)")
     return f"{found[0]}\n"
-
-
-def certificate_refusal(error: BaseException | None) -> ssl.SSLCertVerificationError | None:
-    """Return why a certificate was refused, where that is what is behind an error."""
-    while error is not None and not isinstance(error, ssl.SSLCertVerificationError):
-        error = error.__cause__ or error.__context__
-    return error

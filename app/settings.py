@@ -19,9 +19,9 @@ from pydantic_settings import (
     TomlConfigSettingsSource,
 )
 
-from app.file_choices import OptionalFile
 from app.log_choices import LogFormat, LogLevel
 from app.missions.settings import ServiceSettings
+from app.optional_file import OptionalFile
 
 PREFIX = "BATHYFLEET_"
 CONFIG_VARIABLE = "BATHYFLEET_CONFIG"

@@ -45,7 +45,7 @@ def list_missions(
         list[str] | None, typer.Option("--state", help="Only missions in this state, as often as needed.")
     ] = None,
     limit: Annotated[int | None, typer.Option(min=1, help="Most missions.", show_default="all")] = None,
-    before: Annotated[str, typer.Option(help="Only missions older than this: its id, or the begin of it.")] = "",
+    before: Annotated[str, typer.Option(help="Only missions older than this: its id, or the beginning of it.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, as GET /api/v1/missions answers.")] = False,
     url: Url = None,
     token: Token = None,

@@ -44,6 +44,8 @@ class RunningService:
     ) -> None:
         import httpx
 
+        from bathyfleet.client.connection import trust
+
         self._pinned = certificate is not None
         self.url = url.rstrip("/").removesuffix("/api/v1")
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
@@ -53,7 +55,7 @@ class RunningService:
                 headers=headers,
                 timeout=300.0,
                 trust_env=not on_this_machine,
-                verify=_usual_trust() if certificate is None else _trust(certificate),
+                verify=(trust(self.url, verify=True) if certificate is None else _trust(certificate)) or False,
             )
         except httpx.InvalidURL as error:
             raise CommandError(f"{url!r} is no URL: {error}", "Such as http://127.0.0.1:8080") from None
@@ -81,7 +83,7 @@ class RunningService:
     def _answer(self, method: str, path: str, **content: Any) -> Any:
         import httpx
 
-        from app.certificates import certificate_refusal
+        from bathyfleet.client.retry import certificate_refusal
 
         try:
             return _content(self._client.request(method, path, **content))
@@ -120,24 +122,12 @@ def own_url(settings: "Settings") -> str:
     return f"{'http' if settings.tls_certificate is None else 'https'}://{host}:{settings.port}"
 
 
-def _usual_trust() -> "ssl.SSLContext":
-    """Return what trusts the public authorities and those that this machine trusts, or SSL_CERT_FILE's alone."""
-    import os
-
-    import httpx
-
-    context = httpx.create_ssl_context()
-    if not os.environ.keys() & {"SSL_CERT_FILE", "SSL_CERT_DIR"}:
-        context.load_default_certs()
-    return context
-
-
 def _trust(file: "Path") -> "ssl.SSLContext":
     """Return what trusts the certificate in this file and no other. Raises CommandError where it cannot be read."""
-    from app.certificates import first_certificate, trusting
+    from app.certificates import trusting
 
     try:
-        return trusting(first_certificate(file))
+        return trusting(file.read_text())
     except (OSError, ValueError) as error:
         raise CommandError(f"{file} cannot be read: {error}", "tls_certificate names it") from None
 

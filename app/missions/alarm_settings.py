@@ -7,8 +7,8 @@ from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
 
-from app.file_choices import OptionalFile
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
+from app.optional_file import OptionalFile
 
 SECRET_PREFIX = "whsec_"  # noqa: S105 - of the standard, before the secret
 LEAST_SECRET_BYTES = 16

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from app.compute.settings import ComputeSettings
-from app.file_choices import OptionalFile
 from app.missions.alarm_settings import AlarmSettings
+from app.optional_file import OptionalFile
 from imc_bridge.settings import ConsoleSettings
 
 if TYPE_CHECKING:

@@ -15,21 +15,24 @@ from tests.support.api.rest import make_client, mission_spec, running
 from tests.support.certificates import Authority
 
 
-async def shaken_hands(shown: tuple[Path, Path], trust: ssl.SSLContext) -> None:
-    """Open a connection to who shows a certificate. Raises SSLError where that is not trusted."""
+async def shaken_hands(shown: tuple[Path, Path], trust: ssl.SSLContext) -> bytes | None:
+    """Return what is shown as by a connection that trusts it, DER. Raises SSLError where it is not trusted."""
     served = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     served.load_cert_chain(*shown)
     server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0, ssl=served)
     async with server:
         port = server.sockets[0].getsockname()[1]
         _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=trust)
+        seen: bytes | None = writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
         writer.close()
+        return seen
 
 
 async def test_a_certificate_is_recognised_whoever_signed_it_and_when_it_has_expired(authority: Authority) -> None:
     for until in ("20981231000000Z", "20210101000000Z"):
         ours = authority.sign("auv.example", until=until)
-        await shaken_hands(ours, trusting(first_certificate(ours[0])))
+        certificate = first_certificate(ours[0])
+        assert await shaken_hands(ours, trusting(certificate)) == ssl.PEM_cert_to_DER_cert(certificate)
 
 
 async def test_another_certificate_of_the_same_authority_is_not_ours(authority: Authority) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Browser, Page, Request, Route, expect
 
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
@@ -84,13 +84,20 @@ def test_the_keyboard_stays_where_a_mission_was_paused(page: Page, service: Serv
     page.keyboard.press("Enter")
     held[0].continue_()
     expect_state(page, "paused")
-    expect(by_id(page, "resume")).to_be_focused()
+    expect(by_id(page, "commands")).to_be_focused()
     assert len(held) == 1
     # The new state is told before the answer to the command.
     expect(by_id(page, "resume")).to_be_enabled()
+    asked: list[Request] = []
+    page.on("request", lambda request: asked.append(request))
+    # Pressed once more it does not undo what it did.
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    expect(by_id(page, "resume")).to_be_focused()
+    assert not [request for request in asked if request.url.endswith("/resume")]
     page.keyboard.press("Enter")
     expect_state(page, "running")
-    expect(by_id(page, "pause")).to_be_focused()
+    expect(by_id(page, "commands")).to_be_focused()
 
 
 def test_the_keyboard_stays_at_the_vehicle_that_was_ordered(page: Page, service: Service) -> None:

@@ -32,7 +32,6 @@ def root(address: str) -> str:
     url = httpx.URL(address)
     if url.scheme not in ("http", "https") or not url.host:
         raise ValueError(f"address: {address!r} is not like {ADDRESS} or https://host:port")
-    # Scheme and host in small letters: by the scheme certificates are checked.
     return str(url).rstrip("/").removesuffix("/api/v1")
 
 
@@ -41,7 +40,7 @@ def trust(address: str, verify: bool | ssl.SSLContext) -> ssl.SSLContext | None:
 
     Reading what is trusted takes longer than most requests; plain HTTP has no use for it.
     """
-    if not address.startswith("https:"):
+    if httpx.URL(address).scheme != "https":
         return None
     if isinstance(verify, ssl.SSLContext):
         return verify

@@ -84,7 +84,7 @@ class Attempts:
         """
         if isinstance(error, httpx.LocalProtocolError):
             raise ValueError(f"{self._what}: it cannot be sent: {error}") from error
-        refused = _certificate_refusal(error)
+        refused = certificate_refusal(error)
         if refused is not None:
             raise UnreachableError(
                 f"{self._what}: its certificate is not trusted: {refused.verify_message}; verify= says what is"
@@ -136,7 +136,7 @@ def _retry_after_s(answer: httpx.Response) -> float:
         return 0.0
 
 
-def _certificate_refusal(error: BaseException | None) -> ssl.SSLCertVerificationError | None:
+def certificate_refusal(error: BaseException | None) -> ssl.SSLCertVerificationError | None:
     """Return why a certificate was refused, where that is what is behind an error: asking again changes nothing."""
     while error is not None and not isinstance(error, ssl.SSLCertVerificationError):
         error = error.__cause__ or error.__context__

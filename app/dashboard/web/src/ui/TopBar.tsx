@@ -99,7 +99,8 @@ export function TopBar() {
         ⚙
       </Button>
       <AccountButton />
-      <div class="commands">
+      {/* It has the keyboard while its buttons change. */}
+      <div class="commands" tabIndex={-1} data-testid="commands">
         <WayForward />
         <StopNow />
       </div>
@@ -233,7 +234,7 @@ function LinkSummary() {
 
 const WAYS = { start: "topBar.start", pause: "topBar.pause", resume: "topBar.resume" } as const;
 
-/** What the mission's state allows, never more than one: always the same button, so that the keyboard stays on it. */
+/** What the mission's state allows, never more than one. Each is a button of its own: who presses twice does not undo it. */
 function WayForward() {
   const present = mission.value;
   if (!present) return null;
@@ -244,6 +245,7 @@ function WayForward() {
   const label = say(WAYS[action]);
   return (
     <Button
+      key={action}
       id={action}
       kind="command primary"
       commands

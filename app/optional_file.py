@@ -1,4 +1,4 @@
-"""How a file is named in the settings that the service does without."""
+"""Settings that name a file which the service does without."""
 
 from pathlib import Path
 from typing import Annotated
