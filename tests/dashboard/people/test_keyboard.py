@@ -31,9 +31,7 @@ def portuguese(browser: Browser, service: Service) -> Iterator[Page]:
 
 
 @pytest.mark.parametrize("width", [1280, 390], ids=["wide", "phone"])
-def test_that_the_map_cannot_be_drawn_is_told_where_nothing_covers_it(
-    page: Page, service: Service, width: int
-) -> None:
+def test_that_the_map_cannot_be_drawn_is_told_where_nothing_covers_it(page: Page, service: Service, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 844})
     page.add_init_script(f"({NO_WEBGL})()")
     page.goto(f"/#/missions/{service.create(name='No map')}")
