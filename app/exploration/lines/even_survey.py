@@ -57,7 +57,7 @@ def even_survey(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern
 
     def survey(n: int) -> EvenSurvey | None:
         if n not in dealt:
-            dealt[n] = _survey_of(sweep, vehicles, [turns] * len(vehicles.en_m), pattern, n)
+            dealt[n] = survey_of(sweep, vehicles, [turns] * len(vehicles.en_m), pattern, n)
         return dealt[n]
 
     return survey(most_lines(lambda n: survey(n) is not None))
@@ -94,13 +94,16 @@ def fullest_surveys(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pa
         for _ in range(HALVINGS if high > low else 0):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if affordable(n, middle) else (middle, high)
-        survey = _survey_of(sweep, vehicles, turns, ending(high), n)
+        survey = survey_of(sweep, vehicles, turns, ending(high), n)
         found += [] if survey is None else [survey]
     return found
 
 
-def _survey_of(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern, n: int) -> EvenSurvey | None:
-    """Return the survey of ``n`` lines of a pattern that takes the least way; None where the team cannot fly it."""
+def survey_of(sweep: Sweep, vehicles: Vehicles, turns: Sequence[Turns], pattern: Pattern, n: int) -> EvenSurvey | None:
+    """Return the survey of ``n`` lines of a pattern that takes the least way; None where the team cannot fly it.
+
+    ``turns`` are what they cost each vehicle.
+    """
 
     def length_m(way: list[FloatArray]) -> float:
         return sum(way_m(vehicles, turns[i], i, route) for i, route in enumerate(way))

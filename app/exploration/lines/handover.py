@@ -27,10 +27,15 @@ def hand_over(routes: dict[str, FloatArray], vehicles: tuple[str, ...], en_m: Fl
     for name in vehicles:
         if name not in result:
             donor = max(sorted(result), key=lambda k: route_length(here[k], result[k]))
-            half = (len(result[donor]) + 1) // 2
-            # The piece between the halves may be a whole line: it belongs to the second one.
-            begin = half - 1 if len(result[donor]) > half else half
-            result[donor], rest = result[donor][:half], result[donor][begin:]
-            backwards = len(rest) > 1 and np.hypot(*(rest[-1] - here[name])) < np.hypot(*(rest[0] - here[name]))
-            result[name] = rest[::-1] if backwards else rest
+            result[donor], result[name] = halves(result[donor], here[name])
     return result
+
+
+def halves(rest: FloatArray, taker_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a rest (k, 2) in two: what its vehicle keeps, and what one at ``taker_m`` (2,) takes, from its side."""
+    half = (len(rest) + 1) // 2
+    # The piece between the halves may be a whole line: it belongs to the second one.
+    begin = half - 1 if len(rest) > half else half
+    taken = rest[begin:]
+    backwards = len(taken) > 1 and np.hypot(*(taken[-1] - taker_m)) < np.hypot(*(taken[0] - taker_m))
+    return rest[:half], taken[::-1] if backwards else taken

@@ -33,6 +33,14 @@ def longer_axis_rad(area: FloatArray) -> float:
     return float(angles[np.argmax(lengths)])
 
 
+def direction_of_lines_rad(area: FloatArray, heading_deg: float | None) -> float:
+    """Return the direction of lines of a heading, clockwise from north; without one that of the longer side.
+
+    Anticlockwise from east, in [0, pi).
+    """
+    return longer_axis_rad(area) if heading_deg is None else float(np.radians(90.0 - heading_deg) % np.pi)
+
+
 def axes_of(direction_rad: float) -> FloatArray:
     """Return unit vectors (2, 2) across and along lines of a direction, anticlockwise from east."""
     along = np.array([np.cos(direction_rad), np.sin(direction_rad)])

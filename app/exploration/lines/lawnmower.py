@@ -1,4 +1,7 @@
-"""Even parallel lines: a strip for each vehicle, as usual practice has it, or shared out over the whole area."""
+"""Even parallel lines: a strip for each vehicle, as usual practice has it, or shared out over the whole area.
+
+As close as the vehicles' budgets allow, or at the distance that is asked for.
+"""
 
 import itertools
 from dataclasses import replace
@@ -23,9 +26,10 @@ from app.exploration.core.routes import (
 from app.exploration.lines.even_survey import Pattern, fullest_surveys
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.ground import Ground
-from app.exploration.lines.handover import hand_over
-from app.exploration.lines.lattice import Sweep, boustrophedon, flown_length, longer_axis_rad, route_length
+from app.exploration.lines.handover import halves, hand_over
+from app.exploration.lines.lattice import Sweep, boustrophedon, direction_of_lines_rad, flown_length, route_length
 from app.exploration.lines.parts import is_cut_off, parts_of
+from app.exploration.lines.spaced_lines import spaced_lines
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
@@ -33,6 +37,10 @@ SHARED = Pattern(parts=8)
 """How lines lie that a team shares out."""
 ACROSS = 0.9
 """Lines lie across the longer axis where the ground is closer to them by this factor, squared and on average."""
+LEAST_SHARED = 4
+"""Who has as many ends of lines left to fly, those of two, can leave one to another."""
+SOONER = 0.8
+"""Who takes lines of another is done with them in this part of the time that the other would be done in, or sooner."""
 LEAST_LEG_M = 5.0
 """Who can fly no farther is done."""
 CORNER_LOSS = 0.4
@@ -42,7 +50,11 @@ LEAST_BUDGET_M = 1.0
 
 
 def lawnmower_routes(
-    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turn_radius_m: float = 0.0
+    constraints: Constraints,
+    starts: FloatArray,
+    budgets_m: FloatArray,
+    turn_radius_m: float = 0.0,
+    heading_deg: float | None = None,
 ) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): lines along the longer axis, as many as fit into the distance it can travel.
 
@@ -58,8 +70,11 @@ def lawnmower_routes(
         Distances that the vehicles can travel; their strips are in proportion to them.
     turn_radius_m
         Of the circles in which they turn, which takes some of those distances.
+    heading_deg
+        Of the lines, clockwise from north; None: along the longer axis.
     """
-    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
+    direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
+    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), direction_rad)
     order = np.argsort(sweep.to_uv(starts)[:, 0], kind="stable")
     cuts = sweep.shares(np.maximum(budgets_m[order], LEAST_BUDGET_M))
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
@@ -70,7 +85,12 @@ def lawnmower_routes(
 
 
 def shared_lines(
-    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray, corner_m: float = 0.0
+    constraints: Constraints,
+    starts: FloatArray,
+    budgets_m: FloatArray,
+    radii_m: FloatArray,
+    corner_m: float = 0.0,
+    heading_deg: float | None = None,
 ) -> list[FloatArray]:
     """Return each vehicle's route (k, 2): neighbouring ones of the most even lines that the team can fly together.
 
@@ -90,34 +110,45 @@ def shared_lines(
         Of the circles in which each turns, which takes some of those distances.
     corner_m
         What a corner takes of them besides.
+    heading_deg
+        The course of all lines, clockwise from north, where that is asked for.
     """
+    turns = [Turns(float(radius_m), corner_m) for radius_m in radii_m]
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(starts)
     for part, members in parts_of(constraints, FreeSpace(constraints, BORDER_MARGIN_M), starts):
-        own = _lines_of_one(part, starts[members], budgets_m[members], radii_m[members], corner_m)
+        own = _lines_of_one(part, starts[members], budgets_m[members], [turns[i] for i in members], heading_deg)
         for i, route in zip(members, own, strict=True):
             routes[i] = route
     return routes
 
 
 def _lines_of_one(
-    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, radii_m: FloatArray, corner_m: float
+    constraints: Constraints, starts: FloatArray, budgets_m: FloatArray, turns: list[Turns], heading_deg: float | None
 ) -> list[FloatArray]:
     """Return :func:`shared_lines` of an area in one part."""
-    free, axis = FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area)
+    free, axis = FreeSpace(constraints, BORDER_MARGIN_M), direction_of_lines_rad(constraints.area, heading_deg)
     vehicles = Vehicles(np.ascontiguousarray(starts), np.full(len(starts), np.nan), np.asarray(budgets_m, dtype=float))
-    ground, turns = Ground.of(constraints), [Turns(float(radius_m), corner_m) for radius_m in radii_m]
+    ground = Ground.of(constraints)
+    directions = [(axis, 1.0), (axis + np.pi / 2, 1.0 / ACROSS)] if heading_deg is None else [(axis, 1.0)]
     best: tuple[float, list[FloatArray]] | None = None
-    for direction, counts in ((axis, 1.0), (axis + np.pi / 2, 1.0 / ACROSS)):
+    for direction, counts in directions:
         for survey in fullest_surveys(Sweep(constraints, free, direction), vehicles, turns, SHARED):
             ways = [np.vstack([start, route]) for start, route in zip(starts, survey.routes, strict=True)]
             left_m2 = counts * float((ground.away_m(ways) ** 2).sum())
             if best is None or left_m2 < best[0] * (1.0 - 1e-9):
                 best = left_m2, survey.routes
-    return lawnmower_routes(constraints, starts, budgets_m, float(np.max(radii_m))) if best is None else best[1]
+    widest_m = max(turn.radius_m for turn in turns)
+    return lawnmower_routes(constraints, starts, budgets_m, widest_m, heading_deg) if best is None else best[1]
 
 
 def route_across(
-    constraints: Constraints, en_m: FloatArray, vehicle: int, passes: int, budget_m: float, turn_radius_m: float = 0.0
+    constraints: Constraints,
+    en_m: FloatArray,
+    vehicle: int,
+    passes: int,
+    budget_m: float,
+    turn_radius_m: float = 0.0,
+    heading_deg: float | None = None,
 ) -> FloatArray | None:
     """Return the next lines (k, 2) of a vehicle that has flown its own and can go on; None where it cannot.
 
@@ -132,8 +163,11 @@ def route_across(
         How far it can fly.
     turn_radius_m
         Of the circles in which it turns.
+    heading_deg
+        The course of the lines that it has flown, clockwise from north; None: along the longer axis.
     """
-    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), longer_axis_rad(constraints.area))
+    direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
+    sweep = Sweep(constraints, FreeSpace(constraints, BORDER_MARGIN_M), direction_rad)
     uv, area_uv = sweep.to_uv(en_m), sweep.to_uv(constraints.area)
     if passes == 0 and budget_m <= float(np.ptp(area_uv[:, 1])):
         return None
@@ -156,10 +190,11 @@ class LawnmowerPlanner(PlannerBase):
 
     A vehicle that can still fly when it has flown its lines, as one whose battery lasts longer than was sure at first,
     gets more of them, across its strip; what is left then is flown as straight legs over ground that lines left out.
+    Where the distance of lines is asked for, it takes half of the longest rest instead, and is done when none is left.
     """
 
     name: ClassVar[str] = "lawnmower"
-    own_options: ClassVar[frozenset[str]] = frozenset()
+    own_options: ClassVar[frozenset[str]] = frozenset({"line_spacing_m", "line_heading_deg"})
     plans_for_all = True
     flies_lines = True
     decides_apart = True
@@ -236,6 +271,24 @@ class LawnmowerPlanner(PlannerBase):
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
+    def _lines_for(self, team: Situation, corner_m: float) -> list[FloatArray]:
+        """Return each vehicle's route, (k, 2), over lines at the distance asked for, or as close as can be flown."""
+        constraints, en, left_m = team.constraints, team.positions[:, :2], metres_left(team)
+        radii_m, heading_deg = self._turn_radii_m(team), self.options.line_heading_deg
+        routes = None
+        if self.options.line_spacing_m is not None:
+            routes = spaced_lines(
+                constraints,
+                BORDER_MARGIN_M,
+                direction_of_lines_rad(constraints.area, heading_deg),
+                self.options.line_spacing_m,
+                Vehicles(en, np.full(len(en), np.nan), left_m),
+                [Turns(float(radius_m), corner_m) for radius_m in radii_m],
+            )
+        if routes is None:
+            return shared_lines(constraints, en, left_m, radii_m, corner_m, heading_deg)
+        return routes
+
     def _turn_radii_m(self, team: Situation) -> FloatArray:
         """Return the radius of each vehicle's circles, (n_vehicles,); 0 where turns take no way."""
         if team.left_m is None or not team.turns_take_way:
@@ -254,8 +307,13 @@ class LawnmowerPlanner(PlannerBase):
         for i, name in enumerate(team.vehicles):
             if not team.moves[i] or self._left(team, i) > 0.0:
                 continue
+            if self.options.line_spacing_m is not None:
+                if not self._help_out(team, i):
+                    done.add(name)
+                continue
             passes = self._passes.get(name, 0)
-            route = route_across(team.constraints, en, i, passes, float(left_m[i]), radii_m[i])
+            heading_deg = self.options.line_heading_deg
+            route = route_across(team.constraints, en, i, passes, float(left_m[i]), radii_m[i], heading_deg)
             if route is not None:
                 self._passes[name] = passes + 1
             elif left_m[i] >= LEAST_LEG_M:
@@ -266,6 +324,19 @@ class LawnmowerPlanner(PlannerBase):
             else:
                 done.add(name)
         return frozenset(done)
+
+    def _help_out(self, team: Situation, i: int) -> bool:
+        """Let a vehicle that has flown its lines take some of another's, where all are done clearly sooner then."""
+        en, name, left_m = team.positions[:, :2], team.vehicles[i], metres_left(team)
+        needs = np.array([self._left(team, k) for k in range(len(en))]) / np.maximum(left_m, LEAST_BUDGET_M)
+        other = int(np.argmax(needs))
+        donor = team.vehicles[other]
+        kept, given = halves(self._routes[donor], en[i])
+        way_m = route_length(en[i], given)
+        if len(self._routes[donor]) < LEAST_SHARED or way_m >= min(left_m[i], SOONER * needs[other] * left_m[i]):
+            return False
+        self._routes[donor], self._routes[name] = kept, given
+        return True
 
     def _over_gaps(self, team: Situation, i: int, budget_m: float) -> FloatArray | None:
         """Return the leg of a vehicle, (1, 2), over ground that is far from all lines; None where there is none."""
@@ -298,7 +369,7 @@ class LawnmowerPlanner(PlannerBase):
         en = team.positions[:, :2]
         if not self._routes:
             corner_m = CORNER_LOSS * team.constraints.max_step_m if team.left_m is None else 0.0
-            routes = shared_lines(team.constraints, en, metres_left(team), self._turn_radii_m(team), corner_m)
+            routes = self._lines_for(team, corner_m)
             self._routes = dict(zip(team.vehicles, routes, strict=True))
             self._dealt = [np.vstack([here, route]) for here, route in zip(en, routes, strict=True)]
             return

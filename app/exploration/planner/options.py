@@ -58,6 +58,20 @@ class PlannerOptions(BaseModel):
     cruise_depth_m: float | None = Field(
         None, ge=0, description="Depth at which vehicles survey; by default the depth at which each joined."
     )
+    line_spacing_m: float | None = Field(
+        None,
+        ge=0.5,
+        le=1000,
+        description="Distance from line to line. The mission ends when all lines are flown, or with its budget; by "
+        "default lines are as close as the budget allows.",
+    )
+    line_heading_deg: float | None = Field(
+        None,
+        ge=0,
+        lt=360,
+        description="Course of the lines, clockwise from true north; by default that of the area's longer side, or "
+        "what the planner finds better.",
+    )
     rollouts: int = Field(300, ge=0, le=100_000, description="Changes to the team's plan that a rollout step tries.")
     tries: int = Field(0, ge=0, le=10_000, description="Real tries per step of OSARSES (only in simulation).")
     accuracy_sd_m: float = Field(

@@ -10,7 +10,7 @@ from app.exploration.core.bottom import Bottom
 from app.exploration.core.coverage import Coverage, SwathTask
 from app.exploration.core.problem import Proposal, Situation
 from app.exploration.core.routes import FreeSpace
-from app.exploration.lines.lattice import longer_axis_rad
+from app.exploration.lines.lattice import direction_of_lines_rad
 from app.exploration.planner.base import PlannerBase, settle
 from app.exploration.swath.near_zones import BarredGround
 from app.exploration.swath.raster import Flying
@@ -33,7 +33,7 @@ class SwathPlanner(PlannerBase):
     """Full coverage with swath sonars: lines as far apart as the measured depth allows, gaps filled last."""
 
     name: ClassVar[str] = "swath"
-    own_options: ClassVar[frozenset[str]] = frozenset()
+    own_options: ClassVar[frozenset[str]] = frozenset({"line_heading_deg"})
     runs_errands: ClassVar[bool] = False
     plans_for_all = True
     flies_lines = True
@@ -114,8 +114,15 @@ class SwathPlanner(PlannerBase):
         if self._survey is None:
             altitude_m = max(GUESSED_ALTITUDE_M, team.constraints.min_altitude_m)
             guess_m = float(np.median(list(self._cruise.values()))) + altitude_m
-            along_rad = longer_axis_rad(team.constraints.area)
-            self._survey = SwathSurvey(along_rad, task.coverage.cell_m, guess_m, task.crosslines, self._space(team))
+            heading_deg = self.options.line_heading_deg
+            self._survey = SwathSurvey(
+                direction_of_lines_rad(team.constraints.area, heading_deg),
+                task.coverage.cell_m,
+                guess_m,
+                task.crosslines,
+                self._space(team),
+                turned=heading_deg is None,
+            )
             if self._kept is not None:
                 self._survey.recall(self._kept)
                 self._kept = None

@@ -66,6 +66,8 @@ class SwathSurvey:
         Length of the lines across all others that are flown in the end, as a share of those.
     space
         Where vehicles may go; None: wherever lines lie.
+    turned
+        Whether lines may get another direction than the preferred one.
     """
 
     def __init__(
@@ -75,8 +77,11 @@ class SwathSurvey:
         guess_m: float,
         crosslines: float = 0.0,
         space: FreeSpace | None = None,
+        *,
+        turned: bool = True,
     ) -> None:
         self._crosslines = crosslines
+        self._turned = turned
         self._ground = space
         self._space = None if space is None or space.is_open else space
         """Where a straight way may lead through what vehicles may not enter; None: nowhere."""
@@ -458,6 +463,8 @@ class SwathSurvey:
             share_out(self._sweeps, self._rasters.of(coverage, direction_rad), asked.flying, asked.team)
 
     def _best_direction(self, coverage: Coverage, asked: Question) -> float:
+        if not self._turned:
+            return self._direction_rad
         guess_m, cell_m = self._rasters.guess_m, self._rasters.cell_m
         gain = TURNING_GAIN if len(asked.team) == 1 else TURNING_TEAM_GAIN
         return best_direction(coverage, asked.flying, guess_m, self._direction_rad, gain, asked.team, cell_m)[0]

@@ -17,7 +17,7 @@ from app.exploration.cao.planner import CaoPlanner
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.coverage import Coverage
 from app.exploration.core.routes import FreeSpace
-from app.exploration.lines.lattice import longer_axis_rad
+from app.exploration.lines.lattice import direction_of_lines_rad
 from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.planners import COVERERS
 from app.exploration.rollout.planner import RolloutPlanner
@@ -115,7 +115,8 @@ class Plan:
     depth_m: float
     """How deep the bottom is taken to be."""
     whole_survey: dict[str, WholeWay] | None = None
-    """What each vehicle does until nothing is left to ensonify, whatever its budget; None: that was not planned."""
+    """What each vehicle does until nothing is left to ensonify, or all lines at the distance asked for are flown,
+    whatever its budget; None: that was not planned."""
 
 
 def plan(
@@ -155,16 +156,20 @@ def plan(
     if not own:
         even = PlannerSpec(name=LawnmowerPlanner.name, options=spec.planner.options)
         spec = spec.model_copy(update={"planner": even})
-    all_swept = None
-    if spec.planner.name in COVERERS:
-        routes, done = _swath_lines(spec, members, constraints, begin_m, depth_m, over)
-        sweeps = {}
+
+    def ways_whole(routes: list[FloatArray]) -> dict[str, WholeWay]:
+        found = {}
         for i, (member, route) in enumerate(zip(members, routes, strict=True)):
             way = _cut(np.vstack([starts_m[i], begin_m[i], route]), math.inf)
-            sweeps[member.name] = whole_way(
+            found[member.name] = whole_way(
                 spec, constraints, member, way, _clock_s(spec, member, way), float(_along(way)[-1])
             )
-        all_swept = sweeps if done else None
+        return found
+
+    all_of_it = None
+    if spec.planner.name in COVERERS:
+        routes, done = _swath_lines(spec, members, constraints, begin_m, depth_m, over)
+        all_of_it = ways_whole(routes) if done else None
         # Beyond what a vehicle may fly nothing is missing.
         whole = done or all(
             _along(np.vstack([begin_m[i], route]))[-1] >= member.way_left_m(spec)
@@ -172,6 +177,8 @@ def plan(
         )
     else:
         routes, whole = _planned(spec, members, constraints, begin_m, depth_m, over)
+        if spec.planner.name == LawnmowerPlanner.name and spec.planner.options.line_spacing_m is not None:
+            all_of_it = ways_whole(routes)
     ways_in_m = np.where(
         [from_outside(start, inner, spec) for start in starts_m], np.hypot(*(begin_m - starts_m).T), 0.0
     )
@@ -184,7 +191,7 @@ def plan(
         )
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
-    return Plan(ways, whole, own, depth_m, all_swept)
+    return Plan(ways, whole, own, depth_m, all_of_it)
 
 
 def _planned(
@@ -236,8 +243,9 @@ def _swath_lines(
         for how in flying.values():
             coverage = barred.within_sight(coverage, how)
     space = FreeSpace(constraints.for_plans, 0.0)
-    along_rad, crosslines = longer_axis_rad(constraints.area), spec.coverage.crosslines_pct / 100.0
-    survey = SwathSurvey(along_rad, TURNED * coverage.cell_m, depth_m, crosslines, space)
+    heading_deg, crosslines = spec.planner.options.line_heading_deg, spec.coverage.crosslines_pct / 100.0
+    along_rad = direction_of_lines_rad(constraints.area, heading_deg)
+    survey = SwathSurvey(along_rad, TURNED * coverage.cell_m, depth_m, crosslines, space, turned=heading_deg is None)
     sounding = [(i, member) for i, member in enumerate(members) if member.name in flying]
     found = lines_flown_ahead(
         survey,

@@ -70,8 +70,8 @@ class PlanView(View):
     )
     whole: bool = Field(description="Whether this is all; else the ways end where the time for planning was up")
     whole_survey: WholeSurveyView | None = Field(
-        description="What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath "
-        "sonars, or not all of it was planned in time"
+        description="What it takes until nothing is left to ensonify, or all lines at the distance asked for are "
+        "flown, whatever the budget; null: a survey of neither kind, or not all of it was planned in time"
     )
     assumptions: list[str] = Field(description="What was taken to be so, in words")
 

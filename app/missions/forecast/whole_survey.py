@@ -1,4 +1,4 @@
-"""What all of a survey with swath sonars takes, whatever its budget: until nothing is left to ensonify."""
+"""What all of a survey takes, whatever its budget: until nothing is left to ensonify, or all lines are flown."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class WholeVehicleView(View):
 
 
 class WholeSurveyView(View):
-    """What it takes until swath sonars have nothing left to ensonify, whatever the budget is."""
+    """What it takes until nothing is left to ensonify or all lines are flown, whatever the budget is."""
 
     duration_s: float = Field(description="Until the last vehicle is done, by the vehicles' time; median")
     duration_s_range: ForecastRange

@@ -1,6 +1,7 @@
 """The side of a mission that lives in memory: its map, its journal, its vehicles' reports and its watchers."""
 
 import asyncio
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime
@@ -530,6 +531,7 @@ class LiveMission:
         """Return how long the mission still takes, wall-clock seconds; a search as long as its time window lasts.
 
         A survey for a time or a distance takes what is left of that, as its vehicles fly; of steps, what steps took.
+        One that ends when its lines are flown takes no longer than these.
         """
         if self.header.state in ENDED:
             return 0.0
@@ -540,13 +542,24 @@ class LiveMission:
             return None if self.awaits_batteries else 0.0
         left = remaining(self.spec, self.team)
         if left.minutes is not None and self.header.state not in NOT_STARTED:
-            return 60.0 * left.minutes / self._time_scale
+            return min(60.0 * left.minutes, self._lines_left_s()) / self._time_scale
         if self.reports.leg_s is None:
             return None
         committed = [len(m.ahead) + m.ordered for m in self.team.going_on]
         leg_m, flying = self.spec.limits.max_step_m, [*self.team.plannable, *self.team.held]
         legs = [m.way_left_m(self.spec) / leg_m for m in flying] or [self.spec.steps - self.header.step]
         return (max(0.0, *legs) + max(committed, default=0)) * self.reports.leg_s
+
+    def _lines_left_s(self) -> float:
+        """Return how long the team flies lines at a distance that was asked for, of its time; infinite without such."""
+        left_m = (self.header.terms or {}).get("left_m")
+        going_on = self.team.going_on
+        if left_m is None or not going_on or self.spec.planner.options.line_spacing_m is None:
+            return math.inf
+        ahead_m = np.array([member.way_ahead_m(self.frame) for member in going_on])
+        speeds_mps = np.array([self.spec.speed_of(member.spec) for member in going_on])
+        # What nobody has been given yet is dealt so that all are done at the same time.
+        return float(max((left_m + ahead_m.sum()) / speeds_mps.sum(), (ahead_m / speeds_mps).max()))
 
     def summary(self) -> MissionSummary:
         """Return the mission as it stands in a list."""

@@ -4,6 +4,8 @@ from collections.abc import Collection, Sequence
 
 from shapely import Polygon, unary_union
 
+from app.exploration.lines.lattice import direction_of_lines_rad
+from app.exploration.lines.spaced_lines import check_line_count
 from app.exploration.pcao.planner import PcaoPlanner
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing, options_of
@@ -11,6 +13,7 @@ from app.missions.errors import InvalidRequestError
 from app.missions.spec.mission import MissionKind, MissionSpec, PlannerSpec
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
+from app.missions.task.constraints import make_constraints
 from app.missions.task.way import least_way_m
 
 
@@ -41,6 +44,7 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
             "leave it out, or use another planner",
         )
     check_limits(spec)
+    _check_lines(spec)
     for index, vehicle in enumerate(spec.vehicles):
         check_vehicle(vehicle, spec, kinds, f"vehicles.{index}.")
 
@@ -61,6 +65,20 @@ def _check_options(planner: PlannerSpec, read: Collection[str]) -> None:
             f"planner {planner.name!r} has no option {' and no option '.join(unread)}",
             f"its options are {', '.join(sorted(read))}",
         )
+
+
+def _check_lines(spec: MissionSpec) -> None:
+    """Refuse lines so close that an area has more of them than a survey can. Raises InvalidRequestError."""
+    options = spec.planner.options
+    if options.line_spacing_m is None:
+        return
+    constraints = make_constraints(spec)
+    direction_rad = direction_of_lines_rad(constraints.area, options.line_heading_deg)
+    try:
+        check_line_count(constraints.area, direction_rad, options.line_spacing_m)
+    except ValueError as error:
+        what, _, advice = str(error).partition(": ")
+        raise InvalidRequestError("planner.options.line_spacing_m", what, advice) from None
 
 
 def check_limits(spec: MissionSpec) -> None:

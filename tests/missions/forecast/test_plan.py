@@ -86,6 +86,28 @@ def test_the_lines_of_swath_sonars_see_the_whole_area_over_a_level_bottom() -> N
     assert sum(way.distance_m for way in shallow.ways) > 1.5 * sum(way.distance_m for way in found.ways)
 
 
+@pytest.mark.parametrize(("km", "within"), [(0.3, False), (3.0, True)])
+async def test_lines_at_a_distance_are_told_with_what_all_of_them_take_whatever_the_budget(
+    service: MissionService, km: float, within: bool
+) -> None:
+    options = {"line_spacing_m": 20.0, "line_heading_deg": 90.0}
+    spec = make_spec(
+        120.0,
+        vehicles=[{"name": name, "kind": "sim"} for name in "ab"],
+        planner={"name": "lawnmower", "options": options},
+        budget={"km_per_vehicle": km},
+    )
+    view = await service.previews.of(spec)
+    whole = view.whole_survey
+    assert whole is not None
+    assert whole.within_budget == within
+    assert 6 * 118.0 < whole.distance_m < 6 * 120.0 + 2 * 120.0 + 2 * 170.0
+    assert (view.distance_m == pytest.approx(whole.distance_m)) == within
+    courses = [np.diff(np.array(vehicle.way), axis=0) for vehicle in view.vehicles]
+    longest = [legs[np.argmax(np.abs(legs[:, 0]))] for legs in courses]
+    assert all(abs(north) < 1e-3 * abs(east) for east, north in longest), "they lie from west to east"
+
+
 def test_a_vehicle_whose_energy_is_short_turns_back_where_it_still_comes_home() -> None:
     point = list(lon_lat(-10.0, -10.0))
     vehicles = [

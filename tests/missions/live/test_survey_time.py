@@ -206,6 +206,34 @@ async def test_a_survey_takes_as_long_as_is_left_of_its_budget(under_way: Made, 
     assert progress.eta_s == pytest.approx(60.0 * progress.minutes_left / TIME_SCALE)
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("simulated_time")
+async def test_a_survey_with_lines_at_a_distance_ends_with_the_last_of_them_and_says_when(
+    service: MissionService,
+) -> None:
+    limits = {"max_step_m": 30.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
+    planner = {"name": "lawnmower", "options": {"line_spacing_m": 20.0, "line_heading_deg": 90.0}}
+    spec = sim_spec(side_m=100.0, cell_m=4.0, limits=limits, planner=planner, budget={"minutes": 90.0})
+    mission = (await service.create(spec)).id
+    await act(service, mission, "start")
+    live = await service.get(mission)
+    told_s: list[float] = []
+
+    async def ended() -> bool:
+        progress = live.progress()
+        if live.header.state is MissionState.RUNNING and live.team.going_on and progress.terms:
+            told_s.append(progress.eta_s or 0.0)
+        return live.header.state is MissionState.FINISHED
+
+    await until(ended, "the mission has ended")
+    flown_s = max(member.flown.survey_s for member in live.team)
+    lines_s = 5 * 99.0 / 2 / live.spec.speed_mps
+    assert lines_s < flown_s < 3.0 * lines_s < 0.2 * 90 * 60.0, (
+        "with turns, ways to lines, and half a line more for one"
+    )
+    assert max(told_s) < 2.0 * lines_s, "the time that is left of the budget is not told"
+
+
 async def test_when_everybody_goes_home_no_leg_is_to_come(under_way: Callable[..., Awaitable[UnderWay]]) -> None:
     vehicle = await under_way(minutes=MINUTES)
     live = vehicle.live

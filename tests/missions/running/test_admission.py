@@ -9,9 +9,10 @@ from app.exploration.pcao.model import default_model
 from app.exploration.planner.options import PlannerOptions
 from app.missions.errors import InvalidRequestError
 from app.missions.service import MissionService
+from app.missions.spec.mission import MissionSpec
 from app.storage.models import MissionRow
 from tests.support.missions.harbour import Harbour, sim_spec
-from tests.support.missions.specs import rectangle
+from tests.support.missions.specs import rectangle, spec_json
 
 
 @pytest.mark.parametrize(
@@ -100,6 +101,17 @@ async def test_a_mission_that_was_stored_with_a_controller_for_another_planner_o
         await session.execute(update(MissionRow).where(MissionRow.id == mission.id).values(spec=spec))
     service = await harbour.reopen()
     assert (await service.get(mission.id)).spec.planner.options.model is not None
+
+
+async def test_lines_too_close_for_an_area_are_refused_with_the_least_distance(service: MissionService) -> None:
+    options = {"line_spacing_m": 0.5}
+    vehicles = [{"name": "a", "kind": "sim"}]
+    area = spec_json(2000.0, vehicles=vehicles, cell_m=10.0, planner={"name": "lawnmower", "options": options})
+    with pytest.raises(InvalidRequestError, match=r"0\.5 m makes \d+ lines") as caught:
+        await service.create(MissionSpec.model_validate(area))
+    assert caught.value.field == "planner.options.line_spacing_m"
+    assert caught.value.remedy.startswith("give at least 1")
+    assert await service.rows() == []
 
 
 @pytest.mark.parametrize(

@@ -1202,8 +1202,8 @@ class PlanView(Model):
     whole: bool
     """Whether this is all; else the ways end where the time for planning was up"""
     whole_survey: WholeSurveyView | None
-    """What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath sonars, or
-    not all of it was planned in time
+    """What it takes until nothing is left to ensonify, or all lines at the distance asked for are flown, whatever
+    the budget; null: a survey of neither kind, or not all of it was planned in time
     """
     assumptions: list[str]
     """What was taken to be so, in words"""
@@ -1268,6 +1268,14 @@ class PlannerOptions(Model):
     """Radius of the tightest circle that vehicles fly; survey plans pay for turns."""
     cruise_depth_m: float | None = None
     """Depth at which vehicles survey; by default the depth at which each joined."""
+    line_spacing_m: float | None = None
+    """Distance from line to line. The mission ends when all lines are flown, or with its budget; by default lines
+    are as close as the budget allows.
+    """
+    line_heading_deg: float | None = None
+    """Course of the lines, clockwise from true north; by default that of the area's longer side, or what the planner
+    finds better.
+    """
     rollouts: int = 300
     """Changes to the team's plan that a rollout step tries."""
     tries: int = 0
@@ -2658,7 +2666,9 @@ class WaypointsMessage(Model):
 
 
 class WholeSurveyView(Model):
-    """What it takes until swath sonars have nothing left to ensonify, whatever the budget is."""
+    """What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are
+    flown, whatever the budget is.
+    """
 
     duration_s: float
     """Until the last vehicle is done, by the vehicles' time; median"""

@@ -4516,7 +4516,7 @@ export interface components {
              * @description Whether this is all; else the ways end where the time for planning was up
              */
             whole: boolean;
-            /** @description What it takes until nothing is left to ensonify, whatever the budget; null: no survey with swath sonars, or not all of it was planned in time */
+            /** @description What it takes until nothing is left to ensonify, or all lines at the distance asked for are flown, whatever the budget; null: a survey of neither kind, or not all of it was planned in time */
             whole_survey: components["schemas"]["WholeSurveyView"] | null;
             /**
              * Assumptions
@@ -4671,6 +4671,16 @@ export interface components {
              * @description Depth at which vehicles survey; by default the depth at which each joined.
              */
             cruise_depth_m?: number | null;
+            /**
+             * Line Spacing M
+             * @description Distance from line to line. The mission ends when all lines are flown, or with its budget; by default lines are as close as the budget allows.
+             */
+            line_spacing_m?: number | null;
+            /**
+             * Line Heading Deg
+             * @description Course of the lines, clockwise from true north; by default that of the area's longer side, or what the planner finds better.
+             */
+            line_heading_deg?: number | null;
             /**
              * Rollouts
              * @description Changes to the team's plan that a rollout step tries.
@@ -7723,7 +7733,8 @@ export interface components {
         };
         /**
          * WholeSurveyView
-         * @description What it takes until swath sonars have nothing left to ensonify, whatever the budget is.
+         * @description What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are flown,
+         *     whatever the budget is.
          */
         WholeSurveyView: {
             /**

@@ -153,6 +153,12 @@ export const PLANNING = {
     en: "At most {seconds} and {metres} of tracks, as much as lines {spacingM} m apart.{it}",
     pt: "No máximo {seconds} e {metres} de trajetos, tanto como fiadas a {spacingM} m umas das outras.{it}",
   },
+  "asked.untilLinesAreFlown": {
+    en: "Until all lines are flown, at most {seconds} and {metres} of tracks.{it}",
+    pt: "Até todas as fiadas estarem feitas, no máximo {seconds} e {metres} de trajetos.{it}",
+  },
+  "asked.courseOfTheLines": { en: "Course of the lines, °", pt: "Rumo das fiadas, °" },
+  "asked.distanceOfTheLines": { en: "Distance of the lines, m", pt: "Distância entre fiadas, m" },
   "asked.vehicle": { en: "Vehicle", pt: "Veículo" },
   "asked.time": { en: "Time", pt: "Tempo" },
   "asked.length": { en: "Length", pt: "Extensão" },

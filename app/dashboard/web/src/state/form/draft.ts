@@ -31,7 +31,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./missionFields";
-import { optionFault, optionTexts, typedOptions } from "./plannerOptions";
+import { optionFault, optionTexts, typedOptions, wayForLines } from "./plannerOptions";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -307,12 +307,14 @@ export function resolved(draft: Draft): Draft {
   return each_km === null ? draft : { ...draft, length: "km_per_vehicle", km_per_vehicle: String(each_km) };
 }
 
-/** Kilometres of each vehicle that lines over an area are; null where that is not said. */
+/** Kilometres that each vehicle may fly for lines over an area; null where their distance is not said. */
 function eachByLines(draft: Draft, ring: readonly LngLat[]): number | null {
   const spacing_m = Number(draft.spacing_m);
   const vehicles = vehicleNames(draft).length;
   if (!(spacing_m > 0) || vehicles === 0 || ring.length < 3) return null;
-  return Number((sizeOf(ring).area_m2 / (spacing_m * vehicles * 1000)).toPrecision(3));
+  const { area_m2, east_m, north_m } = sizeOf(ring);
+  const each_m = wayForLines(draft.planner, area_m2 / (spacing_m * vehicles), Math.hypot(east_m, north_m));
+  return Number((each_m / 1000).toPrecision(3));
 }
 
 /** What a mission's length is said in. */

@@ -10,7 +10,7 @@ const planner = (name: string, ...read: string[]) =>
   }) as unknown as PlannerView;
 const PLANNERS = [
   planner("cao", "candidates", "alpha", "turn_radius_m"),
-  planner("lawnmower", "turn_radius_m"),
+  planner("lawnmower", "turn_radius_m", "line_spacing_m"),
   planner("pcao", "turn_radius_m", "model"),
 ];
 const draft: Draft = { ...emptyDraft([-8.705, 41.185]), name: "Quay" };
@@ -71,5 +71,29 @@ describe("settings", () => {
     expect(toMission({ ...draft, options: { degree: " " } }).planner?.options).toEqual({});
     const search = { kind: "search", goal: "41.1853, -8.7045", entry: "41.1851, -8.7049" } as const;
     expect(faultsOf({ ...draft, ...search, options: { degree: "abc" } })).toEqual({});
+  });
+});
+
+describe("lines at a distance", () => {
+  const lines: Draft = { ...draft, planner: "lawnmower", spacing_m: "25" };
+
+  it("are what even lines are told to fly, with way enough to end with the last one", () => {
+    const { planner, budget } = toMission(lines);
+    expect(planner).toEqual({ name: "lawnmower", options: { line_spacing_m: 25 } });
+    const adaptive = toMission({ ...lines, planner: "cao" });
+    expect(adaptive.planner?.options).toEqual({});
+    expect(budget?.km_per_vehicle).toBeGreaterThan(1.3 * (adaptive.budget?.km_per_vehicle as number));
+  });
+
+  it("are a setting like others where the length is said otherwise", () => {
+    const { planner, budget } = toMission({
+      ...draft,
+      planner: "lawnmower",
+      length: "minutes",
+      minutes: "60",
+      options: { line_spacing_m: "30" },
+    });
+    expect(planner?.options).toEqual({ line_spacing_m: 30 });
+    expect(budget).toEqual({ minutes: 60 });
   });
 });

@@ -2,16 +2,30 @@
 
 import SPEC from "../../api/mission.json";
 import type { PlannerOptions, PlannerView } from "../../api/types";
+import { say } from "../../words/say";
 import type { Draft } from "./draft";
 import { type Field, fieldFault, schemaOf, textOf, typedValue } from "./missionFields";
 
 const BEFORE = "planner.options.";
 
+/** The planner that flies lines as far apart as it is told. */
+export const EVEN_LINES = "lawnmower";
+
+/** The setting that every survey along lines is asked for: it stands beside the choice of the planner. */
+export const LINE_HEADING = "line_heading_deg";
+
+/** What settings are called, where their names are not enough. */
+const LABELS: Readonly<Record<string, () => string>> = {
+  [LINE_HEADING]: () => say("asked.courseOfTheLines"),
+  line_spacing_m: () => say("asked.distanceOfTheLines"),
+};
+
 /** A setting as a field of the form; nothing for what is none, such as a trained controller, which is a whole document. */
 export function optionField(name: string): Field | null {
   const path = `${BEFORE}${name}`;
   if (!(path in SPEC)) return null;
-  return { path: path as Field["path"], label: name.replaceAll("_", " "), part: "planner", optional: true };
+  const label = LABELS[name]?.() ?? name.replaceAll("_", " ");
+  return { path: path as Field["path"], label, part: "planner", optional: true };
 }
 
 /** What a planner is set to otherwise than usual, as typed. */
@@ -51,13 +65,21 @@ export function optionFault(name: string, text: string): string {
   return field ? fieldFault(field, text) : "";
 }
 
-/** The settings to send: those that were typed, and the trained controller with which a copied mission's planner flies. */
-export function typedOptions({ planner, options, base }: Draft): PlannerOptions {
+/** The settings to send: those that were typed, the distance of lines where the mission's length is said by it, and the trained controller with which a copied mission's planner flies. */
+export function typedOptions({ planner, options, base, spacing_m }: Draft): PlannerOptions {
   const typed = Object.entries(options).flatMap(([name, text]) => {
     const field = optionField(name);
     const value = field && text.trim() !== "" ? typedValue(field, text) : null;
     return value == null ? [] : [[name, value]];
   });
   const model = base.planner?.name === planner ? base.planner.options?.model : null;
-  return { ...Object.fromEntries(typed), ...(model ? { model } : {}) };
+  const spaced = planner === EVEN_LINES && Number(spacing_m) > 0 ? { line_spacing_m: Number(spacing_m) } : {};
+  return { ...Object.fromEntries(typed), ...spaced, ...(model ? { model } : {}) };
 }
+
+/**
+ * How far a vehicle may fly for lines of so many metres over an area that is so many metres across. Even lines end the
+ * mission when they are flown: ways between them, one line more than others have, and the way to the first fit in, too.
+ */
+export const wayForLines = (planner: string, lines_m: number, across_m: number): number =>
+  planner === EVEN_LINES ? 1.15 * lines_m + 2 * across_m : lines_m;

@@ -1,9 +1,8 @@
-import { schemaOf } from "../../state/form/missionFields";
-import { optionField, optionsOf, withPlanner } from "../../state/form/plannerOptions";
-import { pointed } from "../../state/format";
+import { LINE_HEADING, optionsOf, withPlanner } from "../../state/form/plannerOptions";
 import { say } from "../../words/say";
 import { Choice, same } from "../parts/Controls";
-import { Fault, Part, useForm } from "./Fields";
+import { Part, useForm } from "./Fields";
+import { PlannerOptionFields } from "./PlannerOptionFields";
 
 /** What rarely needs a change: each with its unit, what is usual, and what it is for. */
 export function ExpertFields({ fault }: { fault: string }) {
@@ -55,55 +54,10 @@ function Algorithm({ fault }: { fault: string }) {
           {say("expert.ofCannotBeUsed", { p: p.name, package: p.package, problem: p.problem })}
         </small>
       ))}
-      <Options names={optionsOf(draft.planner, planners)} />
+      <PlannerOptionFields
+        names={optionsOf(draft.planner, planners).filter((name) => name !== LINE_HEADING)}
+      />
       {fault ? <span class="fault">▲ {fault}</span> : null}
     </>
-  );
-}
-
-/** The planner's settings; an empty field takes what is usual. */
-function Options({ names }: { names: readonly string[] }) {
-  const { draft, faults, set } = useForm();
-  const change = (name: string, text: string) =>
-    set(({ options }) => ({ options: { ...options, [name]: text } }));
-  return (
-    <div class="options">
-      {names.map((name) => {
-        const field = optionField(name);
-        if (!field) return null;
-        const { default: usual, description, enum: choices } = schemaOf(field);
-        const id = `option-${name}`;
-        const text = draft.options[name] ?? "";
-        return (
-          <div key={name} class="field">
-            <label for={id}>{field.label}</label>
-            {choices ? (
-              <select
-                id={id}
-                value={text || String(usual)}
-                onChange={(event) => change(name, event.currentTarget.value)}
-              >
-                {choices.map((value) => (
-                  <option key={value}>{value}</option>
-                ))}
-              </select>
-            ) : (
-              <input
-                id={id}
-                type="text"
-                inputMode="decimal"
-                autocomplete="off"
-                value={text}
-                placeholder={usual == null ? say("expert.automatic") : String(usual)}
-                aria-invalid={faults[`options.${name}`] ? "true" : "false"}
-                onInput={(event) => change(name, pointed(event.currentTarget.value))}
-              />
-            )}
-            <Fault field={`options.${name}`} />
-            <small>{description}</small>
-          </div>
-        );
-      })}
-    </div>
   );
 }

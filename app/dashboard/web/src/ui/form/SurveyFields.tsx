@@ -9,6 +9,7 @@ import {
   blockTitle,
   canPlan,
   cornersOf,
+  type Draft,
   estimate,
   faultsOf,
   type LengthChoice,
@@ -17,7 +18,7 @@ import {
   withLength,
 } from "../../state/form/draft";
 import { FIELDS } from "../../state/form/missionFields";
-import { withPlanner } from "../../state/form/plannerOptions";
+import { EVEN_LINES, LINE_HEADING, optionsOf, withPlanner } from "../../state/form/plannerOptions";
 import { distance, duration, fixed } from "../../state/format";
 import { planned } from "../../state/store";
 import { say } from "../../words/say";
@@ -25,6 +26,7 @@ import { Forecast } from "../forecast/Forecast";
 import { Planned, usePlan } from "../forecast/Planned";
 import { Choice } from "../parts/Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
+import { PlannerOptionFields } from "./PlannerOptionFields";
 
 /** What the survey is to give: how sure, how complete, how long it may take; and what follows from that. */
 export function SurveyFields() {
@@ -111,6 +113,9 @@ function Coverage() {
           <Part of="coverage" />
         </div>
       ) : null}
+      {optionsOf(draft.planner, planners).includes(LINE_HEADING) ? (
+        <PlannerOptionFields names={[LINE_HEADING]} />
+      ) : null}
       <Fault field="planner" />
     </div>
   );
@@ -147,6 +152,10 @@ function Length() {
   );
 }
 
+/** Whether the mission ends when lines at a distance that is given are flown. */
+const endsWithLines = ({ planner, spacing_m, options }: Draft) =>
+  planner === EVEN_LINES && (spacing_m.trim() || options.line_spacing_m?.trim() || "") !== "";
+
 /** By what was planned, if that is known, where the vehicles come from into a block. */
 function planBefore(block: number): PlanView | undefined {
   const { plans, fresh } = planned.peek() ?? { plans: [], fresh: 0 };
@@ -180,7 +189,7 @@ function Expected() {
         <small>{SPEC.floor_depth_m.description}</small>
       </div>
       <p class="hint" data-testid="estimate">
-        {say("asked.atMostAndOfTracksAs", {
+        {say(endsWithLines(draft) ? "asked.untilLinesAreFlown" : "asked.atMostAndOfTracksAs", {
           seconds: duration(found.seconds),
           metres: distance(found.metres),
           spacingM: fixed(found.spacing_m, 1),

@@ -1,0 +1,106 @@
+"""Lines at the distance that an operator asks for, dealt so that all vehicles are done at about the same time."""
+
+import math
+
+import numpy as np
+
+from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.routes import FreeSpace, Turns, Vehicles
+from app.exploration.lines.even_survey import EvenSurvey, Pattern, survey_of
+from app.exploration.lines.lattice import MAX_LINES, Sweep, axes_of
+from app.exploration.lines.parts import parts_of
+
+SPARE = 0.05
+"""A line more is flown where the outer ones would lie farther than half a spacing, and this part of one, inside."""
+WHOLE_LINES = 4
+"""Vehicles with so many lines each, on average, fly whole ones; else they may share one, in eight parts."""
+PARTS = 8
+HALVINGS = 8
+"""How often the share of what vehicles can fly is halved in: to less than a hundredth."""
+MOST_SHARE = 2.0**16
+"""Lines are dealt to vehicles that can fly this part of them."""
+
+
+def line_count(area: FloatArray, direction_rad: float, spacing_m: float) -> int:
+    """Return how many lines at a distance an area (n, 2) takes in a direction, anticlockwise from east."""
+    return max(1, math.ceil(_width_m(area, direction_rad) / spacing_m - 2 * SPARE))
+
+
+def check_line_count(area: FloatArray, direction_rad: float, spacing_m: float) -> None:
+    """Raise ValueError where that is more than one survey can have."""
+    count, width_m = line_count(area, direction_rad, spacing_m), _width_m(area, direction_rad)
+    if count > MAX_LINES:
+        raise ValueError(
+            f"{spacing_m:g} m makes {count} lines of an area that is {width_m:.0f} m wide, and a survey has at most "
+            f"{MAX_LINES}: give at least {width_m / MAX_LINES:.2g} m"
+        )
+
+
+def spaced_lines(
+    constraints: Constraints,
+    margin_m: float,
+    direction_rad: float,
+    spacing_m: float,
+    vehicles: Vehicles,
+    turns: list[Turns],
+) -> list[FloatArray] | None:
+    """Return each vehicle's route (k, 2) over lines at a distance; None where nobody can fly any.
+
+    Neighbouring lines go to one vehicle, by what each can fly: as large a share of it from all. Where the lines take
+    more than the team can fly, everybody's route is longer than it can fly, by the same share.
+
+    Parameters
+    ----------
+    margin_m
+        How far lines keep off borders and zones.
+    direction_rad
+        Of the lines, anticlockwise from east.
+    spacing_m
+        From line to line; less by a trifle where the outer ones would else lie on the border.
+    vehicles
+        The team.
+    turns
+        What they cost each vehicle.
+    """
+    routes: list[FloatArray] = [np.zeros((0, 2))] * len(vehicles.en_m)
+    for part, members in parts_of(constraints, FreeSpace(constraints, margin_m), vehicles.en_m):
+        sweep = Sweep(part, FreeSpace(part, margin_m), direction_rad)
+        there = Vehicles(*(of_all[members] for of_all in vehicles))
+        survey = _least_share(sweep, there, [turns[i] for i in members], spacing_m)
+        if survey is None:
+            return None
+        for i, route in zip(members, survey.routes, strict=True):
+            routes[i] = route
+    return routes
+
+
+def _least_share(sweep: Sweep, vehicles: Vehicles, turns: list[Turns], spacing_m: float) -> EvenSurvey | None:
+    """Return the lines dealt so that the largest share of its way that any vehicle needs is as small as may be."""
+    area, direction_rad = sweep.constraints.area, sweep.direction_rad
+    n = line_count(area, direction_rad, spacing_m)
+    inside = (_width_m(area, direction_rad) / spacing_m - (n - 1)) / 2
+    # On the border itself nothing can be flown.
+    to_side = max(inside, 2.0 * sweep.free.margin_m / spacing_m)
+    pattern = Pattern(to_side=to_side, parts=1 if n >= WHOLE_LINES * len(vehicles.en_m) else PARTS)
+
+    def dealt(share: float) -> EvenSurvey | None:
+        return survey_of(sweep, vehicles._replace(left_m=share * vehicles.left_m), turns, pattern, n)
+
+    share = 1.0
+    while (found := dealt(share)) is None:
+        share *= 2.0
+        if share > MOST_SHARE:
+            return None
+    while share > 1.0 / MOST_SHARE and (fewer := dealt(0.5 * share)) is not None:
+        found, share = fewer, 0.5 * share
+    low, high = 0.5 * share, share
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        fewer = dealt(middle)
+        found, low, high = (found, middle, high) if fewer is None else (fewer, low, middle)
+    return found
+
+
+def _width_m(area: FloatArray, direction_rad: float) -> float:
+    return float(np.ptp(area @ axes_of(direction_rad)[0]))

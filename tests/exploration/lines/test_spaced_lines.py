@@ -1,0 +1,159 @@
+"""Lines at the distance and on the course that are asked for, and who of the team flies them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Polygon
+
+from app.arrays import FloatArray
+from app.exploration.core.constraints import Constraints
+from app.exploration.core.problem import Belief, Situation
+from app.exploration.core.routes import Turns, Vehicles
+from app.exploration.lines.lattice import axes_of, direction_of_lines_rad, flown_length
+from app.exploration.lines.spaced_lines import check_line_count, spaced_lines
+from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import create_planner
+
+MARGIN_M = 0.5
+WIDTH, HEIGHT = 120.0, 300.0
+AREA = np.array([[0.0, 0.0], [WIDTH, 0.0], [WIDTH, HEIGHT], [0.0, HEIGHT]])
+TEAM = np.array([[20.0, 290.0], [60.0, 150.0], [100.0, 150.0]])
+
+
+def lines_for(
+    constraints: Constraints, spacing_m: float, budgets_m: FloatArray, heading_deg: float = 0.0, radius_m: float = 0.0
+) -> list[FloatArray]:
+    starts = TEAM[: len(budgets_m)]
+    vehicles = Vehicles(starts, np.full(len(starts), np.nan), budgets_m)
+    direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
+    routes = spaced_lines(
+        constraints, MARGIN_M, direction_rad, spacing_m, vehicles, [Turns(radius_m, 0.0)] * len(starts)
+    )
+    assert routes is not None
+    return routes
+
+
+def across_m(routes: list[FloatArray], heading_deg: float) -> tuple[FloatArray, FloatArray]:
+    """Return where each leg that lies along the lines is across them, and how long it is."""
+    axes = axes_of(np.radians(90.0 - heading_deg))
+    legs = [np.stack([route[:-1], route[1:]], axis=1) @ axes.T for route in routes if len(route) > 1]
+    along = np.concatenate([leg[np.abs(np.diff(leg[..., 0], axis=1)[:, 0]) < 1e-6] for leg in legs])
+    return along[:, 0, 0], np.abs(np.diff(along[..., 1], axis=1)[:, 0])
+
+
+@given(spacing_m=st.floats(3.0, 110.0), heading_deg=st.floats(0.0, 359.0), count=st.integers(1, 3))
+@settings(max_examples=25, deadline=None)
+def test_lines_lie_on_the_course_and_at_the_distance_asked_for_and_none_is_left_out_or_flown_twice(
+    spacing_m: float, heading_deg: float, count: int
+) -> None:
+    routes = lines_for(Constraints(AREA), spacing_m, np.full(count, 2000.0), heading_deg)
+    u, length_m = across_m(routes, heading_deg)
+    [places, which] = np.unique(np.round(u, 6), return_inverse=True)
+    # Beside a border lines may be closer: on it nothing can be flown.
+    assert np.diff(places) == pytest.approx(np.full(len(places) - 1, spacing_m), rel=2 * MARGIN_M / spacing_m)
+    assert (np.diff(places) <= spacing_m + 1e-4).all()
+    borders = AREA @ axes_of(np.radians(90.0 - heading_deg))[0]
+    # A line through the very corner of an area that lies askew has no length.
+    assert places[0] - borders.min() <= 0.55 * spacing_m + spacing_m * (heading_deg % 90.0 != 0.0)
+    inner = Polygon(AREA).buffer(-MARGIN_M, join_style="mitre")
+    for k, place in enumerate(places):
+        ends = np.array([[place, -500.0], [place, 500.0]]) @ axes_of(np.radians(90.0 - heading_deg))
+        whole_m = inner.intersection(LineString(ends)).length
+        assert length_m[which == k].sum() == pytest.approx(whole_m, abs=1e-3)
+
+
+@pytest.mark.parametrize("budget_m", [400.0, 3000.0, 60_000.0])
+@pytest.mark.parametrize("spacing_m", [5.0, 17.0, 40.0])
+def test_all_need_about_the_same_share_of_what_they_can_fly(spacing_m: float, budget_m: float) -> None:
+    budgets_m = budget_m * np.array([2.5, 1.0, 1.0])
+    routes = lines_for(Constraints(AREA), spacing_m, budgets_m, radius_m=4.0)
+    flown_m = np.array([flown_length(at, way, 4.0) for at, way in zip(TEAM, routes, strict=True)])
+    line_m = HEIGHT + spacing_m
+    assert np.ptp(flown_m / budgets_m) * budget_m <= 1.5 * line_m
+
+
+def test_lines_keep_off_zones() -> None:
+    zone = np.array([[40.0, 100.0], [80.0, 100.0], [80.0, 200.0], [40.0, 200.0]])
+    routes = lines_for(Constraints(AREA, (zone,)), 15.0, np.full(2, 5000.0))
+    for route in routes:
+        assert not LineString(route).intersects(Polygon(zone))
+    u, length_m = across_m(routes, 0.0)
+    assert length_m[(u > 40.0) & (u < 80.0)].sum() == pytest.approx(2 * 199.0, abs=5.0)
+
+
+def test_more_lines_than_a_survey_can_have_are_refused_with_the_least_distance() -> None:
+    area = AREA * 20.0
+    with pytest.raises(ValueError, match=r"0\.5 m makes 4800 lines .* 2400 m wide.* give at least 1\.2 m"):
+        check_line_count(area, np.pi / 2, 0.5)
+    check_line_count(area, np.pi / 2, 1.2)
+
+
+def situation(places: FloatArray, left_m: FloatArray, present: tuple[str, ...]) -> Situation:
+    belief = Belief(np.array([[60.0, 150.0]]), np.array([20.0]), np.array([1.0]), np.zeros(1, bool), np.ones(1), 10.0)
+    return Situation(
+        step=1,
+        steps_total=10,
+        vehicles=present,
+        positions=np.column_stack([places, np.full(len(places), 2.0)]),
+        headings_rad=np.zeros(len(places)),
+        soundings_en_m=np.zeros((0, 2)),
+        belief=belief,
+        constraints=Constraints(AREA, max_step_m=60.0, max_depth_m=10.0),
+        left_m=left_m,
+    )
+
+
+def fly(options: PlannerOptions, names: tuple[str, ...], lost: str = "", lost_at: int = 0) -> tuple[float, int]:
+    """Let a team fly until all are done; return the length of the lines flown, and the number of rounds."""
+    planner, rng = create_planner("lawnmower", options), np.random.default_rng(0)
+    here = {name: TEAM[k].copy() for k, name in enumerate(names)}
+    flown: list[LineString] = []
+    for rounds in range(200):
+        if rounds == lost_at:
+            here.pop(lost, None)
+        present = tuple(here)
+        told = situation(np.array(list(here.values())), np.full(len(here), 1e4), present)
+        proposal = planner.propose(told, rng)
+        for name, end in zip(present, proposal.positions[:, :2], strict=True):
+            if np.hypot(*(end - here[name])) > 1e-3:
+                flown.append(LineString([here[name], end]))
+            here[name] = end
+        if proposal.done == frozenset(present):
+            break
+        memory = planner.snapshot()
+        planner = create_planner("lawnmower", options)
+        planner.restore(memory)
+    assert proposal.done == frozenset(present), "they do not fly for ever"
+    steep = [leg for leg in flown if abs(leg.coords[1][1] - leg.coords[0][1]) > 5.0 * abs(
+        leg.coords[1][0] - leg.coords[0][0]
+    )]  # fmt: skip
+    return sum(leg.length for leg in steep), rounds
+
+
+def test_a_survey_at_a_distance_ends_when_its_lines_are_flown_though_there_is_way_left() -> None:
+    options = PlannerOptions(line_spacing_m=20.0, line_heading_deg=0.0)
+    length_m, _ = fly(options, ("a", "b"))
+    # The ways to where lines begin may lie along them, too.
+    assert 6 * (HEIGHT - 1.0) - 10.0 <= length_m <= 6 * HEIGHT + 2 * HEIGHT
+
+
+def test_the_lines_of_who_is_lost_are_flown_and_shared() -> None:
+    options = PlannerOptions(line_spacing_m=10.0, line_heading_deg=0.0)
+    length_m, rounds = fly(options, ("a", "b", "c"), lost="b", lost_at=4)
+    assert length_m >= 12 * (HEIGHT - 1.0) - 60.0
+    _, alone = fly(options, ("a",))
+    assert rounds < 0.75 * alone, "whoever is done takes a part of what is left to another"
+
+
+def test_lines_that_are_only_given_a_course_lie_on_it() -> None:
+    planner = create_planner("lawnmower", PlannerOptions(line_heading_deg=60.0))
+    told = situation(TEAM, np.full(3, 900.0), ("a", "b", "c"))
+    planner.propose(replace(told, turns_take_way=False), np.random.default_rng(0))
+    routes = [route for route in planner.ways_ahead_m().values() if len(route) > 3]
+    assert routes
+    _, length_m = across_m(routes, 60.0)
+    ways_m = sum(float(np.hypot(*np.diff(route, axis=0).T).sum()) for route in routes)
+    assert length_m.sum() > 0.6 * ways_m
