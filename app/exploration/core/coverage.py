@@ -85,8 +85,6 @@ class SwathTask:
         Of each vehicle by name; those without one ensonify nothing.
     overlap
         Share of half a swath that is sounded twice at least.
-    crosslines
-        Length of lines across all others, as a share of those.
     altitudes_m
         Height above the bottom of the vehicles that keep one, by name; the others keep a depth.
     """
@@ -94,5 +92,4 @@ class SwathTask:
     coverage: Coverage
     sonars: Mapping[str, SwathSonar]
     overlap: float
-    crosslines: float = 0.0
     altitudes_m: Mapping[str, float] = field(default_factory=dict)

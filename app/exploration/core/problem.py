@@ -101,6 +101,8 @@ class Situation:
         Of each vehicle's turning circle; None: as the planner's options say.
     swath : SwathTask or None
         What is to be ensonified, in a survey with swath sonars.
+    crosslines : float
+        Length of lines across all others that are asked for, as a share of those.
     at_rest : frozenset of str
         Vehicles that flew all their legs so long ago that what they measured there is known.
     """
@@ -122,6 +124,7 @@ class Situation:
     turns_take_way: bool = True
     turn_radii_m: FloatArray | None = None
     swath: SwathTask | None = None
+    crosslines: float = 0.0
     at_rest: frozenset[str] = frozenset()
 
     @property

@@ -29,7 +29,7 @@ from app.exploration.lines.ground import Ground
 from app.exploration.lines.handover import halves, hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, direction_of_lines_rad, flown_length, route_length
 from app.exploration.lines.parts import is_cut_off, parts_of
-from app.exploration.lines.spaced_lines import spaced_lines
+from app.exploration.lines.spaced_lines import spaced_lines, with_crosslines
 from app.exploration.planner.base import PlannerBase, settle
 
 BORDER_MARGIN_M = 0.5
@@ -275,19 +275,18 @@ class LawnmowerPlanner(PlannerBase):
         """Return each vehicle's route, (k, 2), over lines at the distance asked for, or as close as can be flown."""
         constraints, en, left_m = team.constraints, team.positions[:, :2], metres_left(team)
         radii_m, heading_deg = self._turn_radii_m(team), self.options.line_heading_deg
+        spacing_m, vehicles = self.options.line_spacing_m, Vehicles(en, np.full(len(en), np.nan), left_m)
+        direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
+        turns = [Turns(float(radius_m), corner_m) for radius_m in radii_m]
         routes = None
-        if self.options.line_spacing_m is not None:
-            routes = spaced_lines(
-                constraints,
-                BORDER_MARGIN_M,
-                direction_of_lines_rad(constraints.area, heading_deg),
-                self.options.line_spacing_m,
-                Vehicles(en, np.full(len(en), np.nan), left_m),
-                [Turns(float(radius_m), corner_m) for radius_m in radii_m],
-            )
-        if routes is None:
+        if spacing_m is not None:
+            routes = spaced_lines(constraints, BORDER_MARGIN_M, direction_rad, spacing_m, vehicles, turns)
+        if routes is None or spacing_m is None:
             return shared_lines(constraints, en, left_m, radii_m, corner_m, heading_deg)
-        return routes
+        if team.crosslines == 0.0:
+            return routes
+        across_m = team.crosslines * FreeSpace(constraints, BORDER_MARGIN_M).region.area / spacing_m
+        return with_crosslines(constraints, BORDER_MARGIN_M, direction_rad, across_m, vehicles, routes)
 
     def _turn_radii_m(self, team: Situation) -> FloatArray:
         """Return the radius of each vehicle's circles, (n_vehicles,); 0 where turns take no way."""

@@ -8,7 +8,7 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, Turns, Vehicles
 from app.exploration.lines.even_survey import EvenSurvey, Pattern, survey_of
-from app.exploration.lines.lattice import MAX_LINES, Sweep, axes_of
+from app.exploration.lines.lattice import MAX_LINES, Sweep, axes_of, even_lines, route_length
 from app.exploration.lines.parts import parts_of
 
 SPARE = 0.05
@@ -73,6 +73,45 @@ def spaced_lines(
         for i, route in zip(members, survey.routes, strict=True):
             routes[i] = route
     return routes
+
+
+def with_crosslines(
+    constraints: Constraints,
+    margin_m: float,
+    direction_rad: float,
+    length_m: float,
+    vehicles: Vehicles,
+    routes: list[FloatArray],
+) -> list[FloatArray]:
+    """Return routes with evenly spaced lines across all others at their ends, at least one in each part of the area.
+
+    Each goes to the vehicle that can be done with it first, by the share of what it can fly.
+
+    Parameters
+    ----------
+    length_m
+        How long they are in all, nearly.
+    vehicles, routes
+        The team, and each vehicle's route (k, 2) so far. The rest as for :func:`spaced_lines`.
+    """
+    found, area_m2 = list(routes), FreeSpace(constraints, margin_m).region.area
+    for part, members in parts_of(constraints, FreeSpace(constraints, margin_m), vehicles.en_m):
+        sweep = Sweep(part, FreeSpace(part, margin_m), direction_rad + np.pi / 2)
+        u, mine_m2 = sweep.to_uv(part.area)[:, 0], sweep.free.region.area
+        line_m = mine_m2 / max(float(np.ptp(u)), margin_m)
+        count = max(1, round(length_m * mine_m2 / area_m2 / line_m))
+        for line_u in even_lines(float(u.min()), float(u.max()), count):
+            tries = []
+            for upwards in (True, False):
+                stops = sweep.stops(np.array([line_u]), upwards=upwards)
+                for i in members if len(stops) else ():
+                    end_m = found[i][-1] if len(found[i]) else vehicles.en_m[i]
+                    route = np.vstack([found[i], sweep.free.connect(end_m, stops)])
+                    tries.append((route_length(vehicles.en_m[i], route) / max(vehicles.left_m[i], 1.0), i, route))
+            if tries:
+                _, i, route = min(tries, key=lambda one: one[0])
+                found[i] = route
+    return found
 
 
 def _least_share(sweep: Sweep, vehicles: Vehicles, turns: list[Turns], spacing_m: float) -> EvenSurvey | None:

@@ -119,7 +119,7 @@ class SwathPlanner(PlannerBase):
                 direction_of_lines_rad(team.constraints.area, heading_deg),
                 task.coverage.cell_m,
                 guess_m,
-                task.crosslines,
+                team.crosslines,
                 self._space(team),
                 turned=heading_deg is None,
             )

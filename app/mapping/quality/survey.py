@@ -9,6 +9,7 @@ from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.quality.agreement import Agreement, agreement, outlying
 from app.mapping.quality.beams import BeamCheck
 from app.mapping.quality.crossovers import Crossings, crossings
+from app.mapping.quality.line_log import LineLog
 from app.mapping.quality.tracks import Lines, Tracks, crosslines, cut
 from app.mapping.s44 import Order, max_tvu_m
 
@@ -21,6 +22,8 @@ class SurveyCheck:
     ----------
     names
         Of the vehicles.
+    log
+        Where each line begins and ends, and how straight it is.
     is_crossline : (m,)
         Of each line.
     beams
@@ -29,6 +32,7 @@ class SurveyCheck:
 
     names: tuple[str, ...]
     lines: Lines
+    log: LineLog
     is_crossline: BoolArray
     crossings: Crossings
     beams: BeamCheck | None = None
@@ -38,7 +42,7 @@ class SurveyCheck:
         """Return what the soundings along the vehicles' ways say."""
         lines = cut(tracks)
         found = crossings(tracks, lines)
-        return cls(tracks.names, lines, crosslines(lines, found.line), found)
+        return cls(tracks.names, lines, LineLog.of(tracks, lines), crosslines(lines, found.line), found)
 
     @cached_property
     def length_m(self) -> float:

@@ -97,6 +97,8 @@ class Lines:
         Along the way.
     heading_rad : (m,)
         From its begin to its end, clockwise from north.
+    first, last : (m,)
+        Index of its first and its last sounding.
     """
 
     line: IntArray
@@ -107,6 +109,8 @@ class Lines:
     end_s: FloatArray
     length_m: FloatArray
     heading_rad: FloatArray
+    first: IntArray
+    last: IntArray
 
     def __len__(self) -> int:
         return len(self.vehicle)
@@ -160,7 +164,7 @@ def cut(tracks: Tracks) -> Lines:
         tracks.east_m[last] - tracks.east_m[first],
         tracks.north_m[last] - tracks.north_m[first],
     ) % (2 * np.pi)
-    return Lines(line, joined, vehicle, number, tracks.time_s[first], tracks.time_s[last], length, heading)
+    return Lines(line, joined, vehicle, number, tracks.time_s[first], tracks.time_s[last], length, heading, first, last)
 
 
 def _joined(tracks: Tracks) -> BoolArray:

@@ -65,6 +65,9 @@ SOON = 1.3
 HARDLY_BEGUN = 0.6
 """A leg is decided together with those of others where no more than this part of a longest leg is left before it."""
 
+ANYWHERE = 2.0
+"""Who can still fly this many times across the area has nothing left to survey when its planner has no leg for it."""
+
 TOLD_PCT = 0.1
 """A mission that leaves more of its area unseen says so when it ends."""
 
@@ -383,13 +386,15 @@ class OwnLegs:
         for member in self._live.team.plannable:
             idle = not member.ahead and not member.ordered
             if member.name in done and idle and self._spec.ends_at_home(member.spec):
-                energy_m = self._range.beyond_m(member)
-                lasts = energy_m is not None and energy_m < member.way_left_m(self._spec)
-                if lasts:
-                    why, cause = "its energy lasts for its way home", WithdrawalCause.CALLED
+                energy_m, left_m = self._range.beyond_m(member), member.way_left_m(self._spec)
+                if energy_m is not None and energy_m < left_m:
+                    why, cause = "its energy lasts for its way home and for no further line", WithdrawalCause.CALLED
+                elif left_m > ANYWHERE * float(np.hypot(*np.ptp(self._spec.local_area(), axis=0))):
+                    why, cause = "nothing is left for it to survey", WithdrawalCause.PART_DONE
                 else:
-                    why, cause = "what is left of its way is for going home", WithdrawalCause.PART_DONE
-                self._live.withdraw(member, Response.RETURN, f"{why} and for no further line", cause=cause)
+                    why = "what is left of its way is for going home and for no further line"
+                    cause = WithdrawalCause.PART_DONE
+                self._live.withdraw(member, Response.RETURN, why, cause=cause)
                 self._sent_home.add(member.name)
 
     def _flown_out(self) -> list[Member]:

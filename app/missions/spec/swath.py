@@ -17,7 +17,7 @@ class SwathSonarSpec(Model):
 
 
 class CoverageSpec(Model):
-    """What full coverage by swath sonars is asked for, where the planner is `swath`."""
+    """How full coverage by swath sonars is to be, where the planner is `swath`, and lines across all others."""
 
     overlap_pct: float = Field(
         default=6.0,
@@ -30,7 +30,7 @@ class CoverageSpec(Model):
         ge=0,
         le=50,
         description="Length of lines across all others, flown last, as a share of those; by what both measured where "
-        "they cross a survey is judged. 0: none",
+        "they cross a survey is judged. Also where planner `lawnmower` is given the distance of lines. 0: none",
     )
     cell_of_depth: float | None = Field(
         default=None,

@@ -24,7 +24,7 @@ def swath_task(spec: MissionSpec, vehicles: Iterable[VehicleSpec], coverage: Cov
     sonars = {vehicle.name: sonar for vehicle in team if (sonar := swath_sonar(vehicle)) is not None}
     altitudes_m = {vehicle.name: vehicle.altitude_m for vehicle in team if vehicle.altitude_m is not None}
     asked = spec.coverage
-    return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, asked.crosslines_pct / 100.0, altitudes_m)
+    return SwathTask(coverage, sonars, asked.overlap_pct / 100.0, altitudes_m)
 
 
 def swath_sonar(vehicle: VehicleSpec) -> SwathSonar | None:

@@ -13,7 +13,7 @@ from app.exploration.core.constraints import Constraints
 from app.exploration.core.problem import Belief, Situation
 from app.exploration.core.routes import Turns, Vehicles
 from app.exploration.lines.lattice import axes_of, direction_of_lines_rad, flown_length
-from app.exploration.lines.spaced_lines import check_line_count, spaced_lines
+from app.exploration.lines.spaced_lines import check_line_count, spaced_lines, with_crosslines
 from app.exploration.planner.options import PlannerOptions
 from app.exploration.planners import create_planner
 
@@ -82,6 +82,34 @@ def test_lines_keep_off_zones() -> None:
         assert not LineString(route).intersects(Polygon(zone))
     u, length_m = across_m(routes, 0.0)
     assert length_m[(u > 40.0) & (u < 80.0)].sum() == pytest.approx(2 * 199.0, abs=5.0)
+
+
+@pytest.mark.parametrize(("length_m", "count"), [(10.0, 1), (250.0, 2), (600.0, 5)])
+def test_crosslines_lie_across_all_others_and_go_to_who_is_done_first(length_m: float, count: int) -> None:
+    budgets_m = np.array([6000.0, 3000.0, 3000.0])
+    routes = lines_for(Constraints(AREA), 30.0, budgets_m)
+    vehicles = Vehicles(TEAM, np.full(3, np.nan), budgets_m)
+    longer = with_crosslines(Constraints(AREA), MARGIN_M, np.pi / 2, length_m, vehicles, routes)
+    for before, after in zip(routes, longer, strict=True):
+        assert np.array_equal(after[: len(before)], before)
+    v, across = across_m([after[len(before) :] for before, after in zip(routes, longer, strict=True)], 90.0)
+    assert len(v) == count
+    assert across == pytest.approx(np.full(count, WIDTH - 2 * MARGIN_M), abs=0.01)
+    assert np.ptp(np.diff(np.sort(v))) < 1e-6 if count > 1 else True, "evenly"
+    needs = [flown_length(at, way, 0.0) / left for at, way, left in zip(TEAM, longer, budgets_m, strict=True)]
+    assert max(needs) - min(needs) < (HEIGHT + 2 * WIDTH) / 3000.0
+
+
+def test_crosslines_are_flown_on_each_side_of_a_zone_that_cuts_the_area() -> None:
+    bar = np.array([[-10.0, 140.0], [WIDTH + 10.0, 140.0], [WIDTH + 10.0, 160.0], [-10.0, 160.0]])
+    constraints, vehicles = Constraints(AREA, (bar,)), Vehicles(TEAM, np.full(3, np.nan), np.full(3, 5000.0))
+    starts = np.array([[20.0, 20.0], [60.0, 100.0], [60.0, 280.0]])
+    vehicles = vehicles._replace(en_m=starts)
+    none = [np.zeros((0, 2))] * 3
+    ways = with_crosslines(constraints, MARGIN_M, np.pi / 2, 50.0, vehicles, none)
+    flown = [LineString(np.vstack([at, way])) for at, way in zip(starts, ways, strict=True) if len(way)]
+    assert len(flown) == 2
+    assert not any(line.intersects(Polygon(bar)) for line in flown)
 
 
 def test_more_lines_than_a_survey_can_have_are_refused_with_the_least_distance() -> None:

@@ -72,7 +72,7 @@ def test_the_dominant_direction_is_that_of_most_of_the_way(direction_deg: float,
     heading = np.radians([direction_deg, direction_deg + 180.0, direction_deg + 90.0])
     length = np.array([100.0, 100.0, 200.0 * share])
     none, zeros = np.zeros(3, dtype=np.int64), np.zeros(3)
-    lines = Lines(none, none.astype(bool), none, none, zeros, zeros, length, heading)
+    lines = Lines(none, none.astype(bool), none, none, zeros, zeros, length, heading, none, none)
     off = abs(np.degrees(dominant_rad(lines)) - direction_deg) % 180.0
     assert min(off, 180.0 - off) < 0.01
 

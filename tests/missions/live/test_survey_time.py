@@ -11,6 +11,7 @@ from app.missions.fleet.interface import LinkCapabilities, LinkState, Position, 
 from app.missions.fleet.interface import WaypointStatus as Status
 from app.missions.flown import Flown, Phase
 from app.missions.live.mission import LiveMission
+from app.missions.operations.history import events_after
 from app.missions.running import homecoming
 from app.missions.service import MissionService
 from app.missions.spec.failsafes import Response
@@ -213,7 +214,8 @@ async def test_a_survey_with_lines_at_a_distance_ends_with_the_last_of_them_and_
 ) -> None:
     limits = {"max_step_m": 30.0, "max_depth_m": 2.0, "min_depth_m": 2.0}
     planner = {"name": "lawnmower", "options": {"line_spacing_m": 20.0, "line_heading_deg": 90.0}}
-    spec = sim_spec(side_m=100.0, cell_m=4.0, limits=limits, planner=planner, budget={"minutes": 90.0})
+    home = {"point": list(lon_lat(-10.0, -10.0))}
+    spec = sim_spec(side_m=100.0, cell_m=4.0, limits=limits, planner=planner, budget={"minutes": 90.0}, recovery=home)
     mission = (await service.create(spec)).id
     await act(service, mission, "start")
     live = await service.get(mission)
@@ -232,6 +234,8 @@ async def test_a_survey_with_lines_at_a_distance_ends_with_the_last_of_them_and_
         "with turns, ways to lines, and half a line more for one"
     )
     assert max(told_s) < 2.0 * lines_s, "the time that is left of the budget is not told"
+    told = [event.message for event in await events_after(live)]
+    assert {f"{name} goes home: nothing is left for it to survey" for name in "ab"} <= set(told)
 
 
 async def test_when_everybody_goes_home_no_leg_is_to_come(under_way: Callable[..., Awaitable[UnderWay]]) -> None:

@@ -188,6 +188,7 @@ def _situation(
         turns_take_way=spec.budget.minutes is not None,
         turn_radii_m=np.array([radii_m.get(place.vehicle, place.turn_radius_m) for place in team]),
         swath=knowledge.swath,
+        crosslines=spec.coverage.crosslines_pct / 100.0,
         at_rest=frozenset(place.vehicle for place in team if place.at_rest),
     )
 

@@ -443,13 +443,13 @@ class CorrectionsView(Model):
 
 
 class CoverageSpec(Model):
-    """What full coverage by swath sonars is asked for, where the planner is `swath`."""
+    """How full coverage by swath sonars is to be, where the planner is `swath`, and lines across all others."""
 
     overlap_pct: float = 6.0
     """Share of half a swath that the next one sounds again, at least; more where position is uncertain"""
     crosslines_pct: float = 5.0
     """Length of lines across all others, flown last, as a share of those; by what both measured where they cross a
-    survey is judged. 0: none
+    survey is judged. Also where planner `lawnmower` is given the distance of lines. 0: none
     """
     cell_of_depth: float | None = None
     """Cells by depth, in files with cells of several sizes: each depth has the smallest of cell_m, twice and four
@@ -2666,9 +2666,7 @@ class WaypointsMessage(Model):
 
 
 class WholeSurveyView(Model):
-    """What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are
-    flown, whatever the budget is.
-    """
+    """What it takes until nothing is left to ensonify or all lines are flown, whatever the budget is."""
 
     duration_s: float
     """Until the last vehicle is done, by the vehicles' time; median"""

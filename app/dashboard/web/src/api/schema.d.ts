@@ -2639,7 +2639,7 @@ export interface components {
         };
         /**
          * CoverageSpec
-         * @description What full coverage by swath sonars is asked for, where the planner is `swath`.
+         * @description How full coverage by swath sonars is to be, where the planner is `swath`, and lines across all others.
          */
         CoverageSpec: {
             /**
@@ -2650,7 +2650,7 @@ export interface components {
             overlap_pct: number;
             /**
              * Crosslines Pct
-             * @description Length of lines across all others, flown last, as a share of those; by what both measured where they cross a survey is judged. 0: none
+             * @description Length of lines across all others, flown last, as a share of those; by what both measured where they cross a survey is judged. Also where planner `lawnmower` is given the distance of lines. 0: none
              * @default 5
              */
             crosslines_pct: number;
@@ -7733,8 +7733,7 @@ export interface components {
         };
         /**
          * WholeSurveyView
-         * @description What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are flown,
-         *     whatever the budget is.
+         * @description What it takes until nothing is left to ensonify or all lines are flown, whatever the budget is.
          */
         WholeSurveyView: {
             /**

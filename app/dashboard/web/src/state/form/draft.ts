@@ -31,7 +31,7 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./missionFields";
-import { optionFault, optionTexts, typedOptions, wayForLines } from "./plannerOptions";
+import { fliesCrosslines, optionFault, optionTexts, typedOptions, wayForLines } from "./plannerOptions";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -335,6 +335,7 @@ export function withLength(choice: LengthChoice, draft: Draft): Partial<Draft> {
 function fieldsThatCount(draft: Draft): [FieldName, Field][] {
   return fieldsOf(draft.kind, draft.length).filter(([, { part }]) => {
     if (part === "coverage") return draft.planner === "swath";
+    if (part === "crosslines") return fliesCrosslines(draft);
     return part !== "recovery" || draft.recovery.trim() !== "";
   });
 }

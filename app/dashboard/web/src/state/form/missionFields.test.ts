@@ -43,7 +43,9 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
   const switched = isSwitch ? !schema.default : undefined;
   const text = String(other ?? switched ?? inside / (field.factor ?? 1));
   const length = field.part === "length" ? { length: name as LengthUnit } : {};
-  const led = field.part === "coverage" ? { planner: "swath", sensor: "multibeam" as const } : {};
+  const led = ["coverage", "crosslines"].includes(field.part)
+    ? { planner: "swath", sensor: "multibeam" as const }
+    : {};
 
   it("begins with what the service takes where nothing is said", () => {
     const begun = draftWith({}, kind)[name];

@@ -36,6 +36,7 @@ export interface Field {
     | "recovery"
     | "shoals"
     | "coverage"
+    | "crosslines"
     | "uncertainty"
     | "planner";
   label: string;
@@ -224,7 +225,7 @@ export const FIELDS = {
   },
   crosslines_pct: {
     path: "coverage.crosslines_pct",
-    part: "coverage",
+    part: "crosslines",
     get label() {
       return say("crosslines.crosslines");
     },

@@ -85,6 +85,13 @@ describe("lines at a distance", () => {
     expect(budget?.km_per_vehicle).toBeGreaterThan(1.3 * (adaptive.budget?.km_per_vehicle as number));
   });
 
+  it("have lines across all others, as full coverage has", () => {
+    const crosslines = { crosslines_pct: "10" };
+    expect(toMission({ ...lines, ...crosslines }).coverage).toMatchObject({ crosslines_pct: 10 });
+    const none = toMission({ ...lines, ...crosslines, spacing_m: "" }).coverage;
+    expect(none).not.toHaveProperty("crosslines_pct");
+  });
+
   it("are a setting like others where the length is said otherwise", () => {
     const { planner, budget } = toMission({
       ...draft,

@@ -14,6 +14,13 @@ export const EVEN_LINES = "lawnmower";
 /** The setting that every survey along lines is asked for: it stands beside the choice of the planner. */
 export const LINE_HEADING = "line_heading_deg";
 
+/** Whether the mission ends when lines at a distance that is given are flown. */
+export const endsWithLines = ({ planner, spacing_m, options }: Draft): boolean =>
+  planner === EVEN_LINES && (spacing_m.trim() || options.line_spacing_m?.trim() || "") !== "";
+
+/** Whether lines across all others are flown in the end. */
+export const fliesCrosslines = (draft: Draft): boolean => draft.planner === "swath" || endsWithLines(draft);
+
 /** What settings are called, where their names are not enough. */
 const LABELS: Readonly<Record<string, () => string>> = {
   [LINE_HEADING]: () => say("asked.courseOfTheLines"),

@@ -9,7 +9,6 @@ import {
   blockTitle,
   canPlan,
   cornersOf,
-  type Draft,
   estimate,
   faultsOf,
   type LengthChoice,
@@ -18,7 +17,13 @@ import {
   withLength,
 } from "../../state/form/draft";
 import { FIELDS } from "../../state/form/missionFields";
-import { EVEN_LINES, LINE_HEADING, optionsOf, withPlanner } from "../../state/form/plannerOptions";
+import {
+  endsWithLines,
+  fliesCrosslines,
+  LINE_HEADING,
+  optionsOf,
+  withPlanner,
+} from "../../state/form/plannerOptions";
 import { distance, duration, fixed } from "../../state/format";
 import { planned } from "../../state/store";
 import { say } from "../../words/say";
@@ -108,9 +113,10 @@ function Coverage() {
       {draft.planner in PLANNER_PRESETS ? null : (
         <p class="hint">{say("asked.plannedBySeeExpertSettings", { planner: draft.planner })}</p>
       )}
-      {draft.planner === "swath" ? (
+      {fliesCrosslines(draft) ? (
         <div class="pair">
-          <Part of="coverage" />
+          {draft.planner === "swath" ? <Part of="coverage" /> : null}
+          <Part of="crosslines" />
         </div>
       ) : null}
       {optionsOf(draft.planner, planners).includes(LINE_HEADING) ? (
@@ -151,10 +157,6 @@ function Length() {
     </div>
   );
 }
-
-/** Whether the mission ends when lines at a distance that is given are flown. */
-const endsWithLines = ({ planner, spacing_m, options }: Draft) =>
-  planner === EVEN_LINES && (spacing_m.trim() || options.line_spacing_m?.trim() || "") !== "";
 
 /** By what was planned, if that is known, where the vehicles come from into a block. */
 function planBefore(block: number): PlanView | undefined {
