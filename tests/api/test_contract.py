@@ -52,6 +52,7 @@ BEYOND_THE_SCHEMA = {
     "getProfile",
     "getSoundingsFile",
     "getTracksFile",
+    "getLinesFile",
     "getTile",
     "getTileJson",
     "importSoundings",

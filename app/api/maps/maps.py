@@ -481,6 +481,7 @@ for _kind in REPORTS.values():
 _add_files(MAP, "getMapFile", "Download the map", "Return the map as a file.")
 _add_files(SOUNDINGS, "getSoundingsFile", "Download the soundings", "Return the soundings as a file.")
 _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the vehicles were as a file.")
+_add_files("lines", "getLinesFile", "Download the log of lines", "Return the lines that were flown as a file.")
 
 
 def layer_of(snapshot: MapSnapshot, name: str, order: Order) -> Layer:

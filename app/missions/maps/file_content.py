@@ -24,6 +24,14 @@ class FileContent:
         self._file: IO[bytes] | None = None
         self.size_bytes = len(content)
 
+    @classmethod
+    def of_file(cls, file: IO[bytes]) -> "FileContent":
+        """Return what was written into a file, which is closed when nobody needs the content any more."""
+        content = cls()
+        content._kept, content._file, content.size_bytes = None, file, file.seek(0, os.SEEK_END)
+        weakref.finalize(content, file.close)
+        return content
+
     def add(self, piece: bytes) -> None:
         """Append a piece."""
         self.size_bytes += len(piece)

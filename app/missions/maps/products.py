@@ -18,6 +18,7 @@ from app.mapping.products.crowdsourced import Provider
 from app.mapping.products.geotiff import geotiff
 from app.mapping.products.holidays import holidays_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
+from app.mapping.products.line_log import lines_csv
 from app.mapping.products.netcdf import netcdf
 from app.mapping.products.pictures.overlay import overlay_png
 from app.mapping.products.pictures.picture import picture_png
@@ -34,11 +35,12 @@ from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
 
-MAP, SOUNDINGS, ACCEPTED, RAW, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
+MAP, SOUNDINGS, ACCEPTED, RAW, POINTS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
     "map",
     "soundings",
     "accepted soundings",
     "raw soundings of a vehicle",
+    "soundings as a point cloud",
     "tracks",
     "search",
     "swaths",
@@ -316,10 +318,19 @@ def _obstacles(material: Material, _: ProductOptions) -> bytes:
 
 
 def _crossovers(material: Material, options: ProductOptions) -> bytes:
+    frame = material.facts.frame
+    return crossovers_csv(_checked(material), frame, options.order, vertical_datum=material.datum)
+
+
+def _checked(material: Material) -> SurveyCheck:
+    """Return what the survey says of itself. Raises MapNotReadyError while there is nothing."""
     if material.crossovers is None:
         raise MapNotReadyError("nothing was sounded yet", "start the mission or post measurements")
-    frame = material.facts.frame
-    return crossovers_csv(material.crossovers, frame, options.order, vertical_datum=material.datum)
+    return material.crossovers
+
+
+def _lines(material: Material, options: ProductOptions) -> bytes:
+    return lines_csv(_checked(material), material.facts.frame, options.order)
 
 
 def snapshot_holidays(snapshot: MapSnapshot) -> bytes:
@@ -424,6 +435,14 @@ PRODUCTS = {
         ),
         ProductKind(
             SOUNDINGS,
+            "laz",
+            "application/vnd.laszip",
+            "point cloud (LAZ, UTM) of the accepted soundings of every sonar, the beams of swath sonars among them",
+            _soundings,
+            {POINTS},
+        ),
+        ProductKind(
+            SOUNDINGS,
             "geojson",
             GEOJSON,
             "raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12)",
@@ -455,6 +474,15 @@ PRODUCTS = {
             CSV,
             "where lines cross, with both depths and their difference",
             _crossovers,
+            {CROSSOVERS},
+            by_order=True,
+        ),
+        ProductKind(
+            "lines",
+            "csv",
+            CSV,
+            "the lines that were flown: when, where, how long and how straight, and what crosses them",
+            _lines,
             {CROSSOVERS},
             by_order=True,
         ),

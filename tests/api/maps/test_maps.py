@@ -121,7 +121,9 @@ FILES = {
     "tracks.geojson": ("application/geo+json", b"{"),
     "tracks.kml": ("application/vnd.google-earth.kml+xml", b"<?xml"),
     "tracks.gpx": ("application/gpx+xml", b"<?xml"),
+    "soundings.laz": ("application/vnd.laszip", b"LASF"),
     "crossovers.csv": ("text/csv", b"#"),
+    "lines.csv": ("text/csv", b"#"),
 }
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import laspy
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -71,6 +73,28 @@ async def test_files_of_soundings_say_that_beams_are_elsewhere(client: httpx.Asy
         assert told.startswith("#")
         assert "the beams of 2 pings of swath sonars are not among these: see pings" in told
         assert len([line for line in lines if not line.startswith("#")]) == (2 if file == "csv" else 1)
+
+
+async def test_a_point_cloud_has_soundings_and_beams_as_they_are_corrected(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    async def cloud() -> laspy.LasData:
+        answer = await client.get(f"{path}/soundings.laz")
+        assert answer.status_code == 200, answer.text
+        return laspy.read(io.BytesIO(answer.content))
+
+    assert len((await cloud()).points) == 0
+    [single] = soundings(1, "plain")
+    await post(client, path, [single, posted_ping(0), posted_ping(1)])
+    points = await cloud()
+    source, z = np.asarray(points.point_source_id), np.asarray(points.z)
+    assert [int((source == number).sum()) for number in (1, 2)] == [1, 16], "plain, rover"
+    assert np.ptp(np.asarray(points.scan_angle)[source == 2]) > 0
+    assert z[source == 1] == pytest.approx(-(single["depth_m"] + single["range_m"]), abs=0.002)
+    assert (z[source == 2] < -1.0).all()
+    tide = await client.put(f"{path}/tide", json={"level_m": 0.5, "source": "gauge"})
+    assert tide.status_code == 200, tide.text
+    assert np.asarray((await cloud()).z) == pytest.approx(z + 0.5, abs=0.002)
 
 
 async def test_a_batch_whose_answer_was_lost_is_answered_again(client: httpx.AsyncClient, path: str) -> None:

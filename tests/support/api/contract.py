@@ -48,6 +48,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/crosslines": "getCrosslines",
     "GET /missions/{mission_id}/uncertainty-budget": "getUncertaintyBudget",
     "GET /missions/{mission_id}/crossovers.csv": "getCrossoversFile",
+    "GET /missions/{mission_id}/lines.{format}": "getLinesFile",
     "GET /missions/{mission_id}/report.pdf": "getPdfReport",
     "GET /missions/{mission_id}/report.html": "getHtmlReport",
     "GET /missions/{mission_id}/profile": "getProfile",

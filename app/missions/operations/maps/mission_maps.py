@@ -17,6 +17,7 @@ from app.missions.maps.products import (
     ACCEPTED,
     CROSSOVERS,
     MAP,
+    POINTS,
     RAW,
     SEARCH,
     SOUNDINGS,
@@ -31,7 +32,7 @@ from app.missions.maps.products import (
 )
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.operations.corrections.crossovers import check_of
-from app.missions.operations.maps.sounding_files import accepted_xyz, all_lines, crowdsourced, only_vehicle
+from app.missions.operations.maps.sounding_files import accepted_xyz, all_lines, crowdsourced, only_vehicle, point_cloud
 from app.missions.operations.scans import search_of
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
@@ -170,6 +171,8 @@ async def _sounding_file(
             return await all_lines(live)
         if ACCEPTED in needs:
             return await accepted_xyz(live)
+        if POINTS in needs:
+            return await point_cloud(live)
         if RAW in needs and options.vehicle is not None:
             return await crowdsourced(live, provider.named(), options.vehicle)
     except OSError as error:

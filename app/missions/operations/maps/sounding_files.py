@@ -1,5 +1,6 @@
 """A mission's soundings as files, made piece by piece as they are read: however many there are, few are in memory."""
 
+import asyncio
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,18 +10,23 @@ from app import __version__
 from app.arrays import FloatArray
 from app.mapping.products.crowdsourced import CrowdsourcedFile, Provider, RawSounding
 from app.mapping.products.text import soundings_xyz
+from app.mapping.swath.pings import Pings
 from app.mapping.types import Soundings
 from app.missions.clock import now
 from app.missions.errors import InvalidRequestError
 from app.missions.live.mission import LiveMission
 from app.missions.maps.file_content import FileContent
 from app.missions.maps.sounding_lines import COLUMNS, header_line, sounding_lines
+from app.missions.maps.swath_grid import beams_of
 from app.missions.views.measurements.soundings import Verdict
 from app.storage.bulk import read_in_pieces, read_numbers
 from app.storage.queries import soundings as sounding_queries
+from app.storage.unnamed_file import unnamed_file
 
 RAW = ("lon_deg", "lat_deg", "raw_depth_m", "sd_m", "time_s", "position_sd_m")
 """Columns of a :class:`RawSounding`, in its order."""
+SOUNDED = ("time_s", "east_m", "north_m", "depth_m", "sd_m")
+"""Columns of a point of a cloud."""
 
 
 async def all_lines(live: LiveMission) -> FileContent:
@@ -52,10 +58,49 @@ async def accepted_xyz(live: LiveMission) -> FileContent:
     return content
 
 
+async def point_cloud(live: LiveMission) -> FileContent:
+    """Return the accepted soundings of every sonar, the beams of swath sonars among them, as LAZ.
+
+    Raises PingsUnreadableError.
+    """
+    # What writes these files takes a third of a second to import, which every start of the service would pay.
+    from app.mapping.products.point_cloud import PointCloudFile
+
+    await live.journal.flush()
+    async with live.database.reading() as session:
+        sounding = await sounding_queries.vehicles_of(session, live.id, Verdict.ACCEPTED)
+    chunks, waiting = await live.pings.contents()
+    names = sorted(sounding | {chunk.vehicle for chunk in chunks} | waiting.keys())
+    file = unnamed_file()
+    cloud = PointCloudFile(file, live.frame, names, live.facts.vertical_datum.statement)
+    for vehicle in sorted(sounding):
+        query = sounding_queries.accepted_columns_query(live.id, vehicle, SOUNDED)
+
+        def take(rows: FloatArray, vehicle: str = vehicle) -> None:
+            cloud.add(vehicle, *rows.T)
+
+        await read_numbers(live.database, query, take)
+    place, errors = live.gate.corrections.beams, live.spec.uncertainty
+
+    def add_beams(vehicle: str, pings: Pings) -> None:
+        beams = beams_of(vehicle, pings, place, errors)
+        if beams is not None:
+            at = beams.footprints
+            time_s = pings.time_s[at.ping]
+            cloud.add(vehicle, time_s, at.east_m, at.north_m, at.depth_m, beams.sd_m, at.angle_rad)
+
+    async for vehicle, pings in live.pings.all_accepted():
+        await asyncio.to_thread(add_beams, vehicle, pings)
+    await asyncio.to_thread(cloud.close)
+    return FileContent.of_file(file)
+
+
 def _left_out(live: LiveMission) -> str:
     """Return what of a mission's measurements is in no file of soundings; empty: nothing."""
     pings = live.journal.counts.pings
-    return f"the beams of {pings} pings of swath sonars are not among these: see pings" if pings else ""
+    return (
+        f"the beams of {pings} pings of swath sonars are not among these: see pings, or soundings.laz" if pings else ""
+    )
 
 
 async def crowdsourced(live: LiveMission, provider: Provider | None, vehicle: str) -> FileContent:

@@ -91,6 +91,16 @@ async def test_crossings_are_a_file(client: httpx.AsyncClient, path: str) -> Non
     assert all(float(row["difference_m"]) == pytest.approx(-OFF_M, abs=1e-3) for row in rows)
 
 
+async def test_lines_are_a_file(client: httpx.AsyncClient, path: str) -> None:
+    listed = {product["name"]: product["href"] for product in (await client.get(f"{path}/products")).json()}
+    file = await client.get(listed["lines.csv"].removeprefix("/api/v1"), params={"order": "exclusive"})
+    rows = list(csv.DictReader(io.StringIO(file.text.partition("\n")[2])))
+    [cross] = [row for row in rows if row["kind"] == "cross"]
+    assert (cross["vehicle"], cross["crossings"], cross["within_pct"]) == ("scout", "8", "0.0")
+    assert float(cross["mean_difference_m"]) == pytest.approx(OFF_M, abs=1e-3)
+    assert sum(row["kind"] == "main" and float(row["length_m"]) > 40.0 for row in rows) >= 8
+
+
 async def test_beams_of_crosslines_tell_of_a_wrong_roll(client: httpx.AsyncClient) -> None:
     path = await new_mission(client, "rover", sensor="multibeam")
     main = [(east + 4, north + 2) for east, north in lawnmower(52, 56, 4)]

@@ -959,6 +959,39 @@ class Operations(ABC):
             query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
         ))
 
+    def get_lines_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the log of lines: ``GET /missions/{mission_id}/lines.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/lines.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
     def get_profile(
         self,
         mission_id: str,
@@ -2372,6 +2405,39 @@ class AsyncOperations(ABC):
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+        ))
+
+    async def get_lines_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+    ) -> bytes:
+        """Download the log of lines: ``GET /missions/{mission_id}/lines.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        """
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/lines.{part(format)}",
             bytes,
             query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
         ))

@@ -1220,6 +1220,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/lines.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the log of lines
+         * @description Return the lines that were flown as a file.
+         */
+        get: operations["getLinesFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/profile": {
         parameters: {
             query?: never;
@@ -14073,7 +14093,7 @@ export interface operations {
             };
             header?: never;
             path: {
-                /** @description One of csv, xyz, geojson */
+                /** @description One of csv, xyz, laz, geojson */
                 format: string;
                 /** @description The mission's id */
                 mission_id: string;
@@ -14082,13 +14102,14 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
+            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.laz`: point cloud (LAZ, UTM) of the accepted soundings of every sonar, the beams of swath sonars among them; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
                     "application/geo+json": Record<string, never>;
+                    "application/vnd.laszip": string;
                     "text/csv": string;
                     "text/plain": string;
                 };
@@ -14183,6 +14204,96 @@ export interface operations {
                     "application/geo+json": Record<string, never>;
                     "application/gpx+xml": string;
                     "application/vnd.google-earth.kml+xml": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet; there is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getLinesFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description One of csv */
+                format: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.csv`: the lines that were flown: when, where, how long and how straight, and what crosses them */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/csv": string;
                 };
             };
             /** @description An access token is needed */
