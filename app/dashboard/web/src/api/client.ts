@@ -7,6 +7,7 @@ import type {
   AlarmView,
   Budget,
   ChangesView,
+  CorrectionsView,
   CrossoversView,
   DoctorView,
   EventView,
@@ -37,11 +38,13 @@ import type {
   SoundingPoints,
   SoundingState,
   SoundingView,
+  SoundSpeed,
   StepView,
   SurveyView,
   SystematicErrors,
   SystematicErrorsView,
   TelemetryView,
+  TideCorrection,
   TimedTracks,
   TrafficView,
   VehicleView,
@@ -284,8 +287,13 @@ export const api = {
     post<RulingsView>(`${missionPath(id)}/soundings/${ruling}`, { ids, note }, STORED),
   rule: (id: string, sounding: number, ruling: "restore" | "reject", note: string) =>
     post<SoundingView>(`${missionPath(id)}/soundings/${sounding}/${ruling}`, { note }, STORED),
-  setTide: (id: string, tide: { level_m?: number; table?: string; source: string }) =>
-    put<unknown>(`${missionPath(id)}/tide`, tide),
+  corrections: (id: string) => request<CorrectionsView>(`${missionPath(id)}/corrections`),
+  setTide: (id: string, tide: Partial<TideCorrection>) =>
+    put<CorrectionsView>(`${missionPath(id)}/tide`, tide),
+  setSoundSpeed: (id: string, speed: SoundSpeed) =>
+    put<CorrectionsView>(`${missionPath(id)}/sound-speed`, speed),
+  deleteSoundSpeed: (id: string) =>
+    request<CorrectionsView>(`${missionPath(id)}/sound-speed`, { method: "DELETE" }),
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),

@@ -19,6 +19,47 @@ export const REVIEW = {
   "charts.deviation": { en: "deviation", pt: "desvio" },
   "charts.figureOfTheVehicles": { en: "Figure of the vehicles", pt: "Grandeza dos veículos" },
   "charts.altitude": { en: "Altitude", pt: "Altura" },
+  "corrections.corrections": { en: "Corrections", pt: "Correções" },
+  "corrections.depthsFrom": {
+    en: "Depths are counted from: {datum}. {accepted} soundings accepted, {rejected} rejected with these corrections.",
+    pt: "Profundidades contadas a partir de: {datum}. {accepted} sondas aceites, {rejected} recusadas com estas correções.",
+  },
+  "corrections.everySoundingAnew": {
+    en: "Every sounding is corrected anew from what was measured, and the map with it, at any time.",
+    pt: "Todas as sondas são corrigidas de novo a partir do que foi medido, e o mapa também, a qualquer momento.",
+  },
+  "corrections.waterLevel": { en: "Water level", pt: "Nível da água" },
+  "corrections.table": {
+    en: "Tide table {name}: {entries} entries, {first} to {last}",
+    pt: "Tabela de marés {name}: {entries} linhas, de {first} a {last}",
+  },
+  "corrections.level": { en: "{level} m ({source})", pt: "{level} m ({source})" },
+  "corrections.levelM": { en: "Level, m", pt: "Nível, m" },
+  "corrections.deviationM": { en: "Standard deviation, m", pt: "Desvio padrão, m" },
+  "corrections.applyLevel": { en: "Apply this level", pt: "Aplicar este nível" },
+  "corrections.tideTable": { en: "Tide table from a file…", pt: "Tabela de marés de um ficheiro…" },
+  "corrections.typeNumbers": { en: "Type a number into each field.", pt: "Escreva um número em cada campo." },
+  "corrections.soundSpeed": { en: "Sound speed", pt: "Velocidade do som" },
+  "corrections.profile": {
+    en: "Profile of {count} depths, {depths} m: {speeds} m/s ({source}); {assumed} m/s is set in the sonars",
+    pt: "Perfil de {count} profundidades, {depths} m: {speeds} m/s ({source}); nos sonares está {assumed} m/s",
+  },
+  "corrections.ownRanges": {
+    en: "Not corrected: the sonars' own ranges count",
+    pt: "Não corrigida: contam as distâncias dos próprios sonares",
+  },
+  "corrections.setInTheSonars": { en: "Set in the sonars, m/s", pt: "Nos sonares, m/s" },
+  "corrections.sameEverywhere": {
+    en: "Measured, the same at all depths, m/s",
+    pt: "Medida, igual a qualquer profundidade, m/s",
+  },
+  "corrections.applySpeed": { en: "Apply this speed", pt: "Aplicar esta velocidade" },
+  "corrections.profileFile": { en: "Profile from a file…", pt: "Perfil de um ficheiro…" },
+  "corrections.noProfile": {
+    en: "No line of the file begins with a depth and a speed.",
+    pt: "Nenhuma linha do ficheiro começa com uma profundidade e uma velocidade.",
+  },
+  "corrections.remove": { en: "Do not correct", pt: "Não corrigir" },
   "compare.compareWith": { en: "Compare with", pt: "Comparar com" },
   "compare.chooseAMission": { en: "Choose a mission", pt: "Escolha uma missão" },
   "compare.knownToTheAskedAccuracy": {

@@ -86,10 +86,9 @@ describe("lines at a distance", () => {
   });
 
   it("have lines across all others, as full coverage has", () => {
-    const crosslines = { crosslines_pct: "10" };
-    expect(toMission({ ...lines, ...crosslines }).coverage).toMatchObject({ crosslines_pct: 10 });
-    const none = toMission({ ...lines, ...crosslines, spacing_m: "" }).coverage;
-    expect(none).not.toHaveProperty("crosslines_pct");
+    const spaced = { ...lines, crosslines_pct: "10" };
+    expect(toMission(spaced)).toMatchObject({ coverage: { crosslines_pct: 10 } });
+    expect(toMission({ ...spaced, spacing_m: "" })).not.toHaveProperty("coverage.crosslines_pct");
   });
 
   it("are a setting like others where the length is said otherwise", () => {

@@ -11,6 +11,7 @@ import { Grip } from "../parts/Grip";
 import { ProfilePane } from "../profile/ProfilePane";
 import { Charts } from "./Charts";
 import { Compare } from "./Compare";
+import { Corrections } from "./Corrections";
 import { EventLog } from "./EventLog";
 import { Files } from "./Files";
 import { Review } from "./Review";
@@ -55,6 +56,7 @@ export function BottomStrip() {
       {tab.value === "files" ? <Files /> : null}
       {tab.value === "charts" ? <Charts /> : null}
       {tab.value === "soundings" ? <Review /> : null}
+      {tab.value === "corrections" ? <Corrections /> : null}
       {tab.value === "compare" ? <Compare /> : null}
       {tab.value === "profile" ? <ProfilePane /> : null}
       <TimeSlider />
@@ -116,6 +118,9 @@ export function BottomStrip() {
           <Toggle name="soundings">
             {say("bottomStrip.rejected", { it: p.rejected ? ` (${count(p.rejected)})` : "" })}
           </Toggle>
+          {present.spec.kind === "survey" ? (
+            <Toggle name="corrections">{say("corrections.corrections")}</Toggle>
+          ) : null}
           <Toggle name="files">{say("bottomStrip.files")}</Toggle>
           <Toggle name="profile">{say("profile.profile")}</Toggle>
           <Toggle name="compare">{say("bottomStrip.compare")}</Toggle>
@@ -141,7 +146,7 @@ function toggle(name: Tab): void {
 function Toggle({ name, children }: { name: Tab; children: ComponentChildren }) {
   return (
     <Button id={`toggle-${name}`} aria-expanded={tab.value === name} onClick={() => toggle(name)}>
-      {children} {tab.value === name ? "▾" : "▴"}
+      {children} <span class="arrow">{tab.value === name ? "▾" : "▴"}</span>
     </Button>
   );
 }

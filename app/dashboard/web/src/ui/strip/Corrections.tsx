@@ -1,0 +1,217 @@
+import "./Corrections.css";
+import { type Signal, useSignal, useSignalEffect } from "@preact/signals";
+import { api } from "../../api/client";
+import type { CorrectionsView } from "../../api/types";
+import { whyNotCommand } from "../../state/access";
+import { profileEnds, profileOf } from "../../state/analysis/soundSpeedProfile";
+import { count, dayAndTime, plain, pointed } from "../../state/format";
+import { said } from "../../state/session";
+import { selectedId } from "../../state/store";
+import { say } from "../../words/say";
+import { Button, FileButton, Trouble, Typed } from "../parts/Controls";
+
+/** Changes something, and shows the corrections that hold then. */
+type Change = (change: (id: string) => Promise<CorrectionsView>) => Promise<void>;
+
+/** How soundings are corrected for tide and sound speed, and how that is changed, also when all was flown long ago. */
+export function Corrections() {
+  const answer = useSignal<CorrectionsView | null>(null);
+  const busy = useSignal(false);
+  const fault = useSignal("");
+  const change: Change = async (asked) => {
+    const id = selectedId.peek();
+    if (!id) return;
+    busy.value = true;
+    fault.value = "";
+    try {
+      const found = await asked(id);
+      if (selectedId.peek() === id) answer.value = found;
+    } catch (error) {
+      if (selectedId.peek() === id) fault.value = said(error);
+    } finally {
+      busy.value = false;
+    }
+  };
+  useSignalEffect(() => {
+    selectedId.value;
+    answer.value = null;
+    void change(api.corrections);
+  });
+  const found = answer.value;
+  return (
+    <div class="log corrections" data-testid="corrections">
+      <Trouble words={fault.value} />
+      {found ? (
+        <>
+          <p class="hint" data-testid="corrections-datum">
+            {say("corrections.depthsFrom", {
+              datum: found.vertical_datum,
+              accepted: count(found.accepted),
+              rejected: count(found.rejected),
+            })}
+          </p>
+          <div class="parts" key={selectedId.value}>
+            <WaterLevel found={found} busy={busy} change={change} fault={fault} />
+            <SoundSpeed found={found} busy={busy} change={change} fault={fault} />
+          </div>
+          <p class="hint">{say("corrections.everySoundingAnew")}</p>
+        </>
+      ) : null}
+    </div>
+  );
+}
+
+interface PartProps {
+  found: CorrectionsView;
+  busy: Signal<boolean>;
+  change: Change;
+  fault: Signal<string>;
+}
+
+/** A number as it is typed; null where it is none. */
+const numberOf = (text: Signal<string>): number | null => {
+  const typed = pointed(text.peek()).trim();
+  return typed !== "" && Number.isFinite(Number(typed)) ? Number(typed) : null;
+};
+
+function WaterLevel({ found, busy, change, fault }: PartProps) {
+  const { tide, tide_table: table } = found;
+  const level = useSignal(plain(tide.level_m));
+  const sd = useSignal(plain(tide.sd_m));
+  const source = useSignal(table ? "" : tide.source);
+  const stated = () => {
+    const [level_m, sd_m] = [numberOf(level), numberOf(sd)];
+    if (level_m === null || sd_m === null) {
+      fault.value = say("corrections.typeNumbers");
+      return;
+    }
+    const from = source.peek().trim() || say("draft.statedByTheOperator");
+    void change((id) => api.setTide(id, { ...tide, level_m, sd_m, source: from }));
+  };
+  const read = (name: string, text: string) =>
+    void change((id) =>
+      api.setTide(id, {
+        ...tide,
+        sd_m: numberOf(sd) ?? tide.sd_m,
+        table: text,
+        table_name: name,
+        source: name,
+      }),
+    );
+  return (
+    <section aria-label={say("corrections.waterLevel")}>
+      <h3>{say("corrections.waterLevel")}</h3>
+      <p data-testid="corrections-tide">
+        {table
+          ? say("corrections.table", {
+              name: table.name,
+              entries: count(table.entries),
+              first: dayAndTime(new Date(table.first)),
+              last: dayAndTime(new Date(table.last)),
+            })
+          : say("corrections.level", { level: plain(tide.level_m), source: tide.source })}
+      </p>
+      <div class="fields">
+        <label class="field">
+          {say("corrections.levelM")}
+          <Typed text={level} id="corrections-level" />
+        </label>
+        <label class="field">
+          {say("corrections.deviationM")}
+          <Typed text={sd} id="corrections-tide-sd" />
+        </label>
+        <label class="field">
+          {say("mission.fromWhere")}
+          <Typed
+            text={source}
+            id="corrections-tide-source"
+            placeholder={say("mission.gauge")}
+            maxLength={200}
+          />
+        </label>
+      </div>
+      <p class="row">
+        <Button id="corrections-set-level" commands busy={busy.value} onClick={stated}>
+          {say("corrections.applyLevel")}
+        </Button>
+        {whyNotCommand.value ? null : (
+          <FileButton accept=".tid,.txt,.csv,.tsv" id="corrections-tide-file" onText={read}>
+            {say("corrections.tideTable")}
+          </FileButton>
+        )}
+      </p>
+    </section>
+  );
+}
+
+const SET_IN_SONARS_MPS = 1500;
+
+function SoundSpeed({ found, busy, change, fault }: PartProps) {
+  const speed = found.sound_speed;
+  const assumed = useSignal(plain(speed?.assumed_mps ?? SET_IN_SONARS_MPS));
+  const everywhere = useSignal("");
+  const ends = speed ? profileEnds(speed.profile) : null;
+  const apply = (profile: [number, number][], source: string) => {
+    const assumed_mps = numberOf(assumed);
+    if (assumed_mps === null || profile.length === 0) {
+      fault.value = say(assumed_mps === null ? "corrections.typeNumbers" : "corrections.noProfile");
+      return;
+    }
+    void change((id) => api.setSoundSpeed(id, { assumed_mps, profile, source }));
+  };
+  const one = () => {
+    const mps = numberOf(everywhere);
+    if (mps === null) fault.value = say("corrections.typeNumbers");
+    else apply([[0, mps]], say("draft.statedByTheOperator"));
+  };
+  return (
+    <section aria-label={say("corrections.soundSpeed")}>
+      <h3>{say("corrections.soundSpeed")}</h3>
+      <p data-testid="corrections-sound-speed">
+        {speed && ends
+          ? say("corrections.profile", {
+              depths: ends.depths.map(plain).join(" – "),
+              speeds: ends.speeds.map(plain).join(" – "),
+              count: count(speed.profile.length),
+              assumed: plain(speed.assumed_mps),
+              source: speed.source,
+            })
+          : say("corrections.ownRanges")}
+      </p>
+      <div class="fields">
+        <label class="field">
+          {say("corrections.setInTheSonars")}
+          <Typed text={assumed} id="corrections-assumed" />
+        </label>
+        <label class="field">
+          {say("corrections.sameEverywhere")}
+          <Typed text={everywhere} id="corrections-speed" />
+        </label>
+      </div>
+      <p class="row">
+        <Button id="corrections-set-speed" commands busy={busy.value} onClick={one}>
+          {say("corrections.applySpeed")}
+        </Button>
+        {whyNotCommand.value ? null : (
+          <FileButton
+            accept=".asvp,.vel,.svp,.csv,.txt,.tsv"
+            id="corrections-profile-file"
+            onText={(name, text) => apply(profileOf(text), name)}
+          >
+            {say("corrections.profileFile")}
+          </FileButton>
+        )}
+        {speed ? (
+          <Button
+            id="corrections-remove-speed"
+            commands
+            busy={busy.value}
+            onClick={() => void change(api.deleteSoundSpeed)}
+          >
+            {say("corrections.remove")}
+          </Button>
+        ) : null}
+      </p>
+    </section>
+  );
+}
