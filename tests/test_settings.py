@@ -11,11 +11,12 @@ from pydantic import BaseModel
 
 from app.cli import app as command_line
 from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import PLANNERS
 from app.missions.fleet.links.imc import bridge_settings
 from app.missions.settings import ImcSettings
 from app.missions.spec.mission import MissionSpec
 from app.settings import Settings, SettingsError, is_loopback, load_settings, overridden
-from imc_bridge.settings import BridgeSettings, ConsoleSettings
+from imc_bridge.settings import DEFAULT_RATE_LIMITERS, BridgeSettings, ConsoleSettings
 from tests.support.paths import PROJECT
 
 
@@ -123,6 +124,9 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
             {},
             "simulation.family is 'harbor' (from bathyfleet.toml): use one of ",
         ),
+        ('[neptus]\nplanner = "coa"', {}, {}, "neptus.planner is 'coa' (from bathyfleet.toml): there is no"),
+        ('[neptus]\nplanner = "swath"', {}, {}, "is 'swath' (from bathyfleet.toml): it is for swath sonars"),
+        ('[neptus]\nplanner = "osarses"', {}, {}, "osarses really tries its moves"),
         (
             "",
             {"BATHYFLEET_PROT": "1"},
@@ -275,6 +279,36 @@ def test_a_setting_of_the_bridge_is_declared_once_and_set_as_the_services() -> N
 def test_a_wrong_setting_of_the_bridge_stops_the_start_and_is_named() -> None:
     with pytest.raises(SettingsError, match=r"imc\.interfaces\.0 is 'eth0'"):
         load_settings(imc={"interfaces": ["eth0"]})
+
+
+@pytest.mark.parametrize(
+    ("rates", "said"),
+    [
+        ("Distances:5", "'Distances' is no IMC message: did you mean Distance?"),
+        ("Distance=5", "'Distance=5' is no message and its rate"),
+        ("Distance:often", "'Distance:often' is no message and its rate"),
+        ("Distance:5 EstimatedState:10", "is no message and its rate"),
+        ("Distance:0", "is no message and its rate"),
+        ("Distance:inf", "is no message and its rate"),
+    ],
+)
+def test_a_wrong_rate_is_named_before_a_vehicle_is_asked_for_it(rates: str, said: str) -> None:
+    with pytest.raises(SettingsError) as refused:
+        load_settings(imc={"rate_limiters": f"EstimatedState:10, {rates}"})
+    (problem,) = refused.value.problems
+    assert problem.startswith(f"imc.rate_limiters is 'EstimatedState:10, {rates}'")
+    assert said in problem
+    assert "such as Distance:5, EstimatedState:10" in problem
+
+
+@pytest.mark.parametrize("rates", ["", " Distance : 0.5,EstimatedState:10 ", DEFAULT_RATE_LIMITERS])
+def test_rates_are_taken_as_vehicles_list_them(rates: str) -> None:
+    assert load_settings(imc={"rate_limiters": rates}).imc.rate_limiters == rates
+
+
+@pytest.mark.parametrize("planner", sorted(PLANNERS))
+def test_each_planner_of_surveys_may_plan_for_the_panel(planner: str) -> None:
+    assert load_settings(neptus={"planner": planner}).neptus.planner == planner
 
 
 def declared(model: type[BaseModel]) -> Iterator[str]:

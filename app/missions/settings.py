@@ -85,6 +85,16 @@ class NeptusSettings(Section):
         default=300.0, gt=0, le=86_400, description="A panel that was silent for this long is not waited for"
     )
 
+    @field_validator("planner")
+    @classmethod
+    def _is_a_planner(cls, planner: str) -> str:
+        from app.exploration.planners import COVERERS, PLANNERS, missing  # they take a second, and few set it
+
+        if planner not in PLANNERS:
+            what = "it is for swath sonars" if planner in COVERERS else missing(planner)
+            raise ValueError(f"{what}; use one of {', '.join(sorted(PLANNERS))}")
+        return planner
+
     @model_validator(mode="after")
     def _has_what_it_needs(self) -> Self:
         if self.enabled and (self.centre_lat_deg is None or self.centre_lon_deg is None):
