@@ -138,13 +138,13 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
             "",
             {"BATHYFLEET_ALARMS__CA_FILE": "/nope", "BATHYFLEET_ALARMS__GIVE_UP_AFTER_S": "60"},
             {},
-            "alarms (from BATHYFLEET_ALARMS__CA_FILE): ca_file '/nope' is not a file",
+            "alarms (from BATHYFLEET_ALARMS__CA_FILE): ca_file '/nope' cannot be used: No such file",
         ),
         (
             '[alarms]\nca_file = "/nope"',
             {"BATHYFLEET_ALARMS__GIVE_UP_AFTER_S": "60"},
             {},
-            "alarms (from BATHYFLEET_ALARMS__GIVE_UP_AFTER_S, bathyfleet.toml): ca_file '/nope' is not a file",
+            "alarms (from BATHYFLEET_ALARMS__GIVE_UP_AFTER_S, bathyfleet.toml): ca_file '/nope' cannot be used: No",
         ),
         (
             "",

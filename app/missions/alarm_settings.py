@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
 
+from app.certificates import wrong_with_authorities
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.optional_file import OptionalFile
 
@@ -165,8 +166,8 @@ class AlarmSettings(_Section):
             raise ValueError("emails need a mail server: set smtp.host and smtp.sender")
         if self.topics and not self.mqtt.host:
             raise ValueError("topics need a broker: set mqtt.host")
-        if self.ca_file is not None and not self.ca_file.is_file():
-            raise ValueError(f"ca_file {str(self.ca_file)!r} is not a file")
+        if self.ca_file is not None and (wrong := wrong_with_authorities(self.ca_file)):
+            raise ValueError(f"ca_file {str(self.ca_file)!r} cannot be used: {wrong}")
         return self
 
     @property

@@ -33,7 +33,7 @@ MAIL = {"host": "mail.example", "sender": "survey@ship.example"}
         ({"smtp": MAIL | {"user": "u", "security": "none"}}, "would be sent unprotected"),
         ({"topics": [{"name": "t"}]}, r"set mqtt\.host"),
         ({"topics": [{"name": "t", "topic": "a/#"}], "mqtt": {"host": "b"}}, "pattern"),
-        ({"ca_file": "/nowhere.pem"}, "is not a file"),
+        ({"ca_file": "/nowhere.pem"}, "No such file"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(values: dict[str, Any], why: str) -> None:
