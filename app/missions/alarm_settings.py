@@ -2,10 +2,11 @@
 
 import base64
 import binascii
+import ipaddress
+import re
 from typing import Annotated, Literal, Self
-from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
 
 from app.certificates import wrong_with_authorities
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
@@ -13,9 +14,24 @@ from app.optional_file import OptionalFile
 
 SECRET_PREFIX = "whsec_"  # noqa: S105 - of the standard, before the secret
 LEAST_SECRET_BYTES = 16
+TOPIC_MARKS = ("{mission}", "{kind}", "{severity}")
+"""What in a topic is filled in."""
 
 RecipientName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$")]
 MailAddress = Annotated[str, Field(max_length=254, pattern=r"^[^@\s<>,;]+@[^@\s<>,;]+$")]
+
+
+def _server(host: str) -> str:
+    try:
+        is_plain = not host or ":" not in host or bool(ipaddress.IPv6Address(host))
+    except ValueError:
+        is_plain = False
+    if not is_plain or re.search(r"[\s/@]", host):
+        raise ValueError("write only the name or the address, such as server.ship.example, and the port as port")
+    return host
+
+
+Server = Annotated[str, AfterValidator(_server)]
 
 
 class _Section(BaseModel):
@@ -36,12 +52,15 @@ class Webhook(_Section):
     @field_validator("url")
     @classmethod
     def _is_an_address(cls, url: SecretStr) -> SecretStr:
+        import httpx  # what posts there has to understand it; few settings have one
+
+        text = url.get_secret_value()
         try:
-            parts = urlsplit(url.get_secret_value())
-            host, _ = parts.hostname, parts.port
-        except ValueError:
-            host, parts = None, urlsplit("")
-        if parts.scheme not in ("http", "https") or not host:
+            parts = httpx.URL(text)
+            whole = parts.scheme in ("http", "https") and bool(parts.host) and not re.search(r"\s", text)
+        except httpx.InvalidURL:
+            whole = False
+        if not whole:
             raise ValueError("write a whole address, such as https://hooks.example/alarms")
         return url
 
@@ -74,6 +93,16 @@ class Topic(_Section):
         description="What is published to; {mission}, {kind} and {severity} in it are filled in",
     )
 
+    @field_validator("topic")
+    @classmethod
+    def _can_be_filled_in(cls, topic: str) -> str:
+        unknown = set(re.findall(r"\{[^{}]*\}", topic)) - set(TOPIC_MARKS)
+        if unknown:
+            raise ValueError(f"there is no {min(unknown)}: {', '.join(TOPIC_MARKS)} are filled in")
+        if topic.startswith("$"):
+            raise ValueError("topics that begin with $ are the broker's own")
+        return topic
+
 
 class Route(_Section):
     """Who is told of which alarms, and when."""
@@ -98,7 +127,7 @@ class Route(_Section):
 class MailServer(_Section):
     """The mail server that e-mails are given to."""
 
-    host: str = Field(default="", description="Name or address of the mail server; empty: no e-mail is sent")
+    host: Server = Field(default="", description="Name or address of the mail server; empty: no e-mail is sent")
     port: int = Field(default=587, ge=1, le=65535, description="Its TCP port; usual are 587 (starttls) and 465 (tls)")
     security: Literal["starttls", "tls", "none"] = Field(
         default="starttls", description="How the connection is protected; a password is never sent over none"
@@ -121,7 +150,7 @@ class MailServer(_Section):
 class Broker(_Section):
     """The MQTT broker that alarms are published on."""
 
-    host: str = Field(default="", description="Name or address of the MQTT broker; empty: nothing is published")
+    host: Server = Field(default="", description="Name or address of the MQTT broker; empty: nothing is published")
     port: int = Field(default=8883, ge=1, le=65535, description="Its TCP port; usual are 8883 (TLS) and 1883")
     tls: bool = Field(default=True, description="Whether the connection is protected by TLS")
     user: str = Field(default="", description="Who logs in; empty: nobody does")
