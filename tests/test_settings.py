@@ -124,6 +124,27 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
             {},
             "simulation.family is 'harbor' (from bathyfleet.toml): use one of ",
         ),
+        ('peer_url = "10.0.0.5:8080"', {}, {}, "needs another form: where other processes on the same database reach"),
+        (
+            '[compute]\nscheduler = "deck:8786"',
+            {},
+            {},
+            "(from bathyfleet.toml): needs another form: dask",
+        ),
+        (
+            '[alarms.smtp]\nhost = "mail"\nsender = "us"',
+            {},
+            {},
+            "alarms.smtp.sender (from bathyfleet.toml): needs another form: address that the e-mails come",
+        ),
+        (
+            '[[alarms.topics]]\nname = "wall"\ntopc = "ship/alarms"\n[alarms.mqtt]\nhost = "broker"',
+            {},
+            {},
+            "alarms.topics.0.topc (from bathyfleet.toml) is not a setting: did you mean topic?",
+        ),
+        ("[simulation]\nseed = -1", {}, {}, "simulation.seed is -1 (from bathyfleet.toml): input should be greater"),
+        ("[simulation]\ncurrent_mps = [nan, 0]", {}, {}, "simulation.current_mps.0 is nan"),
         ('[neptus]\nplanner = "coa"', {}, {}, "neptus.planner is 'coa' (from bathyfleet.toml): there is no"),
         ('[neptus]\nplanner = "swath"', {}, {}, "is 'swath' (from bathyfleet.toml): it is for swath sonars"),
         ('[neptus]\nplanner = "osarses"', {}, {}, "osarses really tries its moves"),
@@ -191,10 +212,14 @@ def test_a_file_that_is_named_by_nothing_is_none(tmp_path: Path, monkeypatch: py
     """As a line like BATHYFLEET_TLS_KEY= has it; the folder that the service runs in is meant by nobody."""
     (tmp_path / "bathyfleet.toml").write_text(
         'tls_certificate = "both.pem"\ntls_key = ""\n[ais]\nfile = ""\n[alarms]\nca_file = ""\n'
+        '[compute]\ntls_ca_file = ""\ntls_certificate = ""\ntls_key = ""\n'
     )
     monkeypatch.setenv("BATHYFLEET_SIMULATION__TERRAIN", "")
     settings = load_settings()
     assert settings.tls_key is settings.ais.file is settings.alarms.ca_file is settings.simulation.terrain is None
+    assert settings.compute.tls_ca_file is settings.compute.tls_certificate is settings.compute.tls_key is None
+    monkeypatch.setenv("BATHYFLEET_TLS_CERTIFICATE", "")
+    assert load_settings().tls_certificate is None
 
 
 def test_a_password_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:

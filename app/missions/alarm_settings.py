@@ -43,7 +43,7 @@ class _Section(BaseModel):
 class Webhook(_Section):
     """A program that is told by HTTP."""
 
-    name: RecipientName = Field(description="What routes call it")
+    name: RecipientName = Field(description="What routes call it: letters, digits, blanks and . _ -")
     url: SecretStr = Field(description="Where alarms are posted to, http or https; never shown, as it may hold keys")
     secret: SecretStr = Field(
         description="What it is signed with: at least 16 bytes, or whsec_ and base64 as Standard Webhooks have it"
@@ -79,18 +79,20 @@ class Webhook(_Section):
 class MailRecipient(_Section):
     """People who are told by e-mail."""
 
-    name: RecipientName = Field(description="What routes call them")
-    to: tuple[MailAddress, ...] = Field(min_length=1, max_length=50, description="Their addresses")
+    name: RecipientName = Field(description="What routes call them: letters, digits, blanks and . _ -")
+    to: tuple[MailAddress, ...] = Field(
+        min_length=1, max_length=50, description="Their addresses, each such as duty@institute.example"
+    )
 
 
 class Topic(_Section):
     """A topic on the MQTT broker."""
 
-    name: RecipientName = Field(description="What routes call it")
+    name: RecipientName = Field(description="What routes call it: letters, digits, blanks and . _ -")
     topic: str = Field(
         default="bathyfleet/alarms",
         pattern=r"^[^+#\x00]{1,200}$",
-        description="What is published to; {mission}, {kind} and {severity} in it are filled in",
+        description="What is published to, without + and #; {mission}, {kind} and {severity} in it are filled in",
     )
 
     @field_validator("topic")
@@ -135,7 +137,9 @@ class MailServer(_Section):
     user: str = Field(default="", description="Who logs in; empty: nobody does")
     password: SecretStr = Field(default=SecretStr(""), description="The user's password")
     sender: str = Field(
-        default="", pattern=r"^$|^[^@\s<>,;]+@[^@\s<>,;]+$", description="Address that the e-mails come from"
+        default="",
+        pattern=r"^$|^[^@\s<>,;]+@[^@\s<>,;]+$",
+        description="Address that the e-mails come from, such as survey@ship.example",
     )
 
     @model_validator(mode="after")

@@ -1,7 +1,7 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 import ipaddress
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
@@ -12,6 +12,9 @@ from imc_bridge.settings import ConsoleSettings
 
 if TYPE_CHECKING:
     from app.mapping.products.crowdsourced import Provider
+
+
+Current = Annotated[float, Field(ge=-10, le=10)]
 
 
 class Section(BaseModel):
@@ -112,14 +115,14 @@ class SimulationSettings(Section):
 
     terrain: OptionalFile = Field(default=None, description="Terrain file; without one a sea floor is generated")
     family: str = Field(default="harbour", description="Kind of the generated sea floor")
-    seed: int = Field(default=0, description="Seed of the generated sea floor and of the vehicles' noise")
+    seed: int = Field(default=0, ge=0, description="Seed of the generated sea floor and of the vehicles' noise")
     drift_m2ps: float = Field(
         default=0.0,
         ge=0,
         le=10,
         description="Growth of the variance of a submerged vehicle's position, m2/s; LAUVs report 0.02; 0: none",
     )
-    current_mps: tuple[float, float] = Field(
+    current_mps: tuple[Current, Current] = Field(
         default=(0.0, 0.0), description="Velocity of the water over ground, [east, north], m/s"
     )
     consumption_factor: float = Field(
@@ -194,12 +197,12 @@ class ProviderSettings(Section):
         default="",
         max_length=200,
         pattern=r"^([A-Za-z0-9._%+-]+@[A-Za-z0-9.-]+\.[A-Za-z]{2,6})?$",
-        description="Where users of the data can ask; B-12 asks for it",
+        description="E-mail address where users of the data can ask; B-12 asks for it",
     )
     node: str = Field(
         default="BATHYFLEET",
         pattern=r"^[a-zA-Z][a-zA-Z0-9]{0,63}$",
-        description="Prefix of the vehicles' identities, given by the data centre (DCDB)",
+        description="Prefix of the vehicles' identities, given by the data centre (DCDB): letters and digits",
     )
     license: str = Field(default="CC0 1.0", max_length=200, description="Under what the soundings are given")
 
