@@ -66,8 +66,23 @@ def _is_rate(text: str) -> bool:
         return False
 
 
-Address = Annotated[str, AfterValidator(lambda text: str(ipaddress.IPv4Address(text)))]
-Network = Annotated[str, AfterValidator(lambda text: ipaddress.IPv4Network(text) and text)]
+def _address(text: str) -> str:
+    try:
+        return str(ipaddress.IPv4Address(text))
+    except ValueError:
+        raise ValueError("use an IPv4 address such as 10.0.10.80") from None
+
+
+def _network(text: str) -> str:
+    try:
+        ipaddress.IPv4Network(text)
+    except ValueError:
+        raise ValueError("use an IPv4 address or a network such as 10.0.10.0/24, without host bits") from None
+    return text
+
+
+Address = Annotated[str, AfterValidator(_address)]
+Network = Annotated[str, AfterValidator(_network)]
 ImcId = Annotated[int, Field(ge=1, le=0xFFFE), BeforeValidator(_hexadecimal)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 Latitude = Annotated[float, Field(ge=-90, le=90)]

@@ -145,6 +145,9 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
         ),
         ("[simulation]\nseed = -1", {}, {}, "simulation.seed is -1 (from bathyfleet.toml): input should be greater"),
         ("[simulation]\ncurrent_mps = [nan, 0]", {}, {}, "simulation.current_mps.0 is nan"),
+        ('[neptus]\npublic_address = "ship.example"', {}, {}, "neptus.public_address is 'ship.example'"),
+        ("[neptus]\nftp_port = 8021\nhttp_port = 8021", {}, {}, "ftp_port and http_port are both 8021"),
+        ("[neptus]\nfirst_depth_m = 60", {}, {}, "first_depth_m 60 is below max_depth_m 50"),
         ('[neptus]\nplanner = "coa"', {}, {}, "neptus.planner is 'coa' (from bathyfleet.toml): there is no"),
         ('[neptus]\nplanner = "swath"', {}, {}, "is 'swath' (from bathyfleet.toml): it is for swath sonars"),
         ('[neptus]\nplanner = "osarses"', {}, {}, "osarses really tries its moves"),
@@ -302,8 +305,10 @@ def test_a_setting_of_the_bridge_is_declared_once_and_set_as_the_services() -> N
 
 
 def test_a_wrong_setting_of_the_bridge_stops_the_start_and_is_named() -> None:
-    with pytest.raises(SettingsError, match=r"imc\.interfaces\.0 is 'eth0'"):
+    with pytest.raises(SettingsError, match=r"imc\.interfaces\.0 is 'eth0' .*: use an IPv4 address such as"):
         load_settings(imc={"interfaces": ["eth0"]})
+    with pytest.raises(SettingsError, match=r"imc\.allowed_addresses\.0 is '10\.0\.10\.1/24' .*, without host bits"):
+        load_settings(imc={"allowed_addresses": ["10.0.10.1/24"]})
 
 
 @pytest.mark.parametrize(

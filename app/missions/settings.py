@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from app.compute.settings import ComputeSettings
 from app.missions.alarm_settings import AlarmSettings
 from app.optional_file import OptionalFile
-from imc_bridge.settings import ConsoleSettings
+from imc_bridge.settings import Address, ConsoleSettings
 
 if TYPE_CHECKING:
     from app.mapping.products.crowdsourced import Provider
@@ -39,8 +39,8 @@ class NeptusSettings(Section):
     passive_ports: tuple[int, ...] = Field(
         default=(), description="First and last TCP port of FTP data connections; empty: any"
     )
-    public_address: str | None = Field(
-        default=None, description="Address told for FTP data connections where a router stands between"
+    public_address: Address | None = Field(
+        default=None, description="IPv4 address told for FTP data connections where a router stands between"
     )
     centre_lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Area Center, latitude")
     centre_lon_deg: float | None = Field(default=None, ge=-180, le=180, description="Area Center, longitude")
@@ -107,6 +107,10 @@ class NeptusSettings(Section):
         ports = self.passive_ports
         if ports and not (len(ports) == 2 and 0 < ports[0] <= ports[1] <= 65535):
             raise ValueError(f"passive_ports {list(ports)} must be a first and a last port, 1 to 65535, or empty")
+        if self.ftp_port == self.http_port != 0:
+            raise ValueError(f"ftp_port and http_port are both {self.ftp_port}: each needs a port of its own")
+        if self.first_depth_m > self.max_depth_m:
+            raise ValueError(f"first_depth_m {self.first_depth_m:g} is below max_depth_m {self.max_depth_m:g}")
         return self
 
 
