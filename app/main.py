@@ -3,7 +3,6 @@
 import asyncio
 import os
 import socket
-import ssl
 import sys
 import warnings
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -49,12 +48,14 @@ from app.api.missions import alarms, fleet, forecasts, missions, orders, searche
 from app.api.schemas import API
 from app.api.soundings import corrections, imports, measurements, pings, soundings
 from app.api.state import EdgeState
-from app.certificates import first_certificate
+from app.certificates import first_certificate, when_not_valid
 from app.dashboard.serve import mount_dashboard
 from app.descriptors import allow_descriptors
 from app.end_signals import EndSignals
 from app.malloc import keep_memory_together, settled
+from app.missions import clock
 from app.missions.service import MissionService
+from app.named_files import unusable_certificate
 from app.settings import Settings, StartupError, is_loopback, load_settings
 from app.storage.database import Database
 from app.storage.processes.membership import MembershipLostError
@@ -322,25 +323,6 @@ class Server(uvicorn.Server):
         yield
 
 
-def check_certificate(settings: Settings) -> None:
-    """Raise StartupError when HTTPS is set up with files that cannot be used."""
-    if settings.tls_certificate is None:
-        return
-    try:
-        # Without a password the library would ask for one at the terminal.
-        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(settings.tls_certificate, settings.tls_key, lambda: "")
-    except OSError as error:
-        files = f"tls_certificate {settings.tls_certificate}" + (
-            f" and tls_key {settings.tls_key}" if settings.tls_key else " (where the key has to be, too)"
-        )
-        reason = {"KEY_VALUES_MISMATCH": "the key belongs to another certificate"}.get(
-            getattr(error, "reason", "") or "", error.strerror or str(error)
-        )
-        raise StartupError(
-            f"{files} cannot be used: {reason}; both are PEM files, the key without a password"
-        ) from None
-
-
 def listen(settings: Settings) -> socket.socket:
     """Return a socket that is bound as set up. Raises StartupError when the address is taken or not ours."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
@@ -371,7 +353,10 @@ async def serve(
     StartupError, DatabaseNotReadyError
         When the service cannot start as it is set up.
     """
-    check_certificate(settings)
+    if wrong := unusable_certificate(settings):
+        raise StartupError(wrong)
+    if settings.tls_certificate and (when := when_not_valid(settings.tls_certificate, clock.now())):
+        log.warning("clients refuse the certificate, which is not valid now", tls_certificate=when)
     keep_memory_together()
     sys.setswitchinterval(SWITCH_S)
     allow_descriptors(settings.max_connections)

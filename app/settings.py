@@ -8,10 +8,11 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 from urllib.parse import urlsplit
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -81,7 +82,7 @@ class Settings(BaseSettings, ServiceSettings):
         description="Where other processes on the same database reach this one, for example http://10.0.0.5:8080; "
         "empty: host and port",
     )
-    tls_certificate: Path | None = Field(
+    tls_certificate: OptionalFile = Field(
         default=None, description="File with the certificate and its chain (PEM): serve HTTPS instead of HTTP"
     )
     tls_key: OptionalFile = Field(
@@ -372,20 +373,31 @@ def _unknown(what: str, name: str, known: Iterable[str]) -> str:
     return f"{what} is not a setting: {hint}"
 
 
+def _declared(path: Sequence[str]) -> tuple[type[BaseModel], FieldInfo | None]:
+    """Return the section that a path leads into, and the setting of its last name; None where there is none."""
+    section: type[BaseModel] = Settings
+    field: FieldInfo | None = None
+    for name in path:
+        if name.isdecimal():  # an element of a list
+            continue
+        within = () if field is None else (field.annotation, *get_args(field.annotation))
+        sections = [kind for kind in within if isinstance(kind, type) and issubclass(kind, BaseModel)]
+        section = sections[0] if sections else section
+        field = section.model_fields.get(name)
+    return section, field
+
+
 def _describe(error: ValidationError, overrides: dict[str, Any]) -> Iterable[str]:
     for entry in error.errors(include_url=False):
         path = [str(part) for part in entry["loc"]]
         name = ".".join(path)
         source = "the command line" if overrides.get(path[0]) is not None else _source(path, entry["msg"])
+        section, field = _declared(path)
         if entry["type"] == "extra_forbidden":
-            model: type[BaseModel] = Settings
-            for part in path[:-1]:
-                annotation = model.model_fields[part].annotation
-                if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
-                    break
-                model = annotation
-            yield _unknown(f"{name} (from {source})", path[-1], model.model_fields)
+            yield _unknown(f"{name} (from {source})", path[-1], section.model_fields)
         else:
             message = entry["msg"].removeprefix("Value error, ")
+            if entry["type"] == "string_pattern_mismatch" and field is not None and field.description:
+                message = f"needs another form: {field.description[0].lower()}{field.description[1:]}"
             shown = "" if path[0] in _SECRET else f" is {entry['input']!r}"
             yield f"{name}{shown} (from {source}): {message[0].lower()}{message[1:]}"

@@ -1,6 +1,8 @@
 """Everything that can be set about the IMC side, in one frozen place; what others offer of it derives from here."""
 
+import difflib
 import ipaddress
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
@@ -12,6 +14,8 @@ DEFAULT_RATE_LIMITERS = (
     "Distance:5, EstimatedState:10, ServoPosition:0.1, EulerAngles:0.1, AngularVelocity:0.1, Acceleration:0.1"
 )
 """Positions and depths often; seldom what makes up nine tenths of 710 packets a second and is of no use here."""
+
+_SUCH_RATES = "such as Distance:5, EstimatedState:10"
 
 PLAN_NAME = "bathyfleet"
 """What the names of our plans begin with; earlier versions called every plan so."""
@@ -39,8 +43,46 @@ def _hexadecimal(given: Any) -> Any:
         return given
 
 
-Address = Annotated[str, AfterValidator(lambda text: str(ipaddress.IPv4Address(text)))]
-Network = Annotated[str, AfterValidator(lambda text: ipaddress.IPv4Network(text) and text)]
+def _rates(text: str) -> str:
+    """Return what asks for rates as it is given. Raises ValueError where a vehicle could make nothing of it."""
+    import imcpy  # few set it, and settings are read without the bridge
+
+    for item in filter(str.strip, text.split(",")):
+        name, _, rate = (part.strip() for part in item.partition(":"))
+        if not name or not _is_rate(rate):
+            raise ValueError(f"{item.strip()!r} is no message and its rate in Hz, {_SUCH_RATES}")
+        kind = getattr(imcpy, name, None)
+        if not (isinstance(kind, type) and issubclass(kind, imcpy.Message)):
+            close = difflib.get_close_matches(name, dir(imcpy), n=1)
+            meant = f": did you mean {close[0]}?" if close else ";"
+            raise ValueError(f"{name!r} is no IMC message{meant} Rates are in Hz, {_SUCH_RATES}")
+    return text
+
+
+def _is_rate(text: str) -> bool:
+    try:
+        return 0 < float(text) < math.inf
+    except ValueError:
+        return False
+
+
+def _address(text: str) -> str:
+    try:
+        return str(ipaddress.IPv4Address(text))
+    except ValueError:
+        raise ValueError("use an IPv4 address such as 10.0.10.80") from None
+
+
+def _network(text: str) -> str:
+    try:
+        ipaddress.IPv4Network(text)
+    except ValueError:
+        raise ValueError("use an IPv4 address or a network such as 10.0.10.0/24, without host bits") from None
+    return text
+
+
+Address = Annotated[str, AfterValidator(_address)]
+Network = Annotated[str, AfterValidator(_network)]
 ImcId = Annotated[int, Field(ge=1, le=0xFFFE), BeforeValidator(_hexadecimal)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 Latitude = Annotated[float, Field(ge=-90, le=90)]
@@ -96,7 +138,7 @@ class ConsoleSettings(BaseModel):
         description="Most IMC packets a second from one vehicle, multiplied by time_scale; all strangers at one "
         "address get a quarter of that",
     )
-    rate_limiters: str = Field(
+    rate_limiters: Annotated[str, AfterValidator(_rates)] = Field(
         default=DEFAULT_RATE_LIMITERS,
         description="Rates in Hz asked of every engaged vehicle and taken back at the end; empty: as they are",
     )

@@ -247,6 +247,17 @@ def values_of(schema: dict[str, Any]) -> str:
     return " ".join([words[schema["type"]], *([", ".join(limits)] if limits else [])])
 
 
+def test_the_runbook_quotes_alarms_as_they_are_raised() -> None:
+    runbook = (PROJECT / "docs" / "runbook.md").read_text()
+    cells = re.findall(r"^\| (.*?\*\*.*?) \|", runbook, re.MULTILINE)
+    quoted = [
+        part.strip() for cell in cells for words in re.findall(r"\*\*(.+?)\*\*", cell) for part in words.split("…")
+    ]
+    source = "".join(file.read_text() for name in ("app", "imc_bridge") for file in (PROJECT / name).rglob("*.py"))
+    assert len(quoted) > 10
+    assert [words for words in quoted if words not in source] == []
+
+
 def test_the_table_of_settings_is_complete_and_true() -> None:
     rows = [line for line in (PROJECT / "docs" / "settings.md").read_text().splitlines() if line.startswith("| `")]
     assert rows == list(settings_rows())

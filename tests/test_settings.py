@@ -11,11 +11,12 @@ from pydantic import BaseModel
 
 from app.cli import app as command_line
 from app.exploration.planner.options import PlannerOptions
+from app.exploration.planners import PLANNERS
 from app.missions.fleet.links.imc import bridge_settings
 from app.missions.settings import ImcSettings
 from app.missions.spec.mission import MissionSpec
 from app.settings import Settings, SettingsError, is_loopback, load_settings, overridden
-from imc_bridge.settings import BridgeSettings, ConsoleSettings
+from imc_bridge.settings import DEFAULT_RATE_LIMITERS, BridgeSettings, ConsoleSettings
 from tests.support.paths import PROJECT
 
 
@@ -123,6 +124,33 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
             {},
             "simulation.family is 'harbor' (from bathyfleet.toml): use one of ",
         ),
+        ('peer_url = "10.0.0.5:8080"', {}, {}, "needs another form: where other processes on the same database reach"),
+        (
+            '[compute]\nscheduler = "deck:8786"',
+            {},
+            {},
+            "(from bathyfleet.toml): needs another form: dask",
+        ),
+        (
+            '[alarms.smtp]\nhost = "mail"\nsender = "us"',
+            {},
+            {},
+            "alarms.smtp.sender (from bathyfleet.toml): needs another form: address that the e-mails come",
+        ),
+        (
+            '[[alarms.topics]]\nname = "wall"\ntopc = "ship/alarms"\n[alarms.mqtt]\nhost = "broker"',
+            {},
+            {},
+            "alarms.topics.0.topc (from bathyfleet.toml) is not a setting: did you mean topic?",
+        ),
+        ("[simulation]\nseed = -1", {}, {}, "simulation.seed is -1 (from bathyfleet.toml): input should be greater"),
+        ("[simulation]\ncurrent_mps = [nan, 0]", {}, {}, "simulation.current_mps.0 is nan"),
+        ('[neptus]\npublic_address = "ship.example"', {}, {}, "neptus.public_address is 'ship.example'"),
+        ("[neptus]\nftp_port = 8021\nhttp_port = 8021", {}, {}, "ftp_port and http_port are both 8021"),
+        ("[neptus]\nfirst_depth_m = 60", {}, {}, "first_depth_m 60 is below max_depth_m 50"),
+        ('[neptus]\nplanner = "coa"', {}, {}, "neptus.planner is 'coa' (from bathyfleet.toml): there is no"),
+        ('[neptus]\nplanner = "swath"', {}, {}, "is 'swath' (from bathyfleet.toml): it is for swath sonars"),
+        ('[neptus]\nplanner = "osarses"', {}, {}, "osarses really tries its moves"),
         (
             "",
             {"BATHYFLEET_PROT": "1"},
@@ -134,13 +162,13 @@ def test_only_sqlite_is_migrated_without_being_asked() -> None:
             "",
             {"BATHYFLEET_ALARMS__CA_FILE": "/nope", "BATHYFLEET_ALARMS__GIVE_UP_AFTER_S": "60"},
             {},
-            "alarms (from BATHYFLEET_ALARMS__CA_FILE): ca_file '/nope' is not a file",
+            "alarms (from BATHYFLEET_ALARMS__CA_FILE): ca_file '/nope' cannot be used: No such file",
         ),
         (
             '[alarms]\nca_file = "/nope"',
             {"BATHYFLEET_ALARMS__GIVE_UP_AFTER_S": "60"},
             {},
-            "alarms (from BATHYFLEET_ALARMS__GIVE_UP_AFTER_S, bathyfleet.toml): ca_file '/nope' is not a file",
+            "alarms (from BATHYFLEET_ALARMS__GIVE_UP_AFTER_S, bathyfleet.toml): ca_file '/nope' cannot be used: No",
         ),
         (
             "",
@@ -187,10 +215,14 @@ def test_a_file_that_is_named_by_nothing_is_none(tmp_path: Path, monkeypatch: py
     """As a line like BATHYFLEET_TLS_KEY= has it; the folder that the service runs in is meant by nobody."""
     (tmp_path / "bathyfleet.toml").write_text(
         'tls_certificate = "both.pem"\ntls_key = ""\n[ais]\nfile = ""\n[alarms]\nca_file = ""\n'
+        '[compute]\ntls_ca_file = ""\ntls_certificate = ""\ntls_key = ""\n'
     )
     monkeypatch.setenv("BATHYFLEET_SIMULATION__TERRAIN", "")
     settings = load_settings()
     assert settings.tls_key is settings.ais.file is settings.alarms.ca_file is settings.simulation.terrain is None
+    assert settings.compute.tls_ca_file is settings.compute.tls_certificate is settings.compute.tls_key is None
+    monkeypatch.setenv("BATHYFLEET_TLS_CERTIFICATE", "")
+    assert load_settings().tls_certificate is None
 
 
 def test_a_password_is_never_shown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -273,8 +305,40 @@ def test_a_setting_of_the_bridge_is_declared_once_and_set_as_the_services() -> N
 
 
 def test_a_wrong_setting_of_the_bridge_stops_the_start_and_is_named() -> None:
-    with pytest.raises(SettingsError, match=r"imc\.interfaces\.0 is 'eth0'"):
+    with pytest.raises(SettingsError, match=r"imc\.interfaces\.0 is 'eth0' .*: use an IPv4 address such as"):
         load_settings(imc={"interfaces": ["eth0"]})
+    with pytest.raises(SettingsError, match=r"imc\.allowed_addresses\.0 is '10\.0\.10\.1/24' .*, without host bits"):
+        load_settings(imc={"allowed_addresses": ["10.0.10.1/24"]})
+
+
+@pytest.mark.parametrize(
+    ("rates", "said"),
+    [
+        ("Distances:5", "'Distances' is no IMC message: did you mean Distance?"),
+        ("Distance=5", "'Distance=5' is no message and its rate"),
+        ("Distance:often", "'Distance:often' is no message and its rate"),
+        ("Distance:5 EstimatedState:10", "is no message and its rate"),
+        ("Distance:0", "is no message and its rate"),
+        ("Distance:inf", "is no message and its rate"),
+    ],
+)
+def test_a_wrong_rate_is_named_before_a_vehicle_is_asked_for_it(rates: str, said: str) -> None:
+    with pytest.raises(SettingsError) as refused:
+        load_settings(imc={"rate_limiters": f"EstimatedState:10, {rates}"})
+    (problem,) = refused.value.problems
+    assert problem.startswith(f"imc.rate_limiters is 'EstimatedState:10, {rates}'")
+    assert said in problem
+    assert "such as Distance:5, EstimatedState:10" in problem
+
+
+@pytest.mark.parametrize("rates", ["", " Distance : 0.5,EstimatedState:10 ", DEFAULT_RATE_LIMITERS])
+def test_rates_are_taken_as_vehicles_list_them(rates: str) -> None:
+    assert load_settings(imc={"rate_limiters": rates}).imc.rate_limiters == rates
+
+
+@pytest.mark.parametrize("planner", sorted(PLANNERS))
+def test_each_planner_of_surveys_may_plan_for_the_panel(planner: str) -> None:
+    assert load_settings(neptus={"planner": planner}).neptus.planner == planner
 
 
 def declared(model: type[BaseModel]) -> Iterator[str]:

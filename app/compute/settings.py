@@ -1,9 +1,10 @@
 """What can be set about the cluster; ``app.missions.settings`` composes it."""
 
-from pathlib import Path
 from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from app.optional_file import OptionalFile
 
 
 class ComputeSettings(BaseModel):
@@ -29,13 +30,13 @@ class ComputeSettings(BaseModel):
         le=600,
         description="How long no map of a running mission is begun after one; never shorter than that one took",
     )
-    tls_ca_file: Path | None = Field(
+    tls_ca_file: OptionalFile = Field(
         default=None, description="File with the certificate (PEM) of the authority that the cluster's are signed by"
     )
-    tls_certificate: Path | None = Field(
+    tls_certificate: OptionalFile = Field(
         default=None, description="File with the certificate (PEM) that this service shows the cluster"
     )
-    tls_key: Path | None = Field(default=None, description="File with its private key (PEM)")
+    tls_key: OptionalFile = Field(default=None, description="File with its private key (PEM)")
 
     @model_validator(mode="after")
     def _encrypts_as_the_address_says(self) -> Self:

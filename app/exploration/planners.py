@@ -43,8 +43,6 @@ SEARCHERS: dict[str, type[PlannerBase]] = {
 ONLY_IN_SIMULATION = ("osarses", "spsa-tried", "fdsa-tried")
 """Yardsticks that really try their moves and take them back, as only ``bathyfleet evaluate explore`` can."""
 
-REFUSAL = "{name} really tries its moves before it takes one, which only bathyfleet evaluate explore can simulate"
-
 QUICK = PlannerOptions(search=8, rollouts=8, candidates=4)
 """Enough to run through every part of a planner once."""
 
@@ -71,8 +69,6 @@ def create_planner(
     ValueError
         When there is no planner of that name.
     """
-    if name in ONLY_IN_SIMULATION:
-        raise ValueError(f"planner: {REFUSAL.format(name=name)}")
     try:
         planner = (PLANNERS | COVERERS)[name]
     except KeyError:
@@ -95,7 +91,9 @@ def options_of(planner: type[PlannerBase]) -> frozenset[str]:
 
 
 def missing(name: str) -> str:
-    """Return why there is no planner of a name: not known, or installed and broken."""
+    """Return why there is no planner of a name: not known, installed and broken, or only a yardstick."""
+    if name in ONLY_IN_SIMULATION:
+        return f"{name} really tries its moves before it takes one, which only bathyfleet evaluate explore can simulate"
     broken = INSTALLED.broken.get(name)
     return (
         f"there is no planner {name!r}"

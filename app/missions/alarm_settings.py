@@ -2,19 +2,36 @@
 
 import base64
 import binascii
+import ipaddress
+import re
 from typing import Annotated, Literal, Self
-from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, SecretStr, field_validator, model_validator
 
+from app.certificates import wrong_with_authorities
 from app.missions.alarm_kinds import AlarmKind, AlarmSeverity
 from app.optional_file import OptionalFile
 
 SECRET_PREFIX = "whsec_"  # noqa: S105 - of the standard, before the secret
 LEAST_SECRET_BYTES = 16
+TOPIC_MARKS = ("{mission}", "{kind}", "{severity}")
+"""What in a topic is filled in."""
 
 RecipientName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$")]
 MailAddress = Annotated[str, Field(max_length=254, pattern=r"^[^@\s<>,;]+@[^@\s<>,;]+$")]
+
+
+def _server(host: str) -> str:
+    try:
+        is_plain = not host or ":" not in host or bool(ipaddress.IPv6Address(host))
+    except ValueError:
+        is_plain = False
+    if not is_plain or re.search(r"[\s/@]", host):
+        raise ValueError("write only the name or the address, such as server.ship.example, and the port as port")
+    return host
+
+
+Server = Annotated[str, AfterValidator(_server)]
 
 
 class _Section(BaseModel):
@@ -26,7 +43,7 @@ class _Section(BaseModel):
 class Webhook(_Section):
     """A program that is told by HTTP."""
 
-    name: RecipientName = Field(description="What routes call it")
+    name: RecipientName = Field(description="What routes call it: letters, digits, blanks and . _ -")
     url: SecretStr = Field(description="Where alarms are posted to, http or https; never shown, as it may hold keys")
     secret: SecretStr = Field(
         description="What it is signed with: at least 16 bytes, or whsec_ and base64 as Standard Webhooks have it"
@@ -35,12 +52,15 @@ class Webhook(_Section):
     @field_validator("url")
     @classmethod
     def _is_an_address(cls, url: SecretStr) -> SecretStr:
+        import httpx  # what posts there has to understand it; few settings have one
+
+        text = url.get_secret_value()
         try:
-            parts = urlsplit(url.get_secret_value())
-            host, _ = parts.hostname, parts.port
-        except ValueError:
-            host, parts = None, urlsplit("")
-        if parts.scheme not in ("http", "https") or not host:
+            parts = httpx.URL(text)
+            whole = parts.scheme in ("http", "https") and bool(parts.host) and not re.search(r"\s", text)
+        except httpx.InvalidURL:
+            whole = False
+        if not whole:
             raise ValueError("write a whole address, such as https://hooks.example/alarms")
         return url
 
@@ -59,19 +79,31 @@ class Webhook(_Section):
 class MailRecipient(_Section):
     """People who are told by e-mail."""
 
-    name: RecipientName = Field(description="What routes call them")
-    to: tuple[MailAddress, ...] = Field(min_length=1, max_length=50, description="Their addresses")
+    name: RecipientName = Field(description="What routes call them: letters, digits, blanks and . _ -")
+    to: tuple[MailAddress, ...] = Field(
+        min_length=1, max_length=50, description="Their addresses, each such as duty@institute.example"
+    )
 
 
 class Topic(_Section):
     """A topic on the MQTT broker."""
 
-    name: RecipientName = Field(description="What routes call it")
+    name: RecipientName = Field(description="What routes call it: letters, digits, blanks and . _ -")
     topic: str = Field(
         default="bathyfleet/alarms",
         pattern=r"^[^+#\x00]{1,200}$",
-        description="What is published to; {mission}, {kind} and {severity} in it are filled in",
+        description="What is published to, without + and #; {mission}, {kind} and {severity} in it are filled in",
     )
+
+    @field_validator("topic")
+    @classmethod
+    def _can_be_filled_in(cls, topic: str) -> str:
+        unknown = set(re.findall(r"\{[^{}]*\}", topic)) - set(TOPIC_MARKS)
+        if unknown:
+            raise ValueError(f"there is no {min(unknown)}: {', '.join(TOPIC_MARKS)} are filled in")
+        if topic.startswith("$"):
+            raise ValueError("topics that begin with $ are the broker's own")
+        return topic
 
 
 class Route(_Section):
@@ -97,7 +129,7 @@ class Route(_Section):
 class MailServer(_Section):
     """The mail server that e-mails are given to."""
 
-    host: str = Field(default="", description="Name or address of the mail server; empty: no e-mail is sent")
+    host: Server = Field(default="", description="Name or address of the mail server; empty: no e-mail is sent")
     port: int = Field(default=587, ge=1, le=65535, description="Its TCP port; usual are 587 (starttls) and 465 (tls)")
     security: Literal["starttls", "tls", "none"] = Field(
         default="starttls", description="How the connection is protected; a password is never sent over none"
@@ -105,7 +137,9 @@ class MailServer(_Section):
     user: str = Field(default="", description="Who logs in; empty: nobody does")
     password: SecretStr = Field(default=SecretStr(""), description="The user's password")
     sender: str = Field(
-        default="", pattern=r"^$|^[^@\s<>,;]+@[^@\s<>,;]+$", description="Address that the e-mails come from"
+        default="",
+        pattern=r"^$|^[^@\s<>,;]+@[^@\s<>,;]+$",
+        description="Address that the e-mails come from, such as survey@ship.example",
     )
 
     @model_validator(mode="after")
@@ -120,7 +154,7 @@ class MailServer(_Section):
 class Broker(_Section):
     """The MQTT broker that alarms are published on."""
 
-    host: str = Field(default="", description="Name or address of the MQTT broker; empty: nothing is published")
+    host: Server = Field(default="", description="Name or address of the MQTT broker; empty: nothing is published")
     port: int = Field(default=8883, ge=1, le=65535, description="Its TCP port; usual are 8883 (TLS) and 1883")
     tls: bool = Field(default=True, description="Whether the connection is protected by TLS")
     user: str = Field(default="", description="Who logs in; empty: nobody does")
@@ -165,8 +199,8 @@ class AlarmSettings(_Section):
             raise ValueError("emails need a mail server: set smtp.host and smtp.sender")
         if self.topics and not self.mqtt.host:
             raise ValueError("topics need a broker: set mqtt.host")
-        if self.ca_file is not None and not self.ca_file.is_file():
-            raise ValueError(f"ca_file {str(self.ca_file)!r} is not a file")
+        if self.ca_file is not None and (wrong := wrong_with_authorities(self.ca_file)):
+            raise ValueError(f"ca_file {str(self.ca_file)!r} cannot be used: {wrong}")
         return self
 
     @property

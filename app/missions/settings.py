@@ -1,17 +1,20 @@
 """Settings of the mission service. ``app.settings`` composes them with those of the HTTP edge."""
 
 import ipaddress
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from app.compute.settings import ComputeSettings
 from app.missions.alarm_settings import AlarmSettings
 from app.optional_file import OptionalFile
-from imc_bridge.settings import ConsoleSettings
+from imc_bridge.settings import Address, ConsoleSettings
 
 if TYPE_CHECKING:
     from app.mapping.products.crowdsourced import Provider
+
+
+Current = Annotated[float, Field(ge=-10, le=10)]
 
 
 class Section(BaseModel):
@@ -36,8 +39,8 @@ class NeptusSettings(Section):
     passive_ports: tuple[int, ...] = Field(
         default=(), description="First and last TCP port of FTP data connections; empty: any"
     )
-    public_address: str | None = Field(
-        default=None, description="Address told for FTP data connections where a router stands between"
+    public_address: Address | None = Field(
+        default=None, description="IPv4 address told for FTP data connections where a router stands between"
     )
     centre_lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Area Center, latitude")
     centre_lon_deg: float | None = Field(default=None, ge=-180, le=180, description="Area Center, longitude")
@@ -85,6 +88,16 @@ class NeptusSettings(Section):
         default=300.0, gt=0, le=86_400, description="A panel that was silent for this long is not waited for"
     )
 
+    @field_validator("planner")
+    @classmethod
+    def _is_a_planner(cls, planner: str) -> str:
+        from app.exploration.planners import COVERERS, PLANNERS, missing  # they take a second, and few set it
+
+        if planner not in PLANNERS:
+            what = "it is for swath sonars" if planner in COVERERS else missing(planner)
+            raise ValueError(f"{what}; use one of {', '.join(sorted(PLANNERS))}")
+        return planner
+
     @model_validator(mode="after")
     def _has_what_it_needs(self) -> Self:
         if self.enabled and (self.centre_lat_deg is None or self.centre_lon_deg is None):
@@ -94,6 +107,10 @@ class NeptusSettings(Section):
         ports = self.passive_ports
         if ports and not (len(ports) == 2 and 0 < ports[0] <= ports[1] <= 65535):
             raise ValueError(f"passive_ports {list(ports)} must be a first and a last port, 1 to 65535, or empty")
+        if self.ftp_port == self.http_port != 0:
+            raise ValueError(f"ftp_port and http_port are both {self.ftp_port}: each needs a port of its own")
+        if self.first_depth_m > self.max_depth_m:
+            raise ValueError(f"first_depth_m {self.first_depth_m:g} is below max_depth_m {self.max_depth_m:g}")
         return self
 
 
@@ -102,14 +119,14 @@ class SimulationSettings(Section):
 
     terrain: OptionalFile = Field(default=None, description="Terrain file; without one a sea floor is generated")
     family: str = Field(default="harbour", description="Kind of the generated sea floor")
-    seed: int = Field(default=0, description="Seed of the generated sea floor and of the vehicles' noise")
+    seed: int = Field(default=0, ge=0, description="Seed of the generated sea floor and of the vehicles' noise")
     drift_m2ps: float = Field(
         default=0.0,
         ge=0,
         le=10,
         description="Growth of the variance of a submerged vehicle's position, m2/s; LAUVs report 0.02; 0: none",
     )
-    current_mps: tuple[float, float] = Field(
+    current_mps: tuple[Current, Current] = Field(
         default=(0.0, 0.0), description="Velocity of the water over ground, [east, north], m/s"
     )
     consumption_factor: float = Field(
@@ -184,12 +201,12 @@ class ProviderSettings(Section):
         default="",
         max_length=200,
         pattern=r"^([A-Za-z0-9._%+-]+@[A-Za-z0-9.-]+\.[A-Za-z]{2,6})?$",
-        description="Where users of the data can ask; B-12 asks for it",
+        description="E-mail address where users of the data can ask; B-12 asks for it",
     )
     node: str = Field(
         default="BATHYFLEET",
         pattern=r"^[a-zA-Z][a-zA-Z0-9]{0,63}$",
-        description="Prefix of the vehicles' identities, given by the data centre (DCDB)",
+        description="Prefix of the vehicles' identities, given by the data centre (DCDB): letters and digits",
     )
     license: str = Field(default="CC0 1.0", max_length=200, description="Under what the soundings are given")
 

@@ -126,10 +126,7 @@ class RateRequest:
         for item in self._wanted.split(","):
             name, _, value = item.partition(":")
             if name.strip() == "EstimatedState" and self._set is not None:
-                try:
-                    self._confirmed = self._confirmed or state_rate_hz >= 0.6 * float(value)
-                except ValueError:
-                    return
+                self._confirmed = self._confirmed or state_rate_hz >= 0.6 * float(value)
 
     def restore(self) -> None:
         """Give the vehicle its former rates back: sent until it reports them, since packets get lost."""

@@ -24,5 +24,5 @@ from imc_bridge import BridgeSettings
     ],
 )
 def test_wrong_values_are_refused_by_name(field: str, value: Any) -> None:
-    with pytest.raises(ValueError, match=rf"\n{field}\b.*\n.*(should|no multicast|Expected)"):
+    with pytest.raises(ValueError, match=rf"\n{field}\b.*\n.*(should|no multicast|use an IPv4 address)"):
         BridgeSettings(**{field: value})

@@ -2,13 +2,16 @@
 
 import asyncio
 import gc
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import structlog
 import typer
 
 from app.commands.command import Database, command_settings
 from app.log_choices import LogFormat, LogLevel
+
+if TYPE_CHECKING:
+    from app.settings import Settings
 
 log = structlog.get_logger(__name__)
 
@@ -27,7 +30,10 @@ def serve(
     ] = None,
     log_level: Annotated[LogLevel | None, typer.Option(help="How much is logged.", show_default="info")] = None,
     log_format: Annotated[LogFormat | None, typer.Option(help="How it is written.", show_default="console")] = None,
-    check: Annotated[bool, typer.Option("--check", help="Only read the settings, and say what is wrong.")] = False,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Only read the settings and files that they name, and say what is wrong."),
+    ] = False,
 ) -> None:
     """Run the service. Further settings: environment BATHYFLEET_* or bathyfleet.toml."""
     settings = command_settings(
@@ -40,6 +46,7 @@ def serve(
         log_format=log_format,
     )
     if check:
+        _check_files(settings)
         typer.echo("the settings can be used")
         return
     from app.api import logs
@@ -67,3 +74,15 @@ def serve(
         )
 
     asyncio.run(serve(settings, started=started, with_first_token=True))
+
+
+def _check_files(settings: "Settings") -> None:
+    """Warn of certificates that are not valid now. Raises SettingsError where a file cannot be used."""
+    from app.named_files import certificates_out_of_time, unusable_files
+    from app.settings import SettingsError
+
+    problems = list(unusable_files(settings))
+    if problems:
+        raise SettingsError(problems)
+    for line in certificates_out_of_time(settings):
+        typer.echo(f"warning: {line}", err=True)

@@ -4,6 +4,7 @@ import asyncio
 import base64
 import hashlib
 import hmac
+import logging
 import re
 import socket
 import ssl
@@ -16,12 +17,16 @@ import aiosmtplib
 import httpx
 from pydantic import SecretStr
 
-from app.missions.alarm_settings import AlarmSettings, MailRecipient, Topic, Webhook, signing_key
+from app.missions.alarm_settings import TOPIC_MARKS, AlarmSettings, MailRecipient, Topic, Webhook, signing_key
 from app.missions.alarms.message import Message
 
 PATIENCE_S = 15.0
 """An attempt that takes longer has failed."""
+STEP_S = PATIENCE_S / 3
+"""So is one of which a step to reach the other side does: libraries that are broken off leave connections open."""
 LONGEST_ERROR = 300
+_UNHEARD = logging.Logger("mqtt", logging.CRITICAL + 1)
+"""What the library would log is told with the attempt, once."""
 MOST_MAILED = 1000
 """E-mails of which is known who has them; of others all are written to again."""
 
@@ -94,7 +99,8 @@ class Channels:
         trust = await self._context()
         async with self._opening:
             if self._client is None:
-                self._client = httpx.AsyncClient(verify=trust, follow_redirects=False, timeout=PATIENCE_S)
+                timeout = httpx.Timeout(PATIENCE_S, connect=STEP_S)
+                self._client = httpx.AsyncClient(verify=trust, follow_redirects=False, timeout=timeout)
             return self._client
 
     async def _mail(self, people: MailRecipient, message: Message, at: datetime) -> None:
@@ -130,20 +136,25 @@ class Channels:
     async def _publish(self, topic: Topic, message: Message, at: datetime) -> None:
         broker = self._settings.mqtt
         alarm = message.alarm
-        filled = {"{mission}": alarm.mission_id or "-", "{kind}": alarm.kind, "{severity}": alarm.severity}
         name = topic.topic
-        for mark, value in filled.items():
+        for mark, value in zip(TOPIC_MARKS, (alarm.mission_id or "-", alarm.kind, alarm.severity), strict=True):
             name = name.replace(mark, value)
-        async with aiomqtt.Client(
+        client = aiomqtt.Client(
             broker.host,
             broker.port,
             username=broker.user or None,
             password=broker.password.get_secret_value() or None,
             tls_context=await self._context() if broker.tls else None,
-            timeout=PATIENCE_S,
-        ) as client:
-            # Returns when the broker has acknowledged it.
-            await client.publish(name, message.body(at), qos=1, timeout=PATIENCE_S)
+            timeout=STEP_S,
+            logger=_UNHEARD,
+        )
+        try:
+            async with client:
+                # Returns when the broker has acknowledged it.
+                await client.publish(name, message.body(at), qos=1)
+        finally:
+            # Also where it was connected and not let in: a broker that lets it in later would keep it for good.
+            await client.__aexit__(None, None, None)
 
     async def _context(self) -> ssl.SSLContext:
         """Return whose certificates are trusted; reading them takes too long for the event loop."""

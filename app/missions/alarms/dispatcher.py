@@ -205,7 +205,9 @@ class AlarmDispatcher:
         tasks = [*self._keepers, *(task for _, task in self._sending.values())]
         for task in tasks:
             task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        if tasks:
+            # Some still take leave of the other side, which may be silent.
+            await asyncio.wait(tasks, timeout=CLOSING_S)
         if self._outcomes:
             with suppress(SQLAlchemyError, OSError, TimeoutError):
                 async with asyncio.timeout(CLOSING_S):

@@ -135,6 +135,13 @@ class FleetHub:
         if self.claimed_by(key) == mission_id:
             del self._claims[key]
 
+    def check_deployment(self, key: VehicleKey) -> None:
+        """Raise VehicleRefusedError where a vehicle could be deployed now for no mission."""
+        kind, name = key
+        link = self._links.get(kind)
+        if link is not None:
+            link.check_deployment(name)
+
     def deploy(self, deployment: Deployment) -> None:
         """Prepare a vehicle for its mission, where there is a link to it. Raises VehicleRefusedError."""
         link = self._links.get(deployment.vehicle.kind)

@@ -430,6 +430,9 @@ class FleetLink(ABC):
         """Who is told of its vehicles' requests; None when they send none."""
         return None
 
+    def check_deployment(self, vehicle: str) -> None:  # noqa: B027
+        """Raise VehicleRefusedError where a vehicle could be deployed now for no mission."""
+
     def deploy(self, deployment: Deployment) -> None:  # noqa: B027
         """Prepare a vehicle for the mission that takes it; harmless to repeat. Raises VehicleRefusedError."""
 

@@ -11,7 +11,7 @@ from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
-from app.missions.fleet.interface import LinkState, Position
+from app.missions.fleet.interface import LinkState, Position, VehicleRefusedError
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.neighbours import neighbour_checks
@@ -92,6 +92,10 @@ def _vehicles(live: LiveMission) -> Iterator[CheckView]:
         status, message, remedy = OK, f"{info.state}".replace("_", " "), ""
         if member.capabilities.simulated:
             message = "simulated inside the service, starts with the mission"
+            try:
+                live.hub.check_deployment(member.key)
+            except VehicleRefusedError as error:
+                status, message, remedy = PROBLEM, error.reason, error.remedy
         elif info.state not in (LinkState.READY, LinkState.ENGAGED):
             must = member.capabilities.ready_before_start
             status = PROBLEM if must else WARNING

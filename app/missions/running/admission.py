@@ -8,7 +8,7 @@ from app.exploration.lines.lattice import direction_of_lines_rad
 from app.exploration.lines.spaced_lines import check_line_count
 from app.exploration.pcao.planner import PcaoPlanner
 from app.exploration.planner.options import PlannerOptions
-from app.exploration.planners import COVERERS, ONLY_IN_SIMULATION, PLANNERS, REFUSAL, SEARCHERS, missing, options_of
+from app.exploration.planners import COVERERS, PLANNERS, SEARCHERS, missing, options_of
 from app.missions.errors import InvalidRequestError
 from app.missions.spec.mission import MissionKind, MissionSpec, PlannerSpec
 from app.missions.spec.swath import SwathSonarSpec
@@ -24,12 +24,9 @@ def check_spec(spec: MissionSpec, kinds: Sequence[VehicleKind]) -> None:
     """
     name = spec.planner.name
     there = PLANNERS | COVERERS if spec.kind is MissionKind.SURVEY else SEARCHERS
-    use = f"use one of {', '.join(there)}"
-    if name in ONLY_IN_SIMULATION:
-        raise InvalidRequestError("planner.name", REFUSAL.format(name=name), use)
     if name not in there:
         what = f"{name!r} plans no missions of kind {spec.kind}" if name in PLANNERS | COVERERS else missing(name)
-        raise InvalidRequestError("planner.name", what, use)
+        raise InvalidRequestError("planner.name", what, f"use one of {', '.join(there)}")
     if spec.planner.options.model is not None and name != PcaoPlanner.name:
         raise InvalidRequestError(
             "planner.options.model",

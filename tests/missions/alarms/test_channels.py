@@ -14,6 +14,7 @@ import pytest
 from app.api import logs
 from app.missions.alarm_kinds import AlarmKind
 from app.missions.alarm_settings import AlarmSettings
+from app.missions.alarms import channels
 from app.missions.views.alarms import DeliveryState
 from tests.support.missions.alarms import (
     PASSWORD,
@@ -108,7 +109,9 @@ async def test_no_email_goes_to_a_server_that_nobody_vouches_for_or_with_a_wrong
     assert box.mails == []
 
 
-async def test_mqtt_takes_it_at_least_once_and_no_broker_is_tried_again(keep_watch: Keep) -> None:
+async def test_mqtt_takes_it_at_least_once_and_no_broker_is_tried_again(
+    keep_watch: Keep, caplog: pytest.LogCaptureFixture
+) -> None:
     def by_broker(port: int) -> AlarmSettings:
         return AlarmSettings.model_validate(
             {
@@ -135,7 +138,57 @@ async def test_mqtt_takes_it_at_least_once_and_no_broker_is_tried_again(keep_wat
     await watch.look()
     [delivery] = (await watch.report(later)).deliveries
     assert delivery.state is DeliveryState.WAITING
-    assert delivery.error
+    assert "refused" in delivery.error
+    assert [record for record in caplog.records if record.name == "mqtt"] == [], "the error says it"
+
+
+@pytest.mark.parametrize("way", ["mqtt", "https"])
+async def test_who_does_not_answer_is_not_left_with_an_open_connection(
+    keep_watch: Keep, monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    """A broker that answers late would keep one for each attempt, and so would this process."""
+    monkeypatch.setattr(channels, "STEP_S", 0.2)
+    left = asyncio.Event()
+
+    async def silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read()  # to the end
+        left.set()
+        writer.close()
+
+    async with await asyncio.start_server(silent, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        ways: dict[str, dict[str, Any]] = {
+            "mqtt": {"topics": [{"name": "a"}], "mqtt": {"host": "127.0.0.1", "port": port, "tls": False}},
+            "https": {"webhooks": [{"name": "a", "url": f"https://127.0.0.1:{port}", "secret": SECRET}]},
+        }
+        watch = await keep_watch(AlarmSettings.model_validate(ways[way] | {"routes": [{"to": ["a"]}]}))
+        alarm = await watch.raise_alarm(AlarmKind.LEAK)
+        await watch.look()
+        [delivery] = (await watch.report(alarm)).deliveries
+        assert delivery.state is DeliveryState.WAITING
+        assert delivery.error
+        async with asyncio.timeout(10):
+            await left.wait()
+
+
+async def test_a_mail_server_that_falls_silent_does_not_keep_the_service_from_ending(keep_watch: Keep) -> None:
+    asked, over = asyncio.Event(), asyncio.Event()
+
+    async def silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"220 mail.example\r\n")
+        await reader.readline()
+        asked.set()
+        await over.wait()
+        writer.close()
+
+    async with await asyncio.start_server(silent, "127.0.0.1", 0) as server:
+        watch = await keep_watch(by_mail(server.sockets[0].getsockname()[1], None, security="none", user=""))
+        await watch.raise_alarm(AlarmKind.LEAK)
+        await watch.dispatcher.look()
+        await asked.wait()
+        async with asyncio.timeout(10):  # less than a command to the server may take
+            await watch.dispatcher.close()
+        over.set()
 
 
 async def test_neither_errors_nor_the_log_show_parts_of_a_webhooks_address(keep_watch: Keep, tmp_path: Path) -> None:

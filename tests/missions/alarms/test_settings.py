@@ -25,20 +25,33 @@ MAIL = {"host": "mail.example", "sender": "survey@ship.example"}
         ({"routes": [{"to": ["b"]}]}, "none: describe it in webhooks, emails or topics"),
         ({"webhooks": [HOOK | {"url": "ftp://hooks.example"}]}, "write a whole address"),
         ({"webhooks": [HOOK | {"url": "https://"}]}, "write a whole address"),
+        ({"webhooks": [HOOK | {"url": "https://ex ample/alarms"}]}, "write a whole address"),
+        ({"webhooks": [HOOK | {"url": "https://exämple..com/alarms"}]}, "write a whole address"),
+        ({"webhooks": [HOOK | {"url": "https://hooks.example/\x7f"}]}, "write a whole address"),
         ({"webhooks": [HOOK | {"secret": "short"}]}, "it has 5 bytes, and 16 are the least"),
         ({"webhooks": [HOOK | {"secret": "whsec_***"}]}, "is not base64"),
         ({"emails": [{"name": "m", "to": ["a@b"]}]}, r"set smtp\.host and smtp\.sender"),
         ({"emails": [{"name": "m", "to": ["a@b\r\nBcc: c@d"]}], "smtp": MAIL}, "pattern"),
         ({"smtp": {"host": "mail.example"}}, r"smtp\.sender is missing"),
         ({"smtp": MAIL | {"user": "u", "security": "none"}}, "would be sent unprotected"),
+        ({"smtp": MAIL | {"host": "smtp://mail.example"}}, "only the name or the address"),
+        ({"smtp": MAIL | {"host": "mail.example:587"}}, "only the name or the address"),
+        ({"mqtt": {"host": "mqtts://broker.example"}}, "only the name or the address"),
+        ({"topics": [{"name": "t", "topic": "a/{vehicle}"}], "mqtt": {"host": "b"}}, r"there is no \{vehicle\}"),
+        ({"topics": [{"name": "t", "topic": "$SYS/alarms"}], "mqtt": {"host": "b"}}, "broker's own"),
         ({"topics": [{"name": "t"}]}, r"set mqtt\.host"),
         ({"topics": [{"name": "t", "topic": "a/#"}], "mqtt": {"host": "b"}}, "pattern"),
-        ({"ca_file": "/nowhere.pem"}, "is not a file"),
+        ({"ca_file": "/nowhere.pem"}, "No such file"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(values: dict[str, Any], why: str) -> None:
     with pytest.raises(ValidationError, match=why):
         AlarmSettings.model_validate(values)
+
+
+@pytest.mark.parametrize("host", ["mail.example", "192.0.2.7", "::1", "2001:db8::7", "mail"])
+def test_servers_are_called_by_name_or_address(host: str) -> None:
+    assert AlarmSettings.model_validate({"mqtt": {"host": host}}).mqtt.host == host
 
 
 def test_no_secret_is_shown() -> None:

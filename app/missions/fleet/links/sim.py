@@ -29,7 +29,7 @@ from app.missions.fleet.interface import (
     WaypointReport,
     WaypointStatus,
 )
-from app.missions.fleet.links.simulated.launch import FinalState, Launch, Lookout, lay, target_in
+from app.missions.fleet.links.simulated.launch import FinalState, Launch, Lookout, lay, target_in, terrain_of
 from app.missions.fleet.links.simulated.vehicle import DeployedVehicle, lived, ranges
 from app.missions.settings import SimulationSettings
 from app.missions.spec.swath import SwathSonarSpec
@@ -125,11 +125,22 @@ class SimFleetLink(FleetLink):
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
 
+    def check_deployment(self, vehicle: str) -> None:
+        """See whether there is a sea floor that it can be launched over. Raises VehicleRefusedError."""
+        if self._settings.terrain is None:
+            return
+        try:
+            terrain_of(self._settings.terrain)
+        except TerrainError as error:
+            remedy = "Name a terrain file in simulation.terrain that can be read, or none"
+            raise VehicleRefusedError(vehicle, f"cannot be launched: {error}", remedy) from error
+
     def deploy(self, deployment: Deployment) -> None:
         """Launch a vehicle where its mission has it begin, or where the mission that this one follows left it.
 
         One that was at sea for its mission in another process goes on from where it was heard last.
         """
+        self.check_deployment(deployment.vehicle.name)
         vehicle, mission, world = deployment.vehicle, deployment.mission, deployment.world()
         frame, size = mission.frame(), mission.local_area().max(axis=0)
         final = self._final_states.get(vehicle.name)
@@ -167,9 +178,6 @@ class SimFleetLink(FleetLink):
         )
         try:
             self.launch(launch)
-        except TerrainError as error:
-            remedy = "name a terrain file in simulation.terrain that can be read, or none"
-            raise VehicleRefusedError(vehicle.name, f"cannot be launched: {error}", remedy) from error
         except ValueError as error:
             raise VehicleRefusedError(vehicle.name, f"cannot be launched: {error}", "change its start") from error
 

@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 
 from app.missions.settings import SimulationSettings
 from app.missions.spec.targets import TargetSpec
 from app.missions.spec.vehicle import Sensor
 from simulator.floors.seafloors import generate
-from simulator.floors.terrain import Terrain
+from simulator.floors.terrain import Terrain, TerrainError
 from simulator.floors.terrain_files import load_terrain
 from simulator.obstacles.obstacles import ObstacleWorld
 from simulator.sonars.swath import SwathSonar
@@ -82,10 +84,30 @@ class Launch:
     goes_on_from: FinalState | None = None
 
 
+def terrain_of(file: Path) -> Terrain:
+    """Return what a terrain file holds, which is read once and again when it has changed. Raises TerrainError."""
+    try:
+        there = file.stat()
+        found = _read(file, (there.st_ino, there.st_size, there.st_ctime_ns))
+    except OSError:
+        found = _read(file, None)
+    if isinstance(found, TerrainError):
+        raise TerrainError(str(found))
+    return found
+
+
+@lru_cache(maxsize=1)
+def _read(file: Path, _version: tuple[int, int, int] | None) -> Terrain | TerrainError:
+    try:
+        return load_terrain(file)
+    except TerrainError as error:
+        return error
+
+
 def lay(settings: SimulationSettings, launch: Launch) -> Terrain:
     """Return the sea floor for a launch: the file that settings name, or a generated one under the area."""
     if settings.terrain is not None:
-        terrain = load_terrain(settings.terrain)
+        terrain = terrain_of(settings.terrain)
         return terrain if terrain.origin_lat_deg is not None else terrain.placed_at(*launch.south_west)
     cell_m = max(1, math.ceil(math.sqrt(launch.width_m * launch.height_m / MOST_CELLS)))
     # Whole cells that cover the area to its border and a little more.
