@@ -220,7 +220,7 @@ export function NewMissionForm() {
             <Text field="tide_source" label={say("mission.fromWhere")} placeholder={say("mission.gauge")} />
           </div>
           <FileButton
-            accept=".tid,.txt"
+            accept=".tid,.txt,.csv,.tsv"
             id="tide-file"
             onText={(name, text) => set({ tide_table: text, tide_source: name })}
           >
