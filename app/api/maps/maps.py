@@ -80,10 +80,19 @@ async def _file_options(
     vehicle: Annotated[
         Name | None, Query(description="Whose soundings, in crowdsourced bathymetry; default: the only vehicle's")
     ] = None,
+    crs: Annotated[
+        str | None,
+        Query(
+            max_length=40,
+            description="System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; "
+            "default: the mission's own frame, in XYZ longitude and latitude",
+            examples=["utm"],
+        ),
+    ] = None,
 ) -> ProductOptions:
     if (min is None) != (max is None) or (min is not None and max is not None and not min < max):
         raise ProblemError("invalid-request", f"the colour range is {min} to {max}", remedy="Give min and a max above")
-    return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle)
+    return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle, crs)
 
 
 def _layer_enum(title: str, description: str, among: Callable[[LayerKind], bool]) -> type[StrEnum]:

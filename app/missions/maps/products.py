@@ -3,13 +3,17 @@
 import io
 import zipfile
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
+from enum import StrEnum
 
 import numpy as np
 import orjson
 from shapely.geometry import Polygon, mapping
 
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame, ProjectedFrame, named_frame, projected_cells
+from app.mapping.coordinates.utm import utm_epsg
 from app.mapping.layers import Layer, LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
@@ -28,6 +32,7 @@ from app.mapping.products.vr_bag import vr_bag
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
+from app.mapping.types import BathymetricMap
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.file_content import FileContent
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
@@ -64,6 +69,15 @@ GEOJSON, KML, TEXT, CSV = (
 )
 
 
+class FileOption(StrEnum):
+    """What may be asked of files, as REST calls it."""
+
+    ORDER = "order"
+    INTERVAL = "interval_m"
+    CRS = "crs"
+    VEHICLE = "vehicle"
+
+
 @dataclass(frozen=True)
 class ProductOptions:
     """What may be asked of a file.
@@ -78,12 +92,15 @@ class ProductOptions:
         Depths of a picture's first and last colour; None: the map's own.
     vehicle
         Whose soundings, where a file holds those of one vehicle; None: of the only one.
+    crs
+        The projected system of its positions, ``utm`` or ``EPSG:nnnn``; None: the mission's own frame, or degrees.
     """
 
     order: Order = Order.ORDER_1A
     interval_m: float | None = None
     range_m: tuple[float, float] | None = None
     vehicle: str | None = None
+    crs: str | None = None
 
 
 @dataclass(frozen=True)
@@ -146,10 +163,8 @@ class ProductKind:
         Returns the file. Raises InvalidRequestError for options that cannot be.
     needs
         What has to be loaded to make it.
-    of_vehicle
-        Whether it holds what one vehicle measured.
-    by_order, with_contours
-        Whether the S-44 order makes a difference, and the interval between contours.
+    options
+        What makes a difference to it.
     filename
         Returns what it is saved as, where a standard says so; None: the mission's name.
     """
@@ -160,9 +175,7 @@ class ProductKind:
     title: str
     make: Callable[[Material, ProductOptions], bytes | FileContent]
     needs: Collection[str]
-    of_vehicle: bool = False
-    by_order: bool = False
-    with_contours: bool = False
+    options: Collection[FileOption] = ()
     filename: Callable[[MissionFacts], str] | None = None
 
     @property
@@ -176,29 +189,60 @@ class ProductKind:
         return self.resource.rpartition("/")[2]
 
 
+def frame_of(facts: MissionFacts, options: ProductOptions) -> Frame:
+    """Return what positions are in. Raises InvalidRequestError for a system that cannot be."""
+    if options.crs is None:
+        return facts.frame
+    lon, lat = np.transpose(facts.spec.area.ring)
+    east, north = (0.5 * float(axis.min() + axis.max()) for axis in facts.frame.to_local(lat, lon))
+    try:
+        return named_frame(options.crs, facts.frame, east, north)
+    except ValueError as error:
+        zone = utm_epsg(*(float(degrees) for degrees in facts.frame.to_geographic(east, north)))
+        raise InvalidRequestError(
+            FileOption.CRS,
+            str(error),
+            f"give utm (here EPSG:{zone}), or EPSG: and the code of a projected system in metres for this place",
+        ) from error
+
+
+def _placed(
+    material: Material, options: ProductOptions, layers: Sequence[Layer] = ()
+) -> tuple[BathymetricMap, Sequence[Layer], Frame]:
+    """Return the map and layers of it on the grid that is asked for. Raises ConflictError where no cell is known."""
+    bathymetry, frame = material.snapshot.built.map, frame_of(material.facts, options)
+    if isinstance(frame, LocalFrame):
+        return bathymetry, layers, frame
+    keep = np.logical_or.reduce(
+        [np.isfinite(values) for values in (bathymetry.depth_m, *(one.values for one in layers))]
+    )
+    if not keep.any():
+        raise ConflictError(*NOT_SOUNDED)
+    cells = projected_cells(bathymetry, frame, keep)
+    return cells.map(bathymetry), [replace(one, values=cells.of(one.values, np.nan)) for one in layers], frame
+
+
 def _geotiff(material: Material, options: ProductOptions) -> bytes:
-    snapshot, facts = material.snapshot, material.facts
-    layers = file_layers(snapshot.source(options.order))
-    return geotiff(snapshot.built.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
+    layers = file_layers(material.snapshot.source(options.order))
+    return geotiff(*_placed(material, options, layers), vertical_datum=material.facts.vertical_datum)
 
 
 def _netcdf(material: Material, options: ProductOptions) -> bytes:
-    snapshot, facts = material.snapshot, material.facts
+    facts = material.facts
     return netcdf(
-        snapshot.built.map,
-        file_layers(snapshot.source(options.order)),
-        facts.frame,
+        *_placed(material, options, file_layers(material.snapshot.source(options.order))),
         vertical_datum=facts.vertical_datum,
         title=facts.title,
         created=material.created,
     )
 
 
-def _bag(material: Material, _: ProductOptions) -> bytes:
+def _bag(material: Material, options: ProductOptions) -> bytes:
     facts = material.facts
+    bathymetry, _, frame = _placed(material, options)
     return bag(
-        material.snapshot.built.map,
-        facts.frame,
+        bathymetry,
+        frame,
         vertical_datum=facts.vertical_datum,
         title=facts.title,
         common_sd_m=facts.common_sd_m,
@@ -267,14 +311,14 @@ def _cell_of_depth(material: Material) -> float:
     return share
 
 
-def _map_xyz(material: Material, _: ProductOptions) -> bytes:
-    facts = material.facts
+def _map_xyz(material: Material, options: ProductOptions) -> bytes:
+    bathymetry, _, frame = _placed(material, options)
     return map_xyz(
-        material.snapshot.built.map,
-        facts.frame,
+        bathymetry,
+        frame,
         vertical_datum=material.datum,
-        common_sd_m=facts.common_sd_m,
-        geographic=True,
+        common_sd_m=material.facts.common_sd_m,
+        geographic=isinstance(frame, LocalFrame),
     )
 
 
@@ -355,6 +399,7 @@ def _soundings(material: Material, _: ProductOptions) -> FileContent:
     return material.soundings
 
 
+ORDER, INTERVAL, CRS, VEHICLE = FileOption
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
 TIMED_TRACKS = "the vehicles' tracks with times and depths"
 
@@ -368,9 +413,17 @@ PRODUCTS = {
             "Cloud-Optimized GeoTIFF with every layer",
             _geotiff,
             {MAP},
-            by_order=True,
+            options=(ORDER, CRS),
         ),
-        ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}, by_order=True),
+        ProductKind(
+            MAP,
+            "nc",
+            "application/x-netcdf",
+            "CF-NetCDF with every layer",
+            _netcdf,
+            {MAP},
+            options=(ORDER, CRS),
+        ),
         ProductKind(
             MAP,
             "bag",
@@ -378,6 +431,7 @@ PRODUCTS = {
             "Bathymetric Attributed Grid: elevation, uncertainty and numbers of soundings",
             _bag,
             {MAP},
+            options=(CRS,),
         ),
         ProductKind(
             MAP,
@@ -394,7 +448,7 @@ PRODUCTS = {
             "a GeoTIFF of each tier of cells by depth",
             _tiers,
             {MAP, TIERS},
-            by_order=True,
+            options=(ORDER,),
         ),
         ProductKind(
             MAP,
@@ -405,12 +459,12 @@ PRODUCTS = {
             {MAP, SURVEY},
             filename=lambda facts: file_name(facts.title, facts.mission_id),
         ),
-        ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
+        ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}, options=(CRS,)),
         ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
         ProductKind(
-            MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, with_contours=True
+            MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, options=(INTERVAL,)
         ),
-        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}, with_contours=True),
+        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}, options=(INTERVAL,)),
         ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
         ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
         ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
@@ -421,6 +475,7 @@ PRODUCTS = {
             "longitude, latitude and corrected depth of accepted soundings",
             _soundings,
             {ACCEPTED},
+            options=(CRS,),
         ),
         ProductKind(
             SOUNDINGS,
@@ -429,7 +484,7 @@ PRODUCTS = {
             "raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12)",
             _soundings,
             {RAW},
-            of_vehicle=True,
+            options=(VEHICLE,),
         ),
         ProductKind(TRACKS, "geojson", GEOJSON, TIMED_TRACKS, lambda m, _: tracks_geojson(m.tracks), {TRACKS}),
         ProductKind(TRACKS, "kml", KML, TIMED_TRACKS, lambda m, _: tracks_kml(m.tracks, title=m.facts.title), {TRACKS}),
@@ -456,7 +511,7 @@ PRODUCTS = {
             "where lines cross, with both depths and their difference",
             _crossovers,
             {CROSSOVERS},
-            by_order=True,
+            options=(ORDER,),
         ),
         ProductKind(
             f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}
@@ -473,6 +528,14 @@ def product_kind(name: str) -> ProductKind:
     return PRODUCTS[name]
 
 
+def check_options(name: str, facts: MissionFacts, options: ProductOptions) -> None:
+    """Raise InvalidRequestError for a system of positions that a file cannot be in."""
+    if options.crs is not None and CRS not in product_kind(name).options:
+        able = ", ".join(other for other, kind in PRODUCTS.items() if CRS in kind.options)
+        raise InvalidRequestError(CRS, f"{name} is not made in {options.crs[:40]}", f"leave it out, or ask for {able}")
+    frame_of(facts, options)
+
+
 def make_product(name: str, material: Material, options: ProductOptions) -> Product:
     """Return one file. Raises InvalidRequestError for an unknown format or options that cannot be."""
     kind = product_kind(name)
@@ -480,7 +543,10 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
     content = FileContent(made) if isinstance(made, bytes) else made
     if kind.filename is not None:
         return Product(kind.filename(material.facts), kind.media_type, content)
-    part = (options.vehicle or "") if kind.of_vehicle else kind.part.removeprefix(MAP)
+    part = (options.vehicle or "") if VEHICLE in kind.options else kind.part.removeprefix(MAP)
+    frame = frame_of(material.facts, options)
+    if isinstance(frame, ProjectedFrame):
+        part = f"{part}-epsg{frame.epsg}".removeprefix("-")
     return Product(product_name(material.facts, part, kind.extension), kind.media_type, content)
 
 

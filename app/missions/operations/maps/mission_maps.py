@@ -22,10 +22,13 @@ from app.missions.maps.products import (
     SOUNDINGS,
     SURVEY,
     TRACKS,
+    FileOption,
     Material,
     Product,
     ProductOptions,
     Surveyed,
+    check_options,
+    frame_of,
     make_product,
     product_kind,
 )
@@ -132,7 +135,8 @@ async def export(
     """
     kind, chosen = product_kind(name), options or ProductOptions()
     needs = kind.needs
-    if kind.of_vehicle:
+    check_options(name, live.facts, chosen)
+    if FileOption.VEHICLE in kind.options:
         chosen = replace(chosen, vehicle=await only_vehicle(live, chosen.vehicle))
     snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
     material = Material(
@@ -169,7 +173,7 @@ async def _sounding_file(
         if SOUNDINGS in needs:
             return await all_lines(live)
         if ACCEPTED in needs:
-            return await accepted_xyz(live)
+            return await accepted_xyz(live, frame_of(live.facts, options))
         if RAW in needs and options.vehicle is not None:
             return await crowdsourced(live, provider.named(), options.vehicle)
     except OSError as error:

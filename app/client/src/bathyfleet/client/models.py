@@ -2666,9 +2666,7 @@ class WaypointsMessage(Model):
 
 
 class WholeSurveyView(Model):
-    """What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are
-    flown, whatever the budget is.
-    """
+    """What it takes until nothing is left to ensonify or all lines are flown, whatever the budget is."""
 
     duration_s: float
     """Until the last vehicle is done, by the vehicles' time; median"""

@@ -870,6 +870,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the map: ``GET /missions/{mission_id}/map.{format}``.
 
@@ -885,12 +886,15 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_soundings_file(
@@ -903,6 +907,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``.
 
@@ -918,12 +923,15 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/soundings.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_tracks_file(
@@ -936,6 +944,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``.
 
@@ -951,12 +960,15 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_profile(
@@ -2287,6 +2299,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the map: ``GET /missions/{mission_id}/map.{format}``.
 
@@ -2302,12 +2315,15 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_soundings_file(
@@ -2320,6 +2336,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``.
 
@@ -2335,12 +2352,15 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/soundings.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_tracks_file(
@@ -2353,6 +2373,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``.
 
@@ -2368,12 +2389,15 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_profile(

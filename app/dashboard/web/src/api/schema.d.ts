@@ -7733,8 +7733,7 @@ export interface components {
         };
         /**
          * WholeSurveyView
-         * @description What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are flown,
-         *     whatever the budget is.
+         * @description What it takes until nothing is left to ensonify or all lines are flown, whatever the budget is.
          */
         WholeSurveyView: {
             /**
@@ -13972,6 +13971,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
@@ -14071,6 +14072,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
@@ -14163,6 +14166,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
