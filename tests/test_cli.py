@@ -161,7 +161,7 @@ def test_the_help_shows_all_that_is_said_of_an_option_and_its_default(
             2,
             "map.xyz would be a GeoTIFF: say the kind of",
         ),
-        (["export", "nowhere", "--interval", "1"], {}, 2, "tif does not depend on it, geojson, kml do"),
+        (["export", "nowhere", "--interval", "1"], {}, 2, "tif does not depend on it, geojson, kml"),
         (["export", "nowhere", "--format", "csv", "--vehicle", "a"], {}, 2, "does not depend on it, soundings.geojson"),
         (["export", "nowhere", "--format", "xyz", "--order", "special"], {}, 2, "does not depend on it, tif, nc,"),
         (

@@ -23,6 +23,7 @@ from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.pictures.overlay import overlay_png
 from app.mapping.s44 import Order
 from app.missions.maps.products import (
+    CONTOURS,
     CROSSOVERS,
     GEOJSON,
     MAP,
@@ -488,6 +489,7 @@ for _kind in REPORTS.values():
     _add_report(_kind)
 
 _add_files(MAP, "getMapFile", "Download the map", "Return the map as a file.")
+_add_files(CONTOURS, "getContoursFile", "Download the contours", "Return the map's contours as a file.")
 _add_files(SOUNDINGS, "getSoundingsFile", "Download the soundings", "Return the soundings as a file.")
 _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the vehicles were as a file.")
 

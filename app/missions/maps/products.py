@@ -16,9 +16,16 @@ from app.mapping.coordinates.projected import Frame, ProjectedFrame, named_frame
 from app.mapping.coordinates.utm import utm_epsg
 from app.mapping.layers import Layer, LayerSource, file_layers
 from app.mapping.products.bag import bag
-from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
+from app.mapping.products.contours import (
+    Contour,
+    contours_geojson,
+    contours_in_metres,
+    find_contours,
+    usual_interval_m,
+)
 from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.products.crowdsourced import Provider
+from app.mapping.products.dxf import contours_dxf
 from app.mapping.products.geotiff import geotiff
 from app.mapping.products.holidays import holidays_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
@@ -52,6 +59,9 @@ MAP, SOUNDINGS, ACCEPTED, RAW, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS
     "crossovers",
 )
 """What files are made of."""
+
+CONTOURS = "contours"
+"""A resource whose files are made of the map."""
 
 
 NOT_SOUNDED = ("no cell of the map was sounded", "wait for soundings inside of the area")
@@ -384,11 +394,31 @@ def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int
 
 
 def _contours(material: Material, options: ProductOptions) -> list[Contour]:
-    snapshot, interval_m = material.snapshot, options.interval_m
-    if interval_m is None:
-        interval_m = usual_interval_m(snapshot.built.map.depth_m)
+    return _at_intervals(material, options, lambda map_, m: find_contours(map_, material.facts.frame, m))
+
+
+def _contours_dxf(material: Material, options: ProductOptions) -> bytes:
+    frame = frame_of(material.facts, options)
+    return contours_dxf(
+        _at_intervals(material, options, lambda map_, m: contours_in_metres(map_, frame, m)),
+        _interval_m(material, options),
+        title=material.facts.title,
+        positions=frame.statement,
+        vertical_datum=material.datum,
+    )
+
+
+def _interval_m(material: Material, options: ProductOptions) -> float:
+    given = options.interval_m
+    return usual_interval_m(material.snapshot.built.map.depth_m) if given is None else given
+
+
+def _at_intervals(
+    material: Material, options: ProductOptions, find: Callable[[BathymetricMap, float], list[Contour]]
+) -> list[Contour]:
+    """Return contours. Raises InvalidRequestError for an interval that cannot be."""
     try:
-        return find_contours(snapshot.built.map, snapshot.facts.frame, interval_m)
+        return find(material.snapshot.built.map, _interval_m(material, options))
     except ValueError as error:
         raise InvalidRequestError("interval_m", str(error), "choose a larger one") from error
 
@@ -465,6 +495,15 @@ PRODUCTS = {
             MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, options=(INTERVAL,)
         ),
         ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}, options=(INTERVAL,)),
+        ProductKind(
+            CONTOURS,
+            "dxf",
+            "image/vnd.dxf",
+            "depth contours for CAD (DXF R12), in metres",
+            _contours_dxf,
+            {MAP},
+            options=(INTERVAL, CRS),
+        ),
         ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
         ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
         ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),

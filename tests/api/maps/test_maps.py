@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import httpx
 import numpy as np
+import pyogrio
 import pyproj
 import pytest
 import rasterio
@@ -117,6 +118,7 @@ FILES = {
     "map.csv": ("text/csv", b"#"),
     "map.geojson": ("application/geo+json", b"{"),
     "map.kml": ("application/vnd.google-earth.kml+xml", b"<?xml"),
+    "contours.dxf": ("image/vnd.dxf", b"999"),
     "map.png": ("image/png", b"\x89PNG"),
     "soundings.csv": ("text/csv", b"#"),
     "soundings.xyz": ("text/plain", b"#"),
@@ -224,6 +226,21 @@ async def test_a_system_that_cannot_be_is_refused_by_name(
     (error,) = answer.json()["errors"]
     assert (error["field"], error["value"]) == ("crs", crs)
     assert remedy in error["expected"]
+
+
+async def test_contours_come_as_a_drawing(client: httpx.AsyncClient, measured: str, tmp_path: Path) -> None:
+    answer = await client.get(f"{measured}/contours.dxf", params={"crs": "utm", "interval_m": 0.2})
+    assert answer.headers["content-disposition"] == 'attachment; filename="harbour-basin-contours-epsg32629.dxf"'
+    (path := tmp_path / "contours.dxf").write_bytes(answer.content)
+    west, south, east, north = pyogrio.read_info(path, force_total_bounds=True)["total_bounds"]
+    shown = (await client.get(f"{measured}/map")).json()
+    corners = pyproj.Transformer.from_crs(4326, 32629).transform(*np.array(shown["corners"]).T[::-1])
+    assert min(corners[0]) < west < east < max(corners[0])
+    assert min(corners[1]) < south < north < max(corners[1])
+    own = await client.get(f"{measured}/contours.dxf")
+    assert "positions: transverse Mercator k=1, lat 41.18" in own.text
+    refused = await client.get(f"{measured}/contours.dxf", params={"interval_m": 1e-5})
+    assert [error["field"] for error in refused.json()["errors"]] == ["interval_m"]
 
 
 async def test_a_chart_surface_asks_for_a_chart_datum(client: httpx.AsyncClient, measured: str) -> None:

@@ -239,7 +239,7 @@ def test_positions_stay_as_they_are_without_a_system(peaked: Material) -> None:
     ("name", "crs", "said", "remedy"),
     [
         ("tif", "EPSG:4326", "WGS 84 (EPSG:4326) is no projected system in metres", "here EPSG:32629"),
-        ("vr.bag", "utm", "vr.bag is not made in utm", "tif, nc, bag, xyz"),
+        ("vr.bag", "utm", "vr.bag is not made in utm", "tif, nc, bag, xyz, contours.dxf"),
     ],
 )
 def test_a_system_that_a_file_cannot_be_in_is_refused(

@@ -897,6 +897,43 @@ class Operations(ABC):
             query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
+    def get_contours_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+        crs: str | None = None,
+    ) -> bytes:
+        """Download the contours: ``GET /missions/{mission_id}/contours.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
+        """
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/contours.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
+        ))
+
     def get_soundings_file(
         self,
         mission_id: str,
@@ -2322,6 +2359,43 @@ class AsyncOperations(ABC):
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
+        ))
+
+    async def get_contours_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+        crs: str | None = None,
+    ) -> bytes:
+        """Download the contours: ``GET /missions/{mission_id}/contours.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
+        """
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/contours.{part(format)}",
             bytes,
             query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
