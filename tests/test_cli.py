@@ -161,9 +161,15 @@ def test_the_help_shows_all_that_is_said_of_an_option_and_its_default(
             2,
             "map.xyz would be a GeoTIFF: say the kind of",
         ),
-        (["export", "nowhere", "--interval", "1"], {}, 2, "tif does not depend on it, geojson, kml do"),
+        (["export", "nowhere", "--interval", "1"], {}, 2, "tif does not depend on it, geojson, kml"),
         (["export", "nowhere", "--format", "csv", "--vehicle", "a"], {}, 2, "does not depend on it, soundings.geojson"),
         (["export", "nowhere", "--format", "xyz", "--order", "special"], {}, 2, "does not depend on it, tif, nc,"),
+        (
+            ["export", "nowhere", "--format", "vr.bag", "--crs", "utm"],
+            {},
+            2,
+            "vr.bag does not depend on it, tif, nc",
+        ),
         (["report", "nowhere", "--out", "x.doc"], {}, 2, "x.doc ends in none of .pdf, .html"),
         (["report", "nowhere", "--lang", "xx"], {}, 2, "'xx' is not one of en, pt"),
         (["import-log", "nowhere", "Data.lsf"], {}, 1, "there is no database /"),
@@ -488,6 +494,10 @@ def test_a_mission_is_served_exported_and_found_again(
     assert prior.stdout.startswith("252 of 252 depths imported: "), prior.stderr
     bathyfleet("export", mission["id"], "--format", "png")
     assert (tmp_path / "output" / "harbour-basin.png").stat().st_size > 1000
+    bathyfleet("export", mission["id"], "--crs", "utm")
+    assert (tmp_path / "output" / "harbour-basin-epsg32629.tif").is_file()
+    refused = bathyfleet("export", mission["id"], "--crs", "EPSG:4326")
+    assert (refused.code, "no projected system in metres" in refused.stderr) == (1, True)
     bathyfleet("report", mission["id"][:8])
     assert (tmp_path / "output" / "harbour-basin-report.pdf").read_bytes().startswith(b"%PDF-")
     bathyfleet("report", mission["id"], "--out", "basin.html", "--lang", "pt")

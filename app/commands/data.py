@@ -49,12 +49,16 @@ def export(
     vehicle: Annotated[
         str | None, typer.Option(help="Whose soundings, for soundings.geojson.", show_default="the only vehicle's")
     ] = None,
+    crs: Annotated[
+        str | None,
+        typer.Option(help="System of positions: utm or EPSG:32629, ….", show_default="the mission's own, or degrees"),
+    ] = None,
     database: Database = None,
 ) -> None:
     """Write a mission's map, soundings or tracks to a file, from the database; no service has to run."""
     settings = command_settings(database_url=database)
     from app.mapping.s44 import Order
-    from app.missions.maps.products import PRODUCTS, Product, ProductOptions
+    from app.missions.maps.products import PRODUCTS, FileOption, Product, ProductOptions
     from app.missions.operations.maps import mission_maps
     from app.missions.service import MissionService
 
@@ -66,14 +70,16 @@ def export(
     endings = {f".{kind.extension.rpartition('.')[2]}" for kind in PRODUCTS.values()} - {".tif"}
     if format is None and out is not None and out.suffix.lower() in endings:
         raise typer.BadParameter(f"{out} would be a GeoTIFF: say the kind of file by --format", param_hint="--out")
-    for option, given, heeding in (
-        ("--order", order, [name for name, kind in PRODUCTS.items() if kind.by_order]),
-        ("--interval", interval, [name for name, kind in PRODUCTS.items() if kind.with_contours]),
-        ("--vehicle", vehicle, [name for name, kind in PRODUCTS.items() if kind.of_vehicle]),
+    for option, given, meant in (
+        ("--order", order, FileOption.ORDER),
+        ("--interval", interval, FileOption.INTERVAL),
+        ("--vehicle", vehicle, FileOption.VEHICLE),
+        ("--crs", crs, FileOption.CRS),
     ):
-        if given is not None and wanted not in heeding:
-            raise typer.BadParameter(f"{wanted} does not depend on it, {', '.join(heeding)} do", param_hint=option)
-    options = ProductOptions(Order(order or "1a"), interval, vehicle=vehicle)
+        if given is not None and meant not in PRODUCTS[wanted].options:
+            heeding = ", ".join(name for name, kind in PRODUCTS.items() if meant in kind.options)
+            raise typer.BadParameter(f"{wanted} does not depend on it, {heeding} do", param_hint=option)
+    options = ProductOptions(Order(order or "1a"), interval, vehicle=vehicle, crs=crs)
 
     async def run(service: MissionService) -> Product:
         live = await meant_mission(service, mission)

@@ -47,6 +47,7 @@ BEYOND_THE_SCHEMA = {
     "forecastMission",
     "getMap",
     "getMapOverlay",
+    "getContoursFile",
     "getMapFile",
     "getMapTiles",
     "getProfile",

@@ -23,6 +23,7 @@ from app.mapping.layers import LAYERS, Layer, LayerKind
 from app.mapping.products.pictures.overlay import overlay_png
 from app.mapping.s44 import Order
 from app.missions.maps.products import (
+    CONTOURS,
     CROSSOVERS,
     GEOJSON,
     MAP,
@@ -80,10 +81,19 @@ async def _file_options(
     vehicle: Annotated[
         Name | None, Query(description="Whose soundings, in crowdsourced bathymetry; default: the only vehicle's")
     ] = None,
+    crs: Annotated[
+        str | None,
+        Query(
+            max_length=40,
+            description="System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; "
+            "default: the mission's own frame, in XYZ longitude and latitude",
+            examples=["utm"],
+        ),
+    ] = None,
 ) -> ProductOptions:
     if (min is None) != (max is None) or (min is not None and max is not None and not min < max):
         raise ProblemError("invalid-request", f"the colour range is {min} to {max}", remedy="Give min and a max above")
-    return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle)
+    return ProductOptions(order, interval_m, None if min is None or max is None else (min, max), vehicle, crs)
 
 
 def _layer_enum(title: str, description: str, among: Callable[[LayerKind], bool]) -> type[StrEnum]:
@@ -479,6 +489,7 @@ for _kind in REPORTS.values():
     _add_report(_kind)
 
 _add_files(MAP, "getMapFile", "Download the map", "Return the map as a file.")
+_add_files(CONTOURS, "getContoursFile", "Download the contours", "Return the map's contours as a file.")
 _add_files(SOUNDINGS, "getSoundingsFile", "Download the soundings", "Return the soundings as a file.")
 _add_files(TRACKS, "getTracksFile", "Download the tracks", "Return where the vehicles were as a file.")
 _add_files("lines", "getLinesFile", "Download the log of lines", "Return the lines that were flown as a file.")

@@ -1,4 +1,4 @@
-"""Where a map lies on the Earth: the mission's own frame, UTM, windows and tiles of GIS, outlines of cells.
+"""Where a map lies on the Earth: frames (a mission's own, UTM), windows and tiles of GIS, outlines of cells.
 
 Others use ``georeference.LocalFrame``.
 """

@@ -29,6 +29,8 @@ class LocalFrame:
         When the origin is not a finite latitude within [-90, 90] and longitude within [-180, 180].
     """
 
+    axis_names = "east_m north_m"
+
     def __init__(self, origin_lat_deg: float, origin_lon_deg: float) -> None:
         if not -90.0 <= origin_lat_deg <= 90.0:
             raise ValueError(f"origin_lat_deg is {origin_lat_deg}; it must lie within [-90, 90]")
@@ -49,6 +51,11 @@ class LocalFrame:
     def crs(self) -> pyproj.CRS:
         """The frame's coordinate reference system, axes east and north."""
         return self._crs
+
+    @property
+    def statement(self) -> str:
+        """What positions are in."""
+        return f"transverse Mercator k=1, lat {self.origin_lat_deg!r} lon {self.origin_lon_deg!r}"
 
     @property
     def crs_wkt(self) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rasterio.crs import CRS
 from rasterio.errors import RasterioError
 
-from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame
 from app.mapping.products.geotiff import north_up_transform
 from app.mapping.types import CHARTED_SD, BathymetricMap
 from app.mapping.water.vertical import VerticalDatum
@@ -24,7 +24,7 @@ NOT_WHOLE = "it cannot be written whole; is the disk that TMPDIR points to full?
 
 
 def bag(
-    bathymetry: BathymetricMap, frame: LocalFrame, *, vertical_datum: VerticalDatum, title: str, common_sd_m: float
+    bathymetry: BathymetricMap, frame: Frame, *, vertical_datum: VerticalDatum, title: str, common_sd_m: float
 ) -> bytes:
     """Return a BAG with elevation (positive up: minus the depth), its standard deviation and numbers of soundings.
 
@@ -57,7 +57,7 @@ def _write(
     path: Path,
     layers: Sequence[NDArray[np.float32]],
     bathymetry: BathymetricMap,
-    frame: LocalFrame,
+    frame: Frame,
     vertical_datum: VerticalDatum,
     title: str,
     predicted: str,

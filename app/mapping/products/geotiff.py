@@ -8,6 +8,7 @@ from rasterio.crs import CRS
 from rasterio.io import MemoryFile
 
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame
 from app.mapping.layers import Layer
 from app.mapping.types import BathymetricMap
 from app.mapping.water.vertical import VerticalDatum
@@ -22,9 +23,9 @@ def north_up_transform(bathymetry: BathymetricMap) -> Affine:
 
 
 def geotiff(
-    bathymetry: BathymetricMap, layers: Sequence[Layer], frame: LocalFrame, *, vertical_datum: VerticalDatum
+    bathymetry: BathymetricMap, layers: Sequence[Layer], frame: Frame, *, vertical_datum: VerticalDatum
 ) -> bytes:
-    """Return a COG with one band per layer, north up, in the local frame with the vertical datum as its third axis.
+    """Return a COG with one band per layer, north up, in the frame with the vertical datum as its third axis.
 
     Its overviews hold values of single cells, so that none stands there that the map does not have: classes stay
     classes, and nothing is shoaler or surer than the map. They leave cells out: the least depth is told by the map.
@@ -56,8 +57,14 @@ def geotiff(
                 DEPTH_POSITIVE="down",
                 MODEL=bathymetry.model,
                 AREA_OR_POINT="Area",
-                ORIGIN_LAT=repr(frame.origin_lat_deg),
-                ORIGIN_LON=repr(frame.origin_lon_deg),
+                **_origin(frame),
                 TIFFTAG_SOFTWARE="bathyfleet",
             )
         return bytes(memory.read())
+
+
+def _origin(frame: Frame) -> dict[str, str]:
+    """Return where a mission's own frame begins; what others know by its code needs no such statement."""
+    if not isinstance(frame, LocalFrame):
+        return {}
+    return {"ORIGIN_LAT": repr(frame.origin_lat_deg), "ORIGIN_LON": repr(frame.origin_lon_deg)}

@@ -8,6 +8,7 @@ import numpy as np
 from netCDF4 import Dataset
 
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame
 from app.mapping.layers import INTERPOLATED, PRIOR, SOUNDED, Layer
 from app.mapping.types import BathymetricMap
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
@@ -29,7 +30,7 @@ STANDARD_NAMES = {
 def netcdf(
     bathymetry: BathymetricMap,
     layers: Sequence[Layer],
-    frame: LocalFrame,
+    frame: Frame,
     *,
     vertical_datum: VerticalDatum,
     title: str,
@@ -51,7 +52,7 @@ def _write(
     file: Dataset,
     bathymetry: BathymetricMap,
     layers: Sequence[Layer],
-    frame: LocalFrame,
+    frame: Frame,
     vertical_datum: VerticalDatum,
     title: str,
     created: datetime,
@@ -70,12 +71,16 @@ def _write(
     )
     file.createDimension("y", grid.rows)
     file.createDimension("x", grid.cols)
-    for name, values in (("x", grid.east_m), ("y", grid.north_m)):
+    of_origin = isinstance(frame, LocalFrame)
+    meanings = (
+        [f"{name} of the mission's origin" for name in ("east", "north")] if of_origin else ["easting", "northing"]
+    )
+    for name, values, meaning in zip("xy", (grid.east_m, grid.north_m), meanings, strict=True):
         axis = file.createVariable(name, "f8", (name,))
         axis.setncatts(
             {
                 "standard_name": f"projection_{name}_coordinate",
-                "long_name": {"x": "east", "y": "north"}[name] + " of the mission's origin",
+                "long_name": meaning,
                 "units": "m",
                 "axis": name.upper(),
             }
@@ -93,7 +98,7 @@ def _write(
         _write_layer(file, layer, vertical_datum, companions)
 
 
-def _write_crs(file: Dataset, frame: LocalFrame, vertical_datum: VerticalDatum) -> None:
+def _write_crs(file: Dataset, frame: Frame, vertical_datum: VerticalDatum) -> None:
     crs = file.createVariable("crs", "i4")
     compound = vertical_datum.compound_with(frame.crs)
     cf = {name: value for name, value in frame.crs.to_cf().items() if name != "crs_wkt"}

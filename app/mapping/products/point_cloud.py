@@ -5,12 +5,10 @@ from typing import IO
 
 import laspy
 import numpy as np
-import pyproj
 from laspy.header import GpsTimeType
 
 from app.arrays import FloatArray
-from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.coordinates.utm import utm_epsg
+from app.mapping.coordinates.projected import ProjectedFrame
 
 POINT_FORMAT, VERSION = 6, "1.4"
 RESOLUTION_M = 0.001
@@ -25,31 +23,28 @@ OWN_RECORD = "bathyfleet"
 
 
 class PointCloudFile:
-    """A LAZ 1.4 file of depths, as elevations in metres, in the UTM zone of the area.
+    """A LAZ 1.4 file of depths, as elevations in metres, in a projected system.
 
     Parameters
     ----------
     file
         Open for reading and writing, at its beginning; left open.
     frame
-        Of the positions.
+        The system, and the way there from the mission's own frame.
     vehicles
         Names; a point's source id is the number of its vehicle, from 1.
     vertical_datum
         What depths are counted from, in words.
     """
 
-    def __init__(self, file: IO[bytes], frame: LocalFrame, vehicles: Sequence[str], vertical_datum: str) -> None:
-        lat, lon = (float(of[0]) for of in frame.to_geographic([0.0], [0.0]))
+    def __init__(self, file: IO[bytes], frame: ProjectedFrame, vehicles: Sequence[str], vertical_datum: str) -> None:
         self._frame, self._vehicles = frame, list(vehicles)
-        self._crs = pyproj.CRS.from_epsg(utm_epsg(lat, lon))
-        self._transformer = pyproj.Transformer.from_crs(4326, self._crs, always_xy=True)
         header = laspy.LasHeader(point_format=POINT_FORMAT, version=VERSION)
         header.generating_software = header.system_identifier = "bathyfleet"
         header.global_encoding.gps_time_type = GpsTimeType.STANDARD
         header.scales = np.full(3, RESOLUTION_M)
-        header.offsets = np.floor([*self._transformer.transform(lon, lat), 0.0])
-        header.add_crs(self._crs)
+        header.offsets = np.floor([*(float(of) for of in frame.from_local(0.0, 0.0)), 0.0])
+        header.add_crs(frame.crs)
         header.add_extra_dim(laspy.ExtraBytesParams(DEVIATION, "float32", "standard deviation, m"))
         text = f"z: minus the depth from {vertical_datum}, metres; sources: " + "; ".join(
             f"{number} {name}" for number, name in enumerate(self._vehicles, 1)
@@ -70,7 +65,7 @@ class PointCloudFile:
         sd_m: FloatArray,
         angle_rad: FloatArray | None = None,
     ) -> None:
-        """Append soundings of one vehicle, each array of shape (n,).
+        """Append soundings of one vehicle, each array of shape (n,); positions are in the mission's own frame.
 
         Parameters
         ----------
@@ -80,8 +75,7 @@ class PointCloudFile:
             From straight down in the vehicle, positive to starboard; None: not known, told as 0.
         """
         points = laspy.ScaleAwarePointRecord.zeros(len(time_s), header=self._header)
-        lat, lon = self._frame.to_geographic(east_m, north_m)
-        points.x, points.y = self._transformer.transform(lon, lat)
+        points.x, points.y = self._frame.from_local(east_m, north_m)
         points.z = -depth_m
         points.gps_time = time_s - GPS_EPOCH_S + LEAP_S - OFFSET_S
         points.classification[:] = BATHYMETRIC_POINT

@@ -12,7 +12,7 @@ import pyproj
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.coordinates.utm import UtmCells, utm_cells
+from app.mapping.coordinates.projected import UTM, ProjectedCells, named_frame, projected_cells
 from app.mapping.products.tracks import utc_text
 from app.mapping.types import BathymetricMap, Grid
 from app.mapping.water.vertical import VerticalDatum
@@ -143,7 +143,7 @@ def s102(
     if datum is None:
         raise ValueError(f"S-102 has no number for the vertical datum, {vertical_datum.statement}")
     measured = bathymetry.sounded if bathymetry.prior is None else bathymetry.sounded | bathymetry.prior
-    cells = utm_cells(bathymetry, frame, measured & np.isfinite(bathymetry.depth_m))
+    cells = _cells(bathymetry, frame, measured & np.isfinite(bathymetry.depth_m))
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         _write_root(file, cells, datum, issued.astimezone(UTC))
@@ -159,17 +159,26 @@ def s102(
     return content.getvalue()
 
 
+def _cells(bathymetry: BathymetricMap, frame: LocalFrame, keep: BoolArray) -> ProjectedCells:
+    """Return the cells to keep in the UTM zone of their middle. Raises ValueError when there are none."""
+    if not keep.any():
+        raise ValueError("no cell of the map was sounded")
+    rows, cols = np.nonzero(keep)
+    middle = float(bathymetry.grid.east_m[cols].mean()), float(bathymetry.grid.north_m[rows].mean())
+    return projected_cells(bathymetry, named_frame(UTM, frame, *middle), keep)
+
+
 def file_name(title: str, identity: str) -> str:
     """Return a name as S-100 wants it, of capital letters, digits and underscores, 19 of them at most."""
     words = "".join(c for c in title.upper() if c.isascii() and c.isalnum())
     return f"102{NO_PRODUCER}{words[:7]}_{identity[:4].upper()}.h5"
 
 
-def _write_root(file: h5py.File, cells: UtmCells, datum: int, issued: datetime) -> None:
+def _write_root(file: h5py.File, cells: ProjectedCells, datum: int, issued: datetime) -> None:
     _text(file, "productSpecification", PRODUCT)
     file.attrs.create("issueDate", f"{issued:%Y%m%d}", dtype=DATE)
     _text(file, "issueTime", f"{issued:%H%M%S}Z")
-    file.attrs.create("horizontalCRS", cells.epsg, dtype="<i4")
+    file.attrs.create("horizontalCRS", cells.frame.epsg, dtype="<i4")
     _write_bounds(file, *_geographic_bounds(cells))
     file.attrs.create("verticalCS", DEPTH_AXIS_DOWN, dtype="<i4")
     _choice(file, "verticalCoordinateBase", COORDINATE_BASES, 2)
@@ -177,10 +186,10 @@ def _write_root(file: h5py.File, cells: UtmCells, datum: int, issued: datetime) 
     file.attrs.create("verticalDatum", datum, dtype="<u2")
 
 
-def _geographic_bounds(cells: UtmCells) -> tuple[float, float, float, float]:
+def _geographic_bounds(cells: ProjectedCells) -> tuple[float, float, float, float]:
     """Return west, south, east and north of the outermost cells' borders, degrees."""
     grid = cells.grid
-    to_degrees = pyproj.Transformer.from_crs(cells.epsg, 4326, always_xy=True)
+    to_degrees = pyproj.Transformer.from_crs(cells.frame.epsg, 4326, always_xy=True)
     east, north = grid.west_m + grid.cols * grid.cell_m, grid.south_m + grid.rows * grid.cell_m
     west, south, east, north = to_degrees.transform_bounds(grid.west_m, grid.south_m, east, north)
     return west, south, east, north
@@ -236,7 +245,7 @@ def _write_bounds(group: h5py.Group, west: float, south: float, east: float, nor
         group.attrs.create(name, np.nextafter(single, np.float32(outward)) if inside else single, dtype=REAL)
 
 
-def _write_depths(group: h5py.Group, cells: UtmCells, depth_m: FloatArray, sd_m: FloatArray) -> None:
+def _write_depths(group: h5py.Group, cells: ProjectedCells, depth_m: FloatArray, sd_m: FloatArray) -> None:
     """Write depth and uncertainty in whole centimetres, the latter rounded up."""
     values = np.empty(cells.source.shape, dtype=[("depth", REAL), ("uncertainty", REAL)])
     for name, layer in (
@@ -251,7 +260,7 @@ def _write_depths(group: h5py.Group, cells: UtmCells, depth_m: FloatArray, sd_m:
     group.create_dataset("values", data=values, **_compressed(values.shape))
 
 
-def _write_quality(group: h5py.Group, sounded: BoolArray, cells: UtmCells, survey: SurveyFacts) -> None:
+def _write_quality(group: h5py.Group, sounded: BoolArray, cells: ProjectedCells, survey: SurveyFacts) -> None:
     records = np.where(cells.filled, np.where(cells.of(sounded, 0) > 0, SURVEYED, IMPORTED), NO_RECORD)
     group[f"{QUALITY}.01/Group_001"].create_dataset("values", data=records.astype(NUMBER), **_compressed(records.shape))
     columns: dict[str, tuple[np.dtype[Any], Any, Any]] = {

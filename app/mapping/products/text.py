@@ -5,13 +5,13 @@ import io
 import numpy as np
 
 from app.arrays import FloatArray
-from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame
 from app.mapping.types import CHARTED_SD, BathymetricMap, Soundings
 
 
 def map_xyz(
     bathymetry: BathymetricMap,
-    frame: LocalFrame,
+    frame: Frame,
     *,
     vertical_datum: str,
     common_sd_m: float,
@@ -21,7 +21,7 @@ def map_xyz(
     """Return the cells as XYZ text, south-west to north-east; cells without depth are left out.
 
     Columns after a comment header: position, depth (positive down), standard deviation with ``common_sd_m`` of what all
-    soundings share, count, sounded (1 or 0). Positions are cell centres: east and north of the local frame, or
+    soundings share, count, sounded (1 or 0). Positions are cell centres: east and north of the frame, or
     longitude and latitude when ``geographic``.
     """
     keep = np.isfinite(bathymetry.depth_m)
@@ -47,7 +47,7 @@ def map_xyz(
 
 
 def soundings_xyz(
-    soundings: Soundings, frame: LocalFrame, *, vertical_datum: str, geographic: bool = False, headed: bool = True
+    soundings: Soundings, frame: Frame, *, vertical_datum: str, geographic: bool = False, headed: bool = True
 ) -> bytes:
     """Return the soundings as XYZ text: position, depth (positive down) and standard deviation per line.
 
@@ -64,18 +64,18 @@ def soundings_xyz(
 
 
 def _positions(
-    east: FloatArray, north: FloatArray, frame: LocalFrame, geographic: bool
+    east: FloatArray, north: FloatArray, frame: Frame, geographic: bool
 ) -> tuple[FloatArray, FloatArray, str, str]:
     if geographic:
         lat, lon = frame.to_geographic(east, north)
         return lon, lat, "lon_deg lat_deg", "%.8f"
-    return east, north, "east_m north_m", "%.3f"
+    return east, north, frame.axis_names, "%.3f"
 
 
-def _frame_line(frame: LocalFrame, geographic: bool) -> str:
+def _frame_line(frame: Frame, geographic: bool) -> str:
     if geographic:
         return "positions: WGS 84 (EPSG:4326)"
-    return f"positions: transverse Mercator k=1, lat {frame.origin_lat_deg!r} lon {frame.origin_lon_deg!r}"
+    return f"positions: {frame.statement}"
 
 
 def _text(rows: FloatArray, header: str, formats: list[str], delimiter: str) -> bytes:

@@ -15,8 +15,8 @@ from app.mapping.readers.types import LOCAL, MAX_SOUNDINGS, Points, Positive, Re
 NAMES = {
     "lon": ("lon", "lon_deg", "longitude", "long", "lng"),
     "lat": ("lat", "lat_deg", "latitude"),
-    "x": ("x", "easting", "x_m"),
-    "y": ("y", "northing", "y_m"),
+    "x": ("x", "easting", "x_m", "easting_m"),
+    "y": ("y", "northing", "y_m", "northing_m"),
     "east": ("east_m", "east"),
     "north": ("north_m", "north"),
     "down": ("depth", "depth_m", "corrected_depth", "corrected_depth_m"),

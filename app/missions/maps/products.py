@@ -3,18 +3,29 @@
 import io
 import zipfile
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
+from enum import StrEnum
 
 import numpy as np
 import orjson
 from shapely.geometry import Polygon, mapping
 
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame, ProjectedFrame, named_frame, projected_cells
+from app.mapping.coordinates.utm import utm_epsg
 from app.mapping.layers import Layer, LayerSource, file_layers
 from app.mapping.products.bag import bag
-from app.mapping.products.contours import Contour, contours_geojson, find_contours, usual_interval_m
+from app.mapping.products.contours import (
+    Contour,
+    contours_geojson,
+    contours_in_metres,
+    find_contours,
+    usual_interval_m,
+)
 from app.mapping.products.crossovers import crossovers_csv
 from app.mapping.products.crowdsourced import Provider
+from app.mapping.products.dxf import contours_dxf
 from app.mapping.products.geotiff import geotiff
 from app.mapping.products.holidays import holidays_geojson
 from app.mapping.products.kml import contours_kml, tracks_kml
@@ -29,6 +40,7 @@ from app.mapping.products.vr_bag import vr_bag
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
+from app.mapping.types import BathymetricMap
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.file_content import FileContent
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
@@ -50,6 +62,9 @@ MAP, SOUNDINGS, ACCEPTED, RAW, POINTS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CR
 )
 """What files are made of."""
 
+CONTOURS = "contours"
+"""A resource whose files are made of the map."""
+
 
 NOT_SOUNDED = ("no cell of the map was sounded", "wait for soundings inside of the area")
 
@@ -66,6 +81,15 @@ GEOJSON, KML, TEXT, CSV = (
 )
 
 
+class FileOption(StrEnum):
+    """What may be asked of files, as REST calls it."""
+
+    ORDER = "order"
+    INTERVAL = "interval_m"
+    CRS = "crs"
+    VEHICLE = "vehicle"
+
+
 @dataclass(frozen=True)
 class ProductOptions:
     """What may be asked of a file.
@@ -80,12 +104,15 @@ class ProductOptions:
         Depths of a picture's first and last colour; None: the map's own.
     vehicle
         Whose soundings, where a file holds those of one vehicle; None: of the only one.
+    crs
+        The projected system of its positions, ``utm`` or ``EPSG:nnnn``; None: the mission's own frame, or degrees.
     """
 
     order: Order = Order.ORDER_1A
     interval_m: float | None = None
     range_m: tuple[float, float] | None = None
     vehicle: str | None = None
+    crs: str | None = None
 
 
 @dataclass(frozen=True)
@@ -148,10 +175,8 @@ class ProductKind:
         Returns the file. Raises InvalidRequestError for options that cannot be.
     needs
         What has to be loaded to make it.
-    of_vehicle
-        Whether it holds what one vehicle measured.
-    by_order, with_contours
-        Whether the S-44 order makes a difference, and the interval between contours.
+    options
+        What makes a difference to it.
     filename
         Returns what it is saved as, where a standard says so; None: the mission's name.
     """
@@ -162,9 +187,7 @@ class ProductKind:
     title: str
     make: Callable[[Material, ProductOptions], bytes | FileContent]
     needs: Collection[str]
-    of_vehicle: bool = False
-    by_order: bool = False
-    with_contours: bool = False
+    options: Collection[FileOption] = ()
     filename: Callable[[MissionFacts], str] | None = None
 
     @property
@@ -178,29 +201,63 @@ class ProductKind:
         return self.resource.rpartition("/")[2]
 
 
+def frame_of(facts: MissionFacts, options: ProductOptions) -> Frame:
+    """Return what positions are in. Raises InvalidRequestError for a system that cannot be."""
+    return facts.frame if options.crs is None else projected_frame(facts, options.crs)
+
+
+def projected_frame(facts: MissionFacts, name: str) -> ProjectedFrame:
+    """Return a projected system for a mission's area by its name. Raises InvalidRequestError where it cannot be."""
+    lon, lat = np.transpose(facts.spec.area.ring)
+    east, north = (0.5 * float(axis.min() + axis.max()) for axis in facts.frame.to_local(lat, lon))
+    try:
+        return named_frame(name, facts.frame, east, north)
+    except ValueError as error:
+        zone = utm_epsg(*(float(degrees) for degrees in facts.frame.to_geographic(east, north)))
+        raise InvalidRequestError(
+            FileOption.CRS,
+            str(error),
+            f"give utm (here EPSG:{zone}), or EPSG: and the code of a projected system in metres for this place",
+        ) from error
+
+
+def _placed(
+    material: Material, options: ProductOptions, layers: Sequence[Layer] = ()
+) -> tuple[BathymetricMap, Sequence[Layer], Frame]:
+    """Return the map and layers of it on the grid that is asked for. Raises ConflictError where no cell is known."""
+    bathymetry, frame = material.snapshot.built.map, frame_of(material.facts, options)
+    if isinstance(frame, LocalFrame):
+        return bathymetry, layers, frame
+    keep = np.logical_or.reduce(
+        [np.isfinite(values) for values in (bathymetry.depth_m, *(one.values for one in layers))]
+    )
+    if not keep.any():
+        raise ConflictError(*NOT_SOUNDED)
+    cells = projected_cells(bathymetry, frame, keep)
+    return cells.map(bathymetry), [replace(one, values=cells.of(one.values, np.nan)) for one in layers], frame
+
+
 def _geotiff(material: Material, options: ProductOptions) -> bytes:
-    snapshot, facts = material.snapshot, material.facts
-    layers = file_layers(snapshot.source(options.order))
-    return geotiff(snapshot.built.map, layers, facts.frame, vertical_datum=facts.vertical_datum)
+    layers = file_layers(material.snapshot.source(options.order))
+    return geotiff(*_placed(material, options, layers), vertical_datum=material.facts.vertical_datum)
 
 
 def _netcdf(material: Material, options: ProductOptions) -> bytes:
-    snapshot, facts = material.snapshot, material.facts
+    facts = material.facts
     return netcdf(
-        snapshot.built.map,
-        file_layers(snapshot.source(options.order)),
-        facts.frame,
+        *_placed(material, options, file_layers(material.snapshot.source(options.order))),
         vertical_datum=facts.vertical_datum,
         title=facts.title,
         created=material.created,
     )
 
 
-def _bag(material: Material, _: ProductOptions) -> bytes:
+def _bag(material: Material, options: ProductOptions) -> bytes:
     facts = material.facts
+    bathymetry, _, frame = _placed(material, options)
     return bag(
-        material.snapshot.built.map,
-        facts.frame,
+        bathymetry,
+        frame,
         vertical_datum=facts.vertical_datum,
         title=facts.title,
         common_sd_m=facts.common_sd_m,
@@ -269,14 +326,14 @@ def _cell_of_depth(material: Material) -> float:
     return share
 
 
-def _map_xyz(material: Material, _: ProductOptions) -> bytes:
-    facts = material.facts
+def _map_xyz(material: Material, options: ProductOptions) -> bytes:
+    bathymetry, _, frame = _placed(material, options)
     return map_xyz(
-        material.snapshot.built.map,
-        facts.frame,
+        bathymetry,
+        frame,
         vertical_datum=material.datum,
-        common_sd_m=facts.common_sd_m,
-        geographic=True,
+        common_sd_m=material.facts.common_sd_m,
+        geographic=isinstance(frame, LocalFrame),
     )
 
 
@@ -351,11 +408,31 @@ def _local_track(facts: MissionFacts, track: Track) -> np.ndarray[tuple[int, int
 
 
 def _contours(material: Material, options: ProductOptions) -> list[Contour]:
-    snapshot, interval_m = material.snapshot, options.interval_m
-    if interval_m is None:
-        interval_m = usual_interval_m(snapshot.built.map.depth_m)
+    return _at_intervals(material, options, lambda map_, m: find_contours(map_, material.facts.frame, m))
+
+
+def _contours_dxf(material: Material, options: ProductOptions) -> bytes:
+    frame = frame_of(material.facts, options)
+    return contours_dxf(
+        _at_intervals(material, options, lambda map_, m: contours_in_metres(map_, frame, m)),
+        _interval_m(material, options),
+        title=material.facts.title,
+        positions=frame.statement,
+        vertical_datum=material.datum,
+    )
+
+
+def _interval_m(material: Material, options: ProductOptions) -> float:
+    given = options.interval_m
+    return usual_interval_m(material.snapshot.built.map.depth_m) if given is None else given
+
+
+def _at_intervals(
+    material: Material, options: ProductOptions, find: Callable[[BathymetricMap, float], list[Contour]]
+) -> list[Contour]:
+    """Return contours. Raises InvalidRequestError for an interval that cannot be."""
     try:
-        return find_contours(snapshot.built.map, snapshot.facts.frame, interval_m)
+        return find(material.snapshot.built.map, _interval_m(material, options))
     except ValueError as error:
         raise InvalidRequestError("interval_m", str(error), "choose a larger one") from error
 
@@ -366,6 +443,7 @@ def _soundings(material: Material, _: ProductOptions) -> FileContent:
     return material.soundings
 
 
+ORDER, INTERVAL, CRS, VEHICLE = FileOption
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
 TIMED_TRACKS = "the vehicles' tracks with times and depths"
 
@@ -379,9 +457,17 @@ PRODUCTS = {
             "Cloud-Optimized GeoTIFF with every layer",
             _geotiff,
             {MAP},
-            by_order=True,
+            options=(ORDER, CRS),
         ),
-        ProductKind(MAP, "nc", "application/x-netcdf", "CF-NetCDF with every layer", _netcdf, {MAP}, by_order=True),
+        ProductKind(
+            MAP,
+            "nc",
+            "application/x-netcdf",
+            "CF-NetCDF with every layer",
+            _netcdf,
+            {MAP},
+            options=(ORDER, CRS),
+        ),
         ProductKind(
             MAP,
             "bag",
@@ -389,6 +475,7 @@ PRODUCTS = {
             "Bathymetric Attributed Grid: elevation, uncertainty and numbers of soundings",
             _bag,
             {MAP},
+            options=(CRS,),
         ),
         ProductKind(
             MAP,
@@ -405,7 +492,7 @@ PRODUCTS = {
             "a GeoTIFF of each tier of cells by depth",
             _tiers,
             {MAP, TIERS},
-            by_order=True,
+            options=(ORDER,),
         ),
         ProductKind(
             MAP,
@@ -416,12 +503,21 @@ PRODUCTS = {
             {MAP, SURVEY},
             filename=lambda facts: file_name(facts.title, facts.mission_id),
         ),
-        ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}),
+        ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}, options=(CRS,)),
         ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
         ProductKind(
-            MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, with_contours=True
+            MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, options=(INTERVAL,)
         ),
-        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}, with_contours=True),
+        ProductKind(MAP, "kml", KML, "depth contours", _map_kml, {MAP}, options=(INTERVAL,)),
+        ProductKind(
+            CONTOURS,
+            "dxf",
+            "image/vnd.dxf",
+            "depth contours for CAD (DXF R12), in metres",
+            _contours_dxf,
+            {MAP},
+            options=(INTERVAL, CRS),
+        ),
         ProductKind(MAP, "png", "image/png", "a picture with axes, colour bar and scale", _picture, {MAP, TRACKS}),
         ProductKind(MAP, "overlay.png", "image/png", "a bare picture to lay over a web map", _overlay, {MAP}),
         ProductKind(SOUNDINGS, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
@@ -432,14 +528,16 @@ PRODUCTS = {
             "longitude, latitude and corrected depth of accepted soundings",
             _soundings,
             {ACCEPTED},
+            options=(CRS,),
         ),
         ProductKind(
             SOUNDINGS,
             "laz",
             "application/vnd.laszip",
-            "point cloud (LAZ, UTM) of the accepted soundings of every sonar, the beams of swath sonars among them",
+            "point cloud (LAZ, in UTM unless asked otherwise) of the accepted soundings of every sonar, beams included",
             _soundings,
             {POINTS},
+            options={FileOption.CRS},
         ),
         ProductKind(
             SOUNDINGS,
@@ -448,7 +546,7 @@ PRODUCTS = {
             "raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12)",
             _soundings,
             {RAW},
-            of_vehicle=True,
+            options=(VEHICLE,),
         ),
         ProductKind(TRACKS, "geojson", GEOJSON, TIMED_TRACKS, lambda m, _: tracks_geojson(m.tracks), {TRACKS}),
         ProductKind(TRACKS, "kml", KML, TIMED_TRACKS, lambda m, _: tracks_kml(m.tracks, title=m.facts.title), {TRACKS}),
@@ -475,7 +573,7 @@ PRODUCTS = {
             "where lines cross, with both depths and their difference",
             _crossovers,
             {CROSSOVERS},
-            by_order=True,
+            options=(ORDER,),
         ),
         ProductKind(
             "lines",
@@ -484,7 +582,7 @@ PRODUCTS = {
             "the lines that were flown: when, where, how long and how straight, and what crosses them",
             _lines,
             {CROSSOVERS},
-            by_order=True,
+            options={FileOption.ORDER},
         ),
         ProductKind(
             f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}
@@ -501,6 +599,14 @@ def product_kind(name: str) -> ProductKind:
     return PRODUCTS[name]
 
 
+def check_options(name: str, facts: MissionFacts, options: ProductOptions) -> None:
+    """Raise InvalidRequestError for a system of positions that a file cannot be in."""
+    if options.crs is not None and CRS not in product_kind(name).options:
+        able = ", ".join(other for other, kind in PRODUCTS.items() if CRS in kind.options)
+        raise InvalidRequestError(CRS, f"{name} is not made in {options.crs[:40]}", f"leave it out, or ask for {able}")
+    frame_of(facts, options)
+
+
 def make_product(name: str, material: Material, options: ProductOptions) -> Product:
     """Return one file. Raises InvalidRequestError for an unknown format or options that cannot be."""
     kind = product_kind(name)
@@ -508,7 +614,10 @@ def make_product(name: str, material: Material, options: ProductOptions) -> Prod
     content = FileContent(made) if isinstance(made, bytes) else made
     if kind.filename is not None:
         return Product(kind.filename(material.facts), kind.media_type, content)
-    part = (options.vehicle or "") if kind.of_vehicle else kind.part.removeprefix(MAP)
+    part = (options.vehicle or "") if VEHICLE in kind.options else kind.part.removeprefix(MAP)
+    frame = frame_of(material.facts, options)
+    if isinstance(frame, ProjectedFrame):
+        part = f"{part}-epsg{frame.epsg}".removeprefix("-")
     return Product(product_name(material.facts, part, kind.extension), kind.media_type, content)
 
 

@@ -4,11 +4,14 @@ import errno
 import io
 import zipfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import h5py
 import httpx
 import numpy as np
+import pyogrio
+import pyproj
 import pytest
 import rasterio
 from PIL import Image
@@ -115,6 +118,7 @@ FILES = {
     "map.csv": ("text/csv", b"#"),
     "map.geojson": ("application/geo+json", b"{"),
     "map.kml": ("application/vnd.google-earth.kml+xml", b"<?xml"),
+    "contours.dxf": ("image/vnd.dxf", b"999"),
     "map.png": ("image/png", b"\x89PNG"),
     "soundings.csv": ("text/csv", b"#"),
     "soundings.xyz": ("text/plain", b"#"),
@@ -177,6 +181,68 @@ async def test_the_list_of_files_is_complete_and_every_path_answers(client: http
     for entry in listed.values():
         answer = await client.get(entry["href"].removeprefix("/api/v1"))
         assert answer.status_code == refused.get(entry["name"], 200)
+
+
+async def test_files_come_in_another_projected_system(client: httpx.AsyncClient, measured: str, tmp_path: Path) -> None:
+    zone, utm = {"crs": "EPSG:32629"}, {"crs": "utm"}
+    for name in ("map.tif", "map.bag"):
+        answer = await client.get(f"{measured}/{name}", params=utm)
+        saved = name.replace("map", "harbour-basin-epsg32629")
+        assert answer.headers["content-disposition"] == f'attachment; filename="{saved}"'
+        (path := tmp_path / name).write_bytes(answer.content)
+        with rasterio.open(path) as file:
+            found = pyproj.CRS.from_wkt(file.crs.to_wkt())
+            assert (found.sub_crs_list[0] if found.is_compound else found).to_epsg() == 32629
+    for name in ("map.xyz", "soundings.xyz"):
+        answer = await client.get(f"{measured}/{name}", params=utm)
+        assert answer.text == (await client.get(f"{measured}/{name}", params=zone)).text
+        assert "positions: WGS 84 / UTM zone 29N (EPSG:32629)" in answer.text
+        degrees = np.loadtxt(io.StringIO((await client.get(f"{measured}/{name}")).text))
+        metres = np.loadtxt(io.StringIO(answer.text))
+        easting, northing = pyproj.Transformer.from_crs(4326, 32629).transform(degrees[:, 1], degrees[:, 0])
+        if name == "soundings.xyz":
+            np.testing.assert_allclose(metres[:, :2].T, (easting, northing), atol=2e-3)
+        assert metres[:, 2].min() == degrees[:, 2].min()
+        imported = await client.post(
+            f"{measured}/imports",
+            params={"filename": "map.xyz", "crs": "EPSG:32629", "sd_m": 0.2},
+            content=answer.content,
+        )
+        assert imported.status_code == 201, imported.text
+
+
+@pytest.mark.parametrize(
+    ("name", "crs", "detail", "remedy"),
+    [
+        ("map.tif", "EPSG:4326", "WGS 84 (EPSG:4326) is no projected system in metres", "give utm (here EPSG:32629)"),
+        ("map.xyz", "utm29", "'utm29' is neither utm nor EPSG: and a code", "give utm (here EPSG:32629)"),
+        ("map.kml", "utm", "kml is not made in utm", "leave it out, or ask for tif, nc, bag"),
+        ("tracks.gpx", "utm", "tracks.gpx is not made in utm", "leave it out"),
+    ],
+)
+async def test_a_system_that_cannot_be_is_refused_by_name(
+    client: httpx.AsyncClient, measured: str, name: str, crs: str, detail: str, remedy: str
+) -> None:
+    answer = await client.get(f"{measured}/{name}", params={"crs": crs})
+    assert (answer.status_code, answer.json()["detail"]) == (422, detail)
+    (error,) = answer.json()["errors"]
+    assert (error["field"], error["value"]) == ("crs", crs)
+    assert remedy in error["expected"]
+
+
+async def test_contours_come_as_a_drawing(client: httpx.AsyncClient, measured: str, tmp_path: Path) -> None:
+    answer = await client.get(f"{measured}/contours.dxf", params={"crs": "utm", "interval_m": 0.2})
+    assert answer.headers["content-disposition"] == 'attachment; filename="harbour-basin-contours-epsg32629.dxf"'
+    (path := tmp_path / "contours.dxf").write_bytes(answer.content)
+    west, south, east, north = pyogrio.read_info(path, force_total_bounds=True)["total_bounds"]
+    shown = (await client.get(f"{measured}/map")).json()
+    corners = pyproj.Transformer.from_crs(4326, 32629).transform(*np.array(shown["corners"]).T[::-1])
+    assert min(corners[0]) < west < east < max(corners[0])
+    assert min(corners[1]) < south < north < max(corners[1])
+    own = await client.get(f"{measured}/contours.dxf")
+    assert "positions: transverse Mercator k=1, lat 41.18" in own.text
+    refused = await client.get(f"{measured}/contours.dxf", params={"interval_m": 1e-5})
+    assert [error["field"] for error in refused.json()["errors"]] == ["interval_m"]
 
 
 async def test_a_chart_surface_asks_for_a_chart_datum(client: httpx.AsyncClient, measured: str) -> None:

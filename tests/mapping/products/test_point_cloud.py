@@ -6,10 +6,10 @@ from pathlib import Path
 import laspy
 import numpy as np
 import pyproj
-import pytest
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import ProjectedFrame
 from app.mapping.products.point_cloud import PointCloudFile
 
 FRAME = LocalFrame(41.185, -8.705)
@@ -27,7 +27,7 @@ def test_a_cloud_in_pieces_is_read_with_everything_at_its_place(tmp_path: Path) 
     beams, single = soundings(20_000, 1), soundings(300, 2)
     path = tmp_path / "cloud.laz"
     with path.open("w+b") as file:
-        cloud = PointCloudFile(file, FRAME, ["lauv-1", "näytös"], "mean sea level")
+        cloud = PointCloudFile(file, ProjectedFrame(32629, FRAME), ["lauv-1", "näytös"], "mean sea level")
         cloud.add("näytös", *beams[:, :12_000])
         cloud.add("lauv-1", *single[:5])
         cloud.add("näytös", *beams[:, 12_000:])
@@ -59,20 +59,8 @@ def test_a_cloud_in_pieces_is_read_with_everything_at_its_place(tmp_path: Path) 
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("lat_deg", [-33.9, 78.2])
-def test_the_zone_is_that_of_the_area(lat_deg: float) -> None:
-    file = io.BytesIO()
-    cloud = PointCloudFile(file, LocalFrame(lat_deg, 18.4), ["a"], "chart datum")
-    cloud.add("a", *soundings(3, 0)[:5])
-    cloud.close()
-    file.seek(0)
-    crs = laspy.read(file).header.parse_crs()
-    assert crs is not None
-    assert crs.to_epsg() == (32734 if lat_deg < 0.0 else 32633)
-
-
 def test_a_cloud_of_nothing_can_be_read() -> None:
     file = io.BytesIO()
-    PointCloudFile(file, FRAME, [], "chart datum").close()
+    PointCloudFile(file, ProjectedFrame(25829, FRAME), [], "chart datum").close()
     file.seek(0)
     assert len(laspy.read(file).points) == 0

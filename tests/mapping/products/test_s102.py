@@ -11,7 +11,7 @@ import pytest
 import rasterio
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.coordinates.utm import utm_cells
+from app.mapping.coordinates.projected import ProjectedFrame, projected_cells
 from app.mapping.products.s102 import FILL, SurveyFacts, file_name, s102
 from app.mapping.types import BathymetricMap, Grid
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
@@ -98,7 +98,8 @@ def test_the_bounds_hold_every_cell(tmp_path: Path) -> None:
 def test_gdal_reads_depth_uncertainty_and_quality(tmp_path: Path) -> None:
     bathymetry = made_map(imported=True)
     path = write(tmp_path / NAME, bathymetry)
-    cells = utm_cells(bathymetry, FRAME, bathymetry.sounded | (bathymetry.prior == np.True_))
+    keep = bathymetry.sounded | (bathymetry.prior == np.True_)
+    cells = projected_cells(bathymetry, ProjectedFrame(32629, FRAME), keep)
     with rasterio.open(f'S102:"{path}":BathymetryCoverage') as file:
         assert (file.crs.to_epsg(), file.nodata, file.descriptions) == (32629, FILL, ("depth", "uncertainty"))
         assert file.tags()["VERTICAL_DATUM_ABBREV"] == "LAT"

@@ -41,6 +41,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/map": "getMap",
     "GET /missions/{mission_id}/map.{format}": "getMapFile",
     "GET /missions/{mission_id}/map.overlay.png": "getMapOverlay",
+    "GET /missions/{mission_id}/contours.{format}": "getContoursFile",
     "GET /missions/{mission_id}/soundings.{format}": "getSoundingsFile",
     "GET /missions/{mission_id}/tracks.{format}": "getTracksFile",
     "GET /missions/{mission_id}/holidays": "getHolidays",

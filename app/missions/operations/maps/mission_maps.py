@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from app.compute.compute import Compute
+from app.mapping.coordinates.projected import UTM
 from app.mapping.products.tracks import Track, TrackPoint
 from app.missions.clock import now
 from app.missions.errors import InvalidRequestError, MapNotReadyError, ProductUnavailableError
@@ -23,12 +24,16 @@ from app.missions.maps.products import (
     SOUNDINGS,
     SURVEY,
     TRACKS,
+    FileOption,
     Material,
     Product,
     ProductOptions,
     Surveyed,
+    check_options,
+    frame_of,
     make_product,
     product_kind,
+    projected_frame,
 )
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.operations.corrections.crossovers import check_of
@@ -133,7 +138,8 @@ async def export(
     """
     kind, chosen = product_kind(name), options or ProductOptions()
     needs = kind.needs
-    if kind.of_vehicle:
+    check_options(name, live.facts, chosen)
+    if FileOption.VEHICLE in kind.options:
         chosen = replace(chosen, vehicle=await only_vehicle(live, chosen.vehicle))
     snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
     material = Material(
@@ -170,9 +176,9 @@ async def _sounding_file(
         if SOUNDINGS in needs:
             return await all_lines(live)
         if ACCEPTED in needs:
-            return await accepted_xyz(live)
+            return await accepted_xyz(live, frame_of(live.facts, options))
         if POINTS in needs:
-            return await point_cloud(live)
+            return await point_cloud(live, projected_frame(live.facts, options.crs or UTM))
         if RAW in needs and options.vehicle is not None:
             return await crowdsourced(live, provider.named(), options.vehicle)
     except OSError as error:

@@ -2,12 +2,15 @@
 
 import asyncio
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from app import __version__
 from app.arrays import FloatArray
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.coordinates.projected import Frame, ProjectedFrame
 from app.mapping.products.crowdsourced import CrowdsourcedFile, Provider, RawSounding
 from app.mapping.products.text import soundings_xyz
 from app.mapping.swath.pings import Pings
@@ -38,18 +41,27 @@ async def all_lines(live: LiveMission) -> FileContent:
     return content
 
 
-async def accepted_xyz(live: LiveMission) -> FileContent:
-    """Return the accepted soundings as XYZ text: longitude, latitude, depth, deviation."""
+async def accepted_xyz(live: LiveMission, frame: Frame) -> FileContent:
+    """Return the accepted soundings as XYZ text: position, depth, deviation.
+
+    Positions are eastings and northings, in a mission's own frame longitude and latitude.
+    """
     await live.journal.flush()
-    facts, left_out = live.facts, _left_out(live)
+    left_out = _left_out(live)
     content = FileContent(f"# {left_out}\n".encode() if left_out else b"")
     begin_bytes = content.size_bytes
 
     def take(rows: FloatArray) -> None:
         soundings = Soundings.of_rows(rows[:, :4])
-        datum = facts.vertical_datum.statement
+        if isinstance(frame, ProjectedFrame):
+            easting, northing = frame.from_local(soundings.east_m, soundings.north_m)
+            soundings = replace(soundings, east_m=easting, north_m=northing)
         text = soundings_xyz(
-            soundings, facts.frame, vertical_datum=datum, geographic=True, headed=content.size_bytes == begin_bytes
+            soundings,
+            frame,
+            vertical_datum=live.facts.vertical_datum.statement,
+            geographic=isinstance(frame, LocalFrame),
+            headed=content.size_bytes == begin_bytes,
         )
         content.add(text)
 
@@ -58,7 +70,7 @@ async def accepted_xyz(live: LiveMission) -> FileContent:
     return content
 
 
-async def point_cloud(live: LiveMission) -> FileContent:
+async def point_cloud(live: LiveMission, frame: ProjectedFrame) -> FileContent:
     """Return the accepted soundings of every sonar, the beams of swath sonars among them, as LAZ.
 
     Raises PingsUnreadableError.
@@ -72,7 +84,7 @@ async def point_cloud(live: LiveMission) -> FileContent:
     chunks, waiting = await live.pings.contents()
     names = sorted(sounding | {chunk.vehicle for chunk in chunks} | waiting.keys())
     file = unnamed_file()
-    cloud = PointCloudFile(file, live.frame, names, live.facts.vertical_datum.statement)
+    cloud = PointCloudFile(file, frame, names, live.facts.vertical_datum.statement)
     for vehicle in sorted(sounding):
         query = sounding_queries.accepted_columns_query(live.id, vehicle, SOUNDED)
 

@@ -870,6 +870,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the map: ``GET /missions/{mission_id}/map.{format}``.
 
@@ -885,12 +886,52 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
+        ))
+
+    def get_contours_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+        crs: str | None = None,
+    ) -> bytes:
+        """Download the contours: ``GET /missions/{mission_id}/contours.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
+        """
+        return self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/contours.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_soundings_file(
@@ -903,6 +944,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``.
 
@@ -918,12 +960,15 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/soundings.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_tracks_file(
@@ -936,6 +981,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``.
 
@@ -951,12 +997,15 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_lines_file(
@@ -969,6 +1018,7 @@ class Operations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the log of lines: ``GET /missions/{mission_id}/lines.{format}``.
 
@@ -984,12 +1034,15 @@ class Operations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/lines.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     def get_profile(
@@ -2320,6 +2373,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the map: ``GET /missions/{mission_id}/map.{format}``.
 
@@ -2335,12 +2389,52 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/map.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
+        ))
+
+    async def get_contours_file(
+        self,
+        mission_id: str,
+        format: str,
+        *,
+        order: models.Order | None = None,
+        interval_m: float | None = None,
+        min: float | None = None,
+        max: float | None = None,
+        vehicle: str | None = None,
+        crs: str | None = None,
+    ) -> bytes:
+        """Download the contours: ``GET /missions/{mission_id}/contours.{format}``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that the TVU is compared with
+        interval_m : float, at most 1000
+            Between contours; default: about ten
+        min : float, -20000.0 to 20000.0
+            A picture's least depth
+        max : float, -20000.0 to 20000.0
+            Its largest depth
+        vehicle : str
+            Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
+        """
+        return await self._call(Call[bytes](
+            "GET",
+            f"/missions/{part(mission_id)}/contours.{part(format)}",
+            bytes,
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_soundings_file(
@@ -2353,6 +2447,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the soundings: ``GET /missions/{mission_id}/soundings.{format}``.
 
@@ -2368,12 +2463,15 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/soundings.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_tracks_file(
@@ -2386,6 +2484,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the tracks: ``GET /missions/{mission_id}/tracks.{format}``.
 
@@ -2401,12 +2500,15 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/tracks.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_lines_file(
@@ -2419,6 +2521,7 @@ class AsyncOperations(ABC):
         min: float | None = None,
         max: float | None = None,
         vehicle: str | None = None,
+        crs: str | None = None,
     ) -> bytes:
         """Download the log of lines: ``GET /missions/{mission_id}/lines.{format}``.
 
@@ -2434,12 +2537,15 @@ class AsyncOperations(ABC):
             Its largest depth
         vehicle : str
             Whose soundings, in crowdsourced bathymetry; default: the only vehicle's
+        crs : str
+            System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the
+            mission's own frame, in XYZ longitude and latitude
         """
         return await self._call(Call[bytes](
             "GET",
             f"/missions/{part(mission_id)}/lines.{part(format)}",
             bytes,
-            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle},
+            query={"order": order, "interval_m": interval_m, "min": min, "max": max, "vehicle": vehicle, "crs": crs},
         ))
 
     async def get_profile(

@@ -1180,6 +1180,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/contours.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download the contours
+         * @description Return the map's contours as a file.
+         */
+        get: operations["getContoursFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/soundings.{format}": {
         parameters: {
             query?: never;
@@ -13991,6 +14011,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
@@ -14077,6 +14099,98 @@ export interface operations {
             };
         };
     };
+    getContoursFile: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that the TVU is compared with */
+                order?: components["schemas"]["Order"];
+                /** @description Between contours; default: about ten */
+                interval_m?: number;
+                /** @description A picture's least depth */
+                min?: number;
+                /** @description Its largest depth */
+                max?: number;
+                /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
+                vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
+            };
+            header?: never;
+            path: {
+                /** @description One of dxf */
+                format: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description `.dxf`: depth contours for CAD (DXF R12), in metres */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/vnd.dxf": string;
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no map yet; there is no such format */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     getSoundingsFile: {
         parameters: {
             query?: {
@@ -14090,6 +14204,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
@@ -14102,7 +14218,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.laz`: point cloud (LAZ, UTM) of the accepted soundings of every sonar, the beams of swath sonars among them; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
+            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.laz`: point cloud (LAZ, in UTM unless asked otherwise) of the accepted soundings of every sonar, beams included; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14183,6 +14299,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
@@ -14275,6 +14393,8 @@ export interface operations {
                 max?: number;
                 /** @description Whose soundings, in crowdsourced bathymetry; default: the only vehicle's */
                 vehicle?: string;
+                /** @description System of positions, in metres: `utm`, the zone of the area's middle, or `EPSG:nnnn`; default: the mission's own frame, in XYZ longitude and latitude */
+                crs?: string;
             };
             header?: never;
             path: {
