@@ -323,6 +323,9 @@ def test_the_place_of_the_own_ship_is_taken_as_it_is_now(scene: Scene) -> None:
         return page.get_by_role("button", name="Unmark").is_visible()
 
     scene.wait(is_marked, "her place is marked")
+    tell()
+    # To where it was last, although nothing was heard of it since.
+    expect(by_id(page, "from-here-geofence_left")).to_have_text(re.compile(r"^\d+ m, \d{3}°$"))
     expect(by_id(page, "own-ship-fault-go-to")).to_have_count(0)
     by_id(page, "go-to").click()
     by_id(page, "new-mission").click()

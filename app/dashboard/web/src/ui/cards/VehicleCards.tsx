@@ -3,9 +3,11 @@ import { useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { VehicleView } from "../../api/types";
+import { ownPosition } from "../../state/device/geolocation";
 import { age, clock, distance, metres, percent, speed } from "../../state/format";
 import { localizationWords } from "../../state/localization";
 import { typingFor } from "../../state/orders/orders";
+import { ownPlace, wayTo } from "../../state/ownPlace";
 import { replayed } from "../../state/past/replay";
 import { bringHome, holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../../state/session";
 import {
@@ -30,6 +32,7 @@ import {
   abortOne,
   live,
   mission,
+  ownShip,
   replayStep,
   serviceNow,
   unstopped,
@@ -143,6 +146,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             <dd data-testid={`position-age-${v.name}`}>{age(v.lat_deg === null ? null : vehicle.age_s)}</dd>
           </div>
         </dl>
+        <FromHere to={v} />
       </Steady>
       {v.active ? <Orders of={v} ended={ended} /> : null}
       <Reasons vehicle={vehicle} tone={state.tone} />
@@ -207,6 +211,17 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </div>
       ) : null}
     </article>
+  );
+}
+
+/** How far and which way it is to a vehicle, or to where a lost one was last; nothing where no own place is known. */
+function FromHere({ to: v }: { to: VehicleView }) {
+  const way = wayTo(v, ownPlace(ownShip.value, live.value, ownPosition.value));
+  if (way === null) return null;
+  return (
+    <p class="from-here" title={say("cards.distanceAndTrueBearing")}>
+      {say("cards.fromHere")} <b data-testid={`from-here-${v.name}`}>{way}</b>
+    </p>
   );
 }
 
