@@ -2827,6 +2827,19 @@ export interface components {
             features: components["schemas"]["CrossingFeaturesView"];
         };
         /**
+         * CurrentView
+         * @description The current: what the mission's vehicles last told of it, on average.
+         */
+        CurrentView: {
+            /** Speed Mps */
+            speed_mps: number;
+            /**
+             * Toward Deg
+             * @description Where the water goes, degrees from true north
+             */
+            toward_deg: number;
+        };
+        /**
          * DeliveryState
          * @description How far the telling has come.
          * @enum {string}
@@ -4192,6 +4205,8 @@ export interface components {
              * @description The newest waypoint of each vehicle
              */
             waypoints: components["schemas"]["WaypointView"][];
+            /** @description As its vehicles estimate it, and energy is counted with it; null: none tells of it */
+            current: components["schemas"]["CurrentView"] | null;
             /**
              * Targets
              * @description What is known of the moving targets
@@ -7638,6 +7653,11 @@ export interface components {
             time: string;
             /** Vehicles */
             vehicles: components["schemas"]["VehicleView"][];
+            /**
+             * @description As these estimate it; null: none tells of it
+             * @default null
+             */
+            current: components["schemas"]["CurrentView"] | null;
         };
         /**
          * Verdict
@@ -7733,8 +7753,7 @@ export interface components {
         };
         /**
          * WholeSurveyView
-         * @description What it takes until swath sonars have nothing left to ensonify, or all lines at the distance asked for are flown,
-         *     whatever the budget is.
+         * @description What it takes until nothing is left to ensonify or all lines are flown, whatever the budget is.
          */
         WholeSurveyView: {
             /**
