@@ -192,7 +192,7 @@ export interface paths {
         };
         /**
          * See what stands before the start
-         * @description Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most.
+         * @description Return the checklist: links, the doctor's findings, batteries, places, depths, area, tide, longest duration.
          */
         get: operations["checkMission"];
         put?: never;
