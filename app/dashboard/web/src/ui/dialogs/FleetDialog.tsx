@@ -33,7 +33,7 @@ export function FleetDialog() {
                   say("fleet.mission"),
                   say("fleet.positionAge"),
                   say("charts.battery"),
-                  say("fleet.depth"),
+                  say("cards.vehicleDepth"),
                   say("charts.altitude"),
                   say("fleet.speed"),
                   say("fleet.place"),
