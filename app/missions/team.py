@@ -387,11 +387,18 @@ class Team:
         return [member.spec for member in self.members.values()]
 
     @property
-    def current_mps(self) -> tuple[float, float]:
-        """Velocity of the water, east and north: what vehicles tell of it, on average."""
+    def told_current_mps(self) -> tuple[float, float] | None:
+        """Velocity of the water, east and north: what vehicles tell of it, on average; None: none tells of it."""
         told = [m.report.current_mps for m in self if m.report is not None and m.report.current_mps is not None]
-        east, north = np.mean(told, axis=0) if told else (0.0, 0.0)
+        if not told:
+            return None
+        east, north = np.mean(told, axis=0)
         return float(east), float(north)
+
+    @property
+    def current_mps(self) -> tuple[float, float]:
+        """The same as it is counted with: none while no vehicle tells of one."""
+        return self.told_current_mps or (0.0, 0.0)
 
     @property
     def plannable(self) -> list[Member]:

@@ -239,8 +239,8 @@ for _action in Action:
     responses=_FOUND,
 )
 async def check_mission(reader: Reader, service: Service, mission: Mission) -> PreflightView:
-    """Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most."""
-    return preflight(mission, await service.at_sea())
+    """Return the checklist: links, the doctor's findings, batteries, places, depths, area, tide, longest duration."""
+    return preflight(mission, await service.at_sea(), service.doctor().vehicles)
 
 
 @router.get(

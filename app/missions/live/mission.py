@@ -177,7 +177,7 @@ class LiveMission:
         self._measured_late: Callable[[], None] = _nothing
         self.ships = ShipsAbout(row.id, lambda: self.spec, self.frame, self.team, time_scale)
         """Ships near the mission."""
-        self.feed = LiveFeed(self.broadcaster, self.vehicles.all, targets, self.search_progress, self.ships.message)
+        self.feed = LiveFeed(self.broadcaster, self.vehicles.message, targets, self.search_progress, self.ships.message)
         self._time_scale = time_scale
         self._threads = threads
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}

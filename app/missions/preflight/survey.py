@@ -14,6 +14,7 @@ from app.missions.clock import now
 from app.missions.fleet.interface import LinkState, Position, VehicleRefusedError
 from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
+from app.missions.preflight.doctor import doctor_checks
 from app.missions.preflight.neighbours import neighbour_checks
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
@@ -23,6 +24,7 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.task.constraints import INSET_M, arrival_room_m, from_outside, make_constraints
 from app.missions.task.planner import turn_radius_m
+from app.missions.views.doctor import VehicleDiagnosis
 from app.missions.views.mission import BatteryState, CheckStatus, CheckView, PreflightView
 from app.storage.models import MissionRow
 
@@ -33,10 +35,13 @@ OK, NOTE, WARNING, PROBLEM = CheckStatus.OK, CheckStatus.NOTE, CheckStatus.WARNI
 _BATTERIES = {BatteryState.OK: OK, BatteryState.LOW: WARNING, BatteryState.CRITICAL: PROBLEM}
 
 
-def preflight(live: LiveMission, at_sea: Sequence[MissionRow] = ()) -> PreflightView:
-    """Return what stands before the start of a mission, beside those that are at sea."""
+def preflight(
+    live: LiveMission, at_sea: Sequence[MissionRow] = (), diagnosed: Sequence[VehicleDiagnosis] = ()
+) -> PreflightView:
+    """Return what stands before the start of a mission, beside those that are at sea and what the doctor found."""
     checks = [
         *_vehicles(live),
+        *doctor_checks(live, diagnosed),
         *_batteries(live),
         *recovery_checks(live),
         *_places(live),

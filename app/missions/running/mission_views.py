@@ -29,6 +29,7 @@ def mission_view(live: LiveMission) -> MissionView:
         origin=(frame.origin_lon_deg, frame.origin_lat_deg),
         vehicles=live.vehicles.all(),
         waypoints=live.waypoints.newest,
+        current=live.vehicles.current(),
         targets=live.target_views(),
     )
 

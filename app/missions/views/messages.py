@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.missions.views.alarms import AlarmView
 from app.missions.views.base import View
-from app.missions.views.mission import EventView, MissionSummary, MissionView, VehicleView, WaypointView
+from app.missions.views.mission import CurrentView, EventView, MissionSummary, MissionView, VehicleView, WaypointView
 from app.missions.views.search import SearchMessage
 from app.missions.views.targets import TargetView
 from app.missions.views.traffic import TrafficMessage
@@ -32,6 +32,7 @@ class VehiclesMessage(View):
     type: Literal["vehicles"] = "vehicles"
     time: datetime
     vehicles: list[VehicleView]
+    current: CurrentView | None = Field(default=None, description="As these estimate it; null: none tells of it")
 
 
 class TargetsMessage(View):

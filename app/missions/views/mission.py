@@ -159,6 +159,13 @@ class VehicleView(View):
         return None if self.battery_pct is None else BatteryState.of(self.battery_pct)
 
 
+class CurrentView(View):
+    """The current: what the mission's vehicles last told of it, on average."""
+
+    speed_mps: float
+    toward_deg: float = Field(description="Where the water goes, degrees from true north")
+
+
 class WaypointView(View):
     """One waypoint of one vehicle."""
 
@@ -257,6 +264,9 @@ class MissionView(MissionSummary):
     origin: tuple[Longitude, Latitude] = Field(description="Origin of the local frame, [longitude, latitude]")
     vehicles: list[VehicleView]
     waypoints: list[WaypointView] = Field(description="The newest waypoint of each vehicle")
+    current: CurrentView | None = Field(
+        default=None, description="As its vehicles estimate it, and energy is counted with it; null: none tells of it"
+    )
     targets: list[TargetView] = Field(default_factory=list, description="What is known of the moving targets")
 
     @computed_field  # type: ignore[prop-decorator]

@@ -116,6 +116,12 @@ def test_the_plan_is_drawn_before_the_start_and_follows_the_area_as_it_is_dragge
     assert middle_of(page) != drawn
     page.mouse.up()
 
+    expect(plan).to_have_attribute("data-plan", "new")
+    lines = json.loads(saved(page, "save-plan-geojson", "mission.plan.geojson"))["features"]
+    assert [line["properties"]["vehicle"] for line in lines] == ["sim-1", "sim-2"]
+    assert all(line["geometry"]["type"] == "LineString" for line in lines)
+    assert saved(page, "save-plan-gpx", "mission.plan.gpx").count("<rte>") == 2
+
     page.get_by_text("Single vehicles: speed, endurance").click()
     by_id(page, "endurance_min-sim-2").fill("6")
     expect(by_id(page, "share-sim-2")).to_contain_text(
@@ -124,6 +130,14 @@ def test_the_plan_is_drawn_before_the_start_and_follows_the_area_as_it_is_dragge
     by_id(page, "field-recovery").fill("42.5 -8.7050")
     expect(by_id(page, "plan-fault")).to_contain_text("No plan: recovery.point lies")
     assert len(service.get("/missions")) == before
+
+
+def saved(page: Page, button: str, name: str) -> str:
+    """What a button gives as a file of this name."""
+    with page.expect_download() as download:
+        by_id(page, button).click()
+    assert download.value.suggested_filename == name
+    return download.value.path().read_text(encoding="utf-8")
 
 
 def middle_of(page: Page) -> bytes:

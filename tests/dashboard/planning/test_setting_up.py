@@ -225,6 +225,23 @@ def test_the_whole_fleet_is_one_table(page: Page, service: Service) -> None:
     expect(by_id(page, "fleet-dialog")).not_to_be_visible()
 
 
+def test_who_knows_where_he_is_is_told_how_far_and_which_way_each_vehicle_is(page: Page, service: Service) -> None:
+    mission = service.create(name="To be recovered", vehicles=[{"name": "lost", "kind": "rest"}])
+    place = {"vehicle": "lost", "time_s": 1.79e9, "lat_deg": 41.1852, "lon_deg": -8.7046, "depth_m": 0.0}
+    service.post(f"/missions/{mission}/measurements", {"items": [place]})
+    page.context.grant_permissions(["geolocation"])
+    page.context.set_geolocation({"latitude": 41.1852, "longitude": -8.7193})
+    show(page, mission)
+    expect(by_id(page, "depth-lost")).to_have_text("0.0 m")
+    expect(by_id(page, "from-here-lost")).to_have_count(0)
+    by_id(page, "own-position").click()
+    expect(by_id(page, "from-here-lost")).to_have_text("1.23 km, 090°")
+    page.context.set_geolocation({"latitude": 41.1816, "longitude": -8.7094})
+    expect(by_id(page, "from-here-lost")).to_have_text("567 m, 045°")
+    by_id(page, "open-fleet").click()
+    expect(by_id(page, "fleet-lost")).to_contain_text("567 m, 045°")
+
+
 @pytest.mark.parametrize("width", [390, 1200, 1600])
 def test_nothing_hides_the_areas_lower_edge(page: Page, service: Service, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 900})

@@ -66,6 +66,8 @@ class Scene:
     console: Peer
     mission: str = ""
     lost: str = ""
+    to_come: str = ""
+    """Not started."""
     told: dict[str, dict[str, Any]] = field(default_factory=dict)
     """What vehicles post of themselves, until that changes."""
     over: threading.Event = field(default_factory=threading.Event)
@@ -136,7 +138,7 @@ def scene(built: None, browser: Browser, tmp_path_factory: pytest.TempPathFactor
 
 
 def _describe(scene: Scene) -> None:
-    """Create both missions."""
+    """Create the missions."""
     service, area = scene.service, rectangle(0, 0, SIDE_M, SIDE_M)
     common: dict[str, Any] = {"area": area, "cell_m": 10.0, "step_deadline_s": 3600, "limits": {"max_step_m": 20.0}}
     kinds = dict.fromkeys(POSTING, "rest") | dict.fromkeys(DUNES, "imc")
@@ -147,6 +149,7 @@ def _describe(scene: Scene) -> None:
     scene.mission = service.create(name="All that can fail", vehicles=vehicles, **common)
     lost = [{"name": name, "kind": "imc"} for name in LOST]
     scene.lost = service.create(name="Out of reach", vehicles=lost, **common)
+    scene.to_come = service.create(name="To come", vehicles=[{"name": "no_position", "kind": "imc"}], **common)
     for name in POSTING:
         scene.tell(name)
     scene.tell("low_energy", battery_pct=100.0)
@@ -302,6 +305,19 @@ def expect_alarm(page: Page, words: str) -> None:
     expect(alarm.first).to_contain_text("What to do:")
 
 
+def test_the_checklist_warns_of_what_the_doctor_found_of_its_vehicles(scene: Scene) -> None:
+    page = scene.page
+    (vehicle,) = [one for one in scene.service.get("/doctor")["vehicles"] if one["name"] == "no_position"]
+    (finding,) = [one for one in vehicle["findings"] if one["cause"] == "no_way_home"]
+    show(page, scene.to_come)
+    by_id(page, "start").click()
+    check = by_id(page, "check-doctor.no_position.no_way_home")
+    expect(check).to_have_attribute("data-status", "warning")
+    expect(check).to_contain_text(finding["text"])
+    expect(check).to_contain_text(finding["remedy"])
+    by_id(page, "preflight-close").click()
+
+
 def test_the_place_of_the_own_ship_is_taken_as_it_is_now(scene: Scene) -> None:
     page = scene.page
 
@@ -323,6 +339,9 @@ def test_the_place_of_the_own_ship_is_taken_as_it_is_now(scene: Scene) -> None:
         return page.get_by_role("button", name="Unmark").is_visible()
 
     scene.wait(is_marked, "her place is marked")
+    tell()
+    # To where it was last, although nothing was heard of it since.
+    expect(by_id(page, "from-here-geofence_left")).to_have_text(re.compile(r"^\d+ m, \d{3}°$"))
     expect(by_id(page, "own-ship-fault-go-to")).to_have_count(0)
     by_id(page, "go-to").click()
     by_id(page, "new-mission").click()

@@ -140,6 +140,19 @@ PLACES = """
 """Notes where an element is, picture by picture, each time it has moved."""
 
 
+HEIGHTS = """() => ["depth", "altitude", "water"].map((what) =>
+  parseFloat(document.querySelector(`[data-testid="${what}-sim-1"]`).textContent))"""
+
+
+def test_a_card_tells_how_deep_the_water_is_beside_the_vehicles_own_depth(page: Page, service: Service) -> None:
+    show(page, service.create(name="Over the bottom"))
+    start(page)
+    expect(by_id(page, "card-sim-1")).to_contain_text("Veh. depth")
+    expect(by_id(page, "water-sim-1")).to_have_text(re.compile(r"^\d+\.\d m$"))
+    depth_m, altitude_m, water_m = page.evaluate(HEIGHTS)
+    assert water_m == pytest.approx(depth_m + altitude_m, abs=0.11)
+
+
 def test_a_vehicles_buttons_stay_where_they_are_while_it_tells_more(page: Page, service: Service) -> None:
     # A press met what had come to lie there: the words of a card come and go several times a second.
     vehicles = [{"name": f"sim-{n}", "kind": "sim", "sensor": "dvl"} for n in (1, 2)]

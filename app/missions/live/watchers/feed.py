@@ -10,7 +10,6 @@ from app.missions.clock import now
 from app.missions.live.watchers.broadcast import Broadcaster
 from app.missions.maps.builder import BuiltMap
 from app.missions.views.messages import MapMessage, TargetsMessage, VehiclesMessage
-from app.missions.views.mission import VehicleView
 from app.missions.views.search import SearchMessage, SearchProgress
 from app.missions.views.targets import TargetView
 from app.missions.views.traffic import TrafficMessage
@@ -39,7 +38,7 @@ class LiveFeed:
     def __init__(
         self,
         broadcaster: Broadcaster,
-        vehicles: Callable[[], list[VehicleView]],
+        vehicles: Callable[[], VehiclesMessage],
         targets: Callable[[], list[TargetView]] | None,
         search: Callable[[], SearchProgress | None],
         traffic: Callable[[], TrafficMessage | None] = lambda: None,
@@ -92,7 +91,7 @@ class LiveFeed:
 
     async def _tick(self) -> None:
         while self._broadcaster.watched:
-            self._broadcaster.publish(VehiclesMessage(time=now(), vehicles=self._vehicles()))
+            self._broadcaster.publish(self._vehicles())
             if self._targets is not None:
                 self._broadcaster.publish(TargetsMessage(time=now(), targets=self._targets()))
             self._tell_of_search()

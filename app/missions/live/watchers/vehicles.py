@@ -19,7 +19,8 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.spec.orders import OrderKind
 from app.missions.spec.surface_policy import SurfacePolicy
 from app.missions.team import Member, Swath, Team
-from app.missions.views.mission import FailsafeView, PositionQuality, VehicleView, WaitingCircle
+from app.missions.views.messages import VehiclesMessage
+from app.missions.views.mission import CurrentView, FailsafeView, PositionQuality, VehicleView, WaitingCircle
 from app.missions.views.orders import OrderView
 
 SWATH_KEPT_S = 5.0
@@ -60,6 +61,19 @@ class VehicleViews:
         infos = self._hub.infos()
         shown = [*self._team, *(member for member in self._team.departed.values() if member.report is not None)]
         return [self._view(member, infos.get(member.key)) for member in shown]
+
+    def current(self) -> CurrentView | None:
+        """Return the current as the vehicles that take part estimate it; None while none of them does."""
+        told = self._team.told_current_mps
+        if told is None:
+            return None
+        east, north = told
+        toward_deg = round(math.degrees(math.atan2(east, north)) % 360.0, 1) % 360.0
+        return CurrentView(speed_mps=round(math.hypot(east, north), 3), toward_deg=toward_deg)
+
+    def message(self) -> VehiclesMessage:
+        """Return what those who watch the mission are shown of its vehicles."""
+        return VehiclesMessage(time=now(), vehicles=self.all(), current=self.current())
 
     def of(self, info: VehicleInfo) -> VehicleView | None:
         """Return a vehicle of this name and kind, if it takes part."""

@@ -8,6 +8,7 @@ import pytest
 from app.missions.clock import now
 from app.missions.fleet.interface import FleetEvent, LinkState, Position, VehicleInfo
 from app.missions.flown import Phase
+from app.missions.running.mission_views import mission_view
 from app.missions.service import MissionService
 from tests.support.missions.harbour import sim_spec
 from tests.support.missions.placed import PlacedVehicles
@@ -56,3 +57,31 @@ async def test_once_its_mission_is_over_a_vehicle_is_shown_where_its_link_hears_
     assert shown() == (pytest.approx(20.0, abs=0.01), 0.0, pytest.approx(1.0, abs=0.5))
     service.hub.claim(member.key, "another", ignore, name="the other one")
     assert shown() == (pytest.approx(5.0, abs=0.01), 3.0, pytest.approx(100.0, abs=1.0))
+
+
+@pytest.mark.parametrize(
+    ("told", "shown"),
+    [
+        ([None, None], None),
+        ([(0.3, 0.0), None], (0.3, 90.0)),
+        ([(-0.2, 0.0), (0.0, -0.2)], (0.141, 225.0)),
+        ([(0.0, 0.0), None], (0.0, 0.0)),
+        ([(-0.00001, 0.4), None], (0.4, 0.0)),
+    ],
+)
+async def test_the_current_is_what_vehicles_tell_of_it_on_average_and_whither_it_goes(
+    service: MissionService,
+    monkeypatch: pytest.MonkeyPatch,
+    told: list[tuple[float, float] | None],
+    shown: tuple[float, float] | None,
+) -> None:
+    live = await service.get((await service.create(sim_spec("a", "b", side_m=60.0))).id)
+    placed = PlacedVehicles(live, service.hub, monkeypatch)
+    assert mission_view(live).current is None
+    for name, current_mps in zip(("a", "b"), told, strict=True):
+        member = placed.put(name, (5.0, 5.0, 3.0), (50.0, 5.0, 3.0))
+        assert member.report is not None
+        member.report = replace(member.report, current_mps=current_mps)
+    current = mission_view(live).current
+    assert (None if current is None else (current.speed_mps, current.toward_deg)) == shown
+    assert live.vehicles.message().current == current

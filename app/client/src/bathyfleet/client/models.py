@@ -537,6 +537,14 @@ class CrossoversView(Model):
     features: CrossingFeaturesView
 
 
+class CurrentView(Model):
+    """The current: what the mission's vehicles last told of it, on average."""
+
+    speed_mps: float
+    toward_deg: float
+    """Where the water goes, degrees from true north"""
+
+
 class DeliveryView(Model):
     """What one recipient is told, and what came of it."""
 
@@ -1091,6 +1099,8 @@ class MissionView(Model):
     vehicles: list[VehicleView]
     waypoints: list[WaypointView]
     """The newest waypoint of each vehicle"""
+    current: CurrentView | None
+    """As its vehicles estimate it, and energy is counted with it; null: none tells of it"""
     targets: list[TargetView]
     """What is known of the moving targets"""
     allowed_actions: list[Action]
@@ -2620,6 +2630,8 @@ class VehiclesMessage(Model):
     type: Literal["vehicles"]
     time: datetime
     vehicles: list[VehicleView]
+    current: CurrentView | None
+    """As these estimate it; null: none tells of it"""
 
 
 class VolumeView(Model):

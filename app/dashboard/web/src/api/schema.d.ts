@@ -192,7 +192,7 @@ export interface paths {
         };
         /**
          * See what stands before the start
-         * @description Return the checklist: links, batteries, places, depths, area, tide, and how long it takes at most.
+         * @description Return the checklist: links, the doctor's findings, batteries, places, depths, area, tide, longest duration.
          */
         get: operations["checkMission"];
         put?: never;
@@ -2867,6 +2867,19 @@ export interface components {
             features: components["schemas"]["CrossingFeaturesView"];
         };
         /**
+         * CurrentView
+         * @description The current: what the mission's vehicles last told of it, on average.
+         */
+        CurrentView: {
+            /** Speed Mps */
+            speed_mps: number;
+            /**
+             * Toward Deg
+             * @description Where the water goes, degrees from true north
+             */
+            toward_deg: number;
+        };
+        /**
          * DeliveryState
          * @description How far the telling has come.
          * @enum {string}
@@ -4232,6 +4245,8 @@ export interface components {
              * @description The newest waypoint of each vehicle
              */
             waypoints: components["schemas"]["WaypointView"][];
+            /** @description As its vehicles estimate it, and energy is counted with it; null: none tells of it */
+            current: components["schemas"]["CurrentView"] | null;
             /**
              * Targets
              * @description What is known of the moving targets
@@ -7678,6 +7693,11 @@ export interface components {
             time: string;
             /** Vehicles */
             vehicles: components["schemas"]["VehicleView"][];
+            /**
+             * @description As these estimate it; null: none tells of it
+             * @default null
+             */
+            current: components["schemas"]["CurrentView"] | null;
         };
         /**
          * Verdict

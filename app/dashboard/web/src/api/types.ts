@@ -32,6 +32,7 @@ export type OwnShipView = Complete<Schemas["OwnShipView"]>;
 export type TrafficView = Complete<Schemas["TrafficView"]>;
 export type SearchProgress = Complete<Schemas["SearchProgress"]>;
 export type SearchGridView = Complete<Schemas["SearchGridView"]>;
+export type CurrentView = Complete<Schemas["CurrentView"]>;
 export type WaypointView = Complete<Schemas["WaypointView"]>;
 export type MissionSummary = Complete<Schemas["MissionSummary"]>;
 export type MissionView = Complete<Schemas["MissionView"]>;

@@ -59,7 +59,8 @@ export function widened(bounds: Bounds, places: readonly LngLat[]): Bounds {
 /** Metres between two places, and the direction from one to the other in degrees from north; for short ways. */
 export function wayBetween(from: LngLat, to: LngLat): { metres: number; bearing_deg: number } {
   const scale = metresPerDegree((from[1] + to[1]) / 2);
-  const east = (to[0] - from[0]) * scale.east;
+  // The short way over the date line.
+  const east = (((to[0] - from[0] + 540) % 360) - 180) * scale.east;
   const north = (to[1] - from[1]) * scale.north;
   return {
     metres: Math.hypot(east, north),

@@ -114,21 +114,26 @@ const started = reduce(EMPTY_VIEW, snapshot("m"), 1000);
 
 describe("live messages", () => {
   it("mean nothing before the first snapshot", () => {
-    expect(reduce(EMPTY_VIEW, { type: "vehicles", time: "", vehicles: [vehicle("a", 1, 1)] }, 1)).toBe(
-      EMPTY_VIEW,
-    );
+    expect(
+      reduce(EMPTY_VIEW, { type: "vehicles", current: null, time: "", vehicles: [vehicle("a", 1, 1)] }, 1),
+    ).toBe(EMPTY_VIEW);
   });
 
   it("extend a track only when the vehicle has moved", () => {
     const still = reduce(
       started,
-      { type: "vehicles", time: "", vehicles: [vehicle("a", 1 + 1e-7, 1)] },
+      { type: "vehicles", current: null, time: "", vehicles: [vehicle("a", 1 + 1e-7, 1)] },
       2000,
     );
     expect(still.tracks).toBe(started.tracks);
     const moved = reduce(
       still,
-      { type: "vehicles", time: "", vehicles: [vehicle("a", 1.1, 1), vehicle("b", null, null)] },
+      {
+        type: "vehicles",
+        current: null,
+        time: "",
+        vehicles: [vehicle("a", 1.1, 1), vehicle("b", null, null)],
+      },
       3000,
     );
     expect(moved.tracks.a).toEqual({
@@ -156,6 +161,12 @@ describe("live messages", () => {
     ]);
   });
 
+  it("tell of the current with the vehicles", () => {
+    const current = { speed_mps: 0.3, toward_deg: 74 };
+    const told = reduce(started, { type: "vehicles", time: "", vehicles: [], current }, 2);
+    expect(told.mission?.current).toEqual(current);
+  });
+
   it("change the mission's state and keep its vehicles", () => {
     const view = reduce(started, { type: "mission", mission: { ...mission("m"), state: "paused" } }, 5000);
     expect(view.mission?.state).toBe("paused");
@@ -174,7 +185,11 @@ describe("live messages", () => {
   it("keep a long track within bounds and its newest point exact", () => {
     let view = started;
     for (let i = 1; i <= 9000; i++) {
-      view = reduce(view, { type: "vehicles", time: "", vehicles: [vehicle("a", 1 + i / 1000, 1)] }, i);
+      view = reduce(
+        view,
+        { type: "vehicles", current: null, time: "", vehicles: [vehicle("a", 1 + i / 1000, 1)] },
+        i,
+      );
     }
     expect(view.tracks.a?.old.length).toBeLessThanOrEqual(8200);
     expect(view.tracks.a?.tail.at(-1)).toEqual([10, 1, 2]);
@@ -216,7 +231,7 @@ it("shows a mission that was asked for, and what the live view tells in its plac
   expect(ageSeconds(vehicle("a", 1, 1, 2), asked.vehiclesAt, 6000)).toBe(3);
   const told = reduce(
     asked,
-    { type: "vehicles", time: "2026-11-21T12:00:00Z", vehicles: [vehicle("a", 1, 2)] },
+    { type: "vehicles", current: null, time: "2026-11-21T12:00:00Z", vehicles: [vehicle("a", 1, 2)] },
     7000,
   );
   expect(told.tracks.a?.tail).toHaveLength(1);
@@ -308,7 +323,7 @@ it("the service's clock counts where the page's is wrong, not what messages take
   const told = (view: typeof shown, late_ms: number) =>
     reduce(
       view,
-      { type: "vehicles", time: "2026-11-21T12:00:00Z", vehicles: [] },
+      { type: "vehicles", current: null, time: "2026-11-21T12:00:00Z", vehicles: [] },
       at + late_ms,
     ) as typeof shown;
   expect(told(shown, 900).clockAhead_ms).toBe(0);
@@ -320,7 +335,11 @@ it("the service's clock counts where the page's is wrong, not what messages take
 
 it("what vehicles tell goes on to be kept for charts when the device's clock is set back", () => {
   const heard = (view: LiveView, at: number) =>
-    reduce(view, { type: "vehicles", time: new Date(at).toISOString(), vehicles: [vehicle("a", 0, 0)] }, at);
+    reduce(
+      view,
+      { type: "vehicles", current: null, time: new Date(at).toISOString(), vehicles: [vehicle("a", 0, 0)] },
+      at,
+    );
   const before = heard(withMission(EMPTY_VIEW, { vehicles: [] } as unknown as MissionView, 0), 7_200_000);
   const after = heard(before, 3_600_000);
   expect(after.samples.a).toHaveLength(2);

@@ -108,7 +108,7 @@ export function reduce(view: LiveView, message: LiveMessage, at: number): LiveVi
       return {
         ...view,
         clockAhead_ms: steady(view.clockAhead_ms, Date.parse(message.time) - at),
-        mission: { ...view.mission, vehicles: message.vehicles },
+        mission: { ...view.mission, vehicles: message.vehicles, current: message.current },
         tracks: extendTracks(view.tracks, message.vehicles),
         vehiclesAt: at,
         // A clock that is set back leaves no gap.

@@ -125,6 +125,7 @@ export const MAP = {
     en: "It cannot be shown in space: {fault}",
     pt: "Não pode ser mostrado no espaço: {fault}",
   },
+  "current.current": { en: "Current", pt: "Corrente" },
   "marks.lastHeardAgo": { en: ", last heard {ageS} ago", pt: ", ouvido há {ageS}" },
   "marks.positionOld": { en: ", position {ageS} old", pt: ", posição de há {ageS}" },
   "marks.old": { en: "{old} old", pt: "há {old}" },

@@ -166,6 +166,8 @@ export const PLANNING = {
   "asked.ofItsEndurance": { en: "{it}{seconds} of its endurance", pt: "{it}{seconds} da sua autonomia" },
   "asked.battery": { en: "battery {batteryPct}", pt: "bateria {batteryPct}" },
   "asked.notKnown": { en: "not known", pt: "não conhecida" },
+  "planned.savePlan": { en: "Save plan", pt: "Guardar o plano" },
+  "planned.savePlanAs": { en: "Save plan as {format}", pt: "Guardar o plano como {format}" },
   "planned.planned": {
     en: "Planned: {length} of tracks in {time}",
     pt: "Planeado: {length} de trajetos em {time}",

@@ -11,6 +11,18 @@ export const WATCHING = {
     en: "Age of its position: since it last told where it is",
     pt: "Idade da posição: desde que disse pela última vez onde está",
   },
+  "cards.vehicleDepth": { en: "Vehicle depth", pt: "Profundidade do veículo" },
+  "cards.vehicleDepthShort": { en: "Veh. depth", pt: "Prof. veíc." },
+  "cards.water": { en: "Water", pt: "Água" },
+  "cards.vehicleDepthAndAltitude": {
+    en: "Depth of the water: the vehicle's depth and its altitude together",
+    pt: "Profundidade da água: a profundidade do veículo e a sua altura somadas",
+  },
+  "cards.fromHere": { en: "From here", pt: "Daqui" },
+  "cards.distanceAndTrueBearing": {
+    en: "Distance and true bearing to where it was last, from the own ship or else from this device",
+    pt: "Distância e azimute verdadeiro até onde esteve por último, a partir do navio próprio ou então deste aparelho",
+  },
   "cards.wholeCards": { en: "◂ Whole cards", pt: "◂ Fichas completas" },
   "cards.foldCards": { en: "Fold cards ▸", pt: "Dobrar fichas ▸" },
   "cards.noVehicleTakesPartYetSwitch": {

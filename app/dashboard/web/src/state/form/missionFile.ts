@@ -39,9 +39,11 @@ export function missionFile(
   return `${JSON.stringify(file, null, 2)}\n`;
 }
 
-/** A name for the file that every system takes. */
-export const fileNameOf = (name: string): string =>
-  `${name.trim().replaceAll(/[^\p{L}\p{N}._-]+/gu, "-") || "mission"}.mission.json`;
+/** A name for a file that every system takes, without its ending. */
+export const plainFileName = (name: string): string =>
+  name.trim().replaceAll(/[^\p{L}\p{N}._-]+/gu, "-") || "mission";
+
+export const fileNameOf = (name: string): string => `${plainFileName(name)}.mission.json`;
 
 /** The draft that a file describes. Throws what is wrong with it. */
 export function draftIn(fileName: string, text: string): Draft {

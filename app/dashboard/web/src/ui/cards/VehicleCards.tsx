@@ -3,9 +3,11 @@ import { useSignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import type { VehicleView } from "../../api/types";
+import { ownPosition } from "../../state/device/geolocation";
 import { age, clock, distance, metres, percent, speed } from "../../state/format";
 import { localizationWords } from "../../state/localization";
 import { typingFor } from "../../state/orders/orders";
+import { ownPlace, wayTo } from "../../state/ownPlace";
 import { replayed } from "../../state/past/replay";
 import { bringHome, holdVehicle, rejoin, resumeVehicle, returnVehicle } from "../../state/session";
 import {
@@ -30,12 +32,14 @@ import {
   abortOne,
   live,
   mission,
+  ownShip,
   replayStep,
   serviceNow,
   unstopped,
   type Vehicle,
   vehicles,
 } from "../../state/store";
+import { waterDepth_m } from "../../state/water";
 import { say, sayWith } from "../../words/say";
 import { cardsFolded, cardsWidth, shownFolded } from "../chart/layout";
 import { Button, flips } from "../parts/Controls";
@@ -125,12 +129,12 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </header>
         <dl class="big">
           <div>
-            <dt>{say("fleet.depth")}</dt>
+            <dt title={say("cards.vehicleDepth")}>{say("cards.vehicleDepthShort")}</dt>
             <dd data-testid={`depth-${v.name}`}>{metres(v.depth_m)}</dd>
           </div>
           <div>
             <dt>{say("charts.altitude")}</dt>
-            <dd>{metres(v.altitude_m)}</dd>
+            <dd data-testid={`altitude-${v.name}`}>{metres(v.altitude_m)}</dd>
           </div>
           <div class={v.battery ?? ""}>
             <dt>{byEndurance ? say("asked.energy") : say("charts.battery")}</dt>
@@ -143,6 +147,7 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
             <dd data-testid={`position-age-${v.name}`}>{age(v.lat_deg === null ? null : vehicle.age_s)}</dd>
           </div>
         </dl>
+        <Surroundings of={vehicle} />
       </Steady>
       {v.active ? <Orders of={v} ended={ended} /> : null}
       <Reasons vehicle={vehicle} tone={state.tone} />
@@ -207,6 +212,27 @@ function Card({ vehicle }: { vehicle: Vehicle }) {
         </div>
       ) : null}
     </article>
+  );
+}
+
+/** How deep the water is there, and how far and which way it is to where it was last; neither where it is not known. */
+function Surroundings({ of: { view: v, stale } }: { of: Vehicle }) {
+  const water_m = waterDepth_m(v, live.value && !stale);
+  const way = wayTo(v, ownPlace(ownShip.value, live.value, ownPosition.value));
+  if (water_m === null && way === null) return null;
+  return (
+    <p class="surroundings">
+      {water_m === null ? null : (
+        <span title={say("cards.vehicleDepthAndAltitude")}>
+          {say("cards.water")} <b data-testid={`water-${v.name}`}>{metres(water_m)}</b>
+        </span>
+      )}
+      {way === null ? null : (
+        <span title={say("cards.distanceAndTrueBearing")}>
+          {say("cards.fromHere")} <b data-testid={`from-here-${v.name}`}>{way}</b>
+        </span>
+      )}
+    </p>
   );
 }
 
@@ -430,7 +456,7 @@ function PastCard({ vehicle, depth_m }: { vehicle: Vehicle; depth_m: number | nu
       </header>
       <dl class="big">
         <div>
-          <dt>{say("fleet.depth")}</dt>
+          <dt title={say("cards.vehicleDepth")}>{say("cards.vehicleDepthShort")}</dt>
           <dd data-testid={`depth-${name}`}>{metres(depth_m)}</dd>
         </div>
       </dl>

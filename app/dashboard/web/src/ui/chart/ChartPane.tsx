@@ -18,6 +18,7 @@ import {
 } from "../../state/store";
 import { say } from "../../words/say";
 import { fitAsked } from "../keys";
+import { Current } from "./Current";
 import { overlaid } from "./layout";
 import { MapTools } from "./MapTools";
 import { chartFault, shownChart } from "./mapPicture";
@@ -89,6 +90,7 @@ export function ChartPane() {
     <section class="chart" aria-label={say("chartPane.map")} inert={in3d.value}>
       <div ref={container} class="chart-canvas" data-testid="map" data-ready={chart.value !== null} />
       {frame.value ? <GridLabels frame={frame.value} /> : null}
+      <Current />
       <MapTools onFit={() => chart.value?.fit(overlaid)} />
     </section>
   );

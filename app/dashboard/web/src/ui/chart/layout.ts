@@ -41,7 +41,7 @@ export const mapFirst = computed(
 );
 
 const OVER_THE_MAP =
-  ".legend, .map-tools, .beside-tools > *, .over-map > *, .card, .bottom, .missions, .maplibregl-ctrl-scale, .maplibregl-ctrl-group";
+  ".legend, .current, .map-tools, .beside-tools > *, .over-map > *, .card, .bottom, .missions, .maplibregl-ctrl-scale, .maplibregl-ctrl-group";
 /** Above which the legend lies at the map's upper edge. */
 const UPPER = 0.4;
 

@@ -1,7 +1,11 @@
 import "./FleetDialog.css";
-import type { VehicleView } from "../../api/types";
+import { useSignal, useSignalEffect } from "@preact/signals";
+import { api } from "../../api/client";
+import type { LngLat, OwnShipView, VehicleView } from "../../api/types";
+import { ownPosition } from "../../state/device/geolocation";
 import { age, metres, place, speed } from "../../state/format";
 import { ageSeconds } from "../../state/live";
+import { ownPlace, wayTo } from "../../state/ownPlace";
 import { batteryWords, vehicleState, whenLastHeard } from "../../state/stateNames";
 import { coordinateFormat, fleet, fleetOpen, listedAt, listsLive, missions, now } from "../../state/store";
 import { say } from "../../words/say";
@@ -12,6 +16,7 @@ import { Dialog } from "../parts/Dialog";
 export function FleetDialog() {
   const open = fleetOpen.value;
   const close = sets(fleetOpen, false);
+  const from = useFrom();
   return (
     <Dialog open={open} onClose={close} name="fleet" heading={say("fleet.fleet")} kind="fleet">
       {fleet.value.length === 0 ? (
@@ -28,10 +33,11 @@ export function FleetDialog() {
                   say("fleet.mission"),
                   say("fleet.positionAge"),
                   say("charts.battery"),
-                  say("fleet.depth"),
+                  say("cards.vehicleDepth"),
                   say("charts.altitude"),
                   say("fleet.speed"),
                   say("fleet.place"),
+                  ...(from ? [say("cards.fromHere")] : []),
                   say("fleet.link"),
                 ].map((title) => (
                   <th key={title} scope="col">
@@ -42,7 +48,7 @@ export function FleetDialog() {
             </thead>
             <tbody>
               {fleet.value.map((vehicle) => (
-                <Line key={`${vehicle.kind} ${vehicle.name}`} vehicle={vehicle} />
+                <Line key={`${vehicle.kind} ${vehicle.name}`} vehicle={vehicle} from={from} />
               ))}
             </tbody>
           </table>
@@ -52,7 +58,25 @@ export function FleetDialog() {
   );
 }
 
-function Line({ vehicle: v }: { vehicle: VehicleView }) {
+/** From where the way to each vehicle is told: the own ship as it was told with the lists, else this device; null: not known. */
+function useFrom(): LngLat | null {
+  const ship = useSignal<OwnShipView | null>(null);
+  useSignalEffect(() => {
+    // Asked anew with every answer about the fleet, without which the own ship is not known either.
+    if (!fleetOpen.value || listedAt.value === 0) return;
+    api.traffic().then(
+      ({ own_ship }) => {
+        ship.value = own_ship;
+      },
+      () => {
+        ship.value = null;
+      },
+    );
+  });
+  return ownPlace(ship.value, listsLive.value, ownPosition.value);
+}
+
+function Line({ vehicle: v, from }: { vehicle: VehicleView; from: LngLat | null }) {
   const told = vehicleState(v, undefined);
   const state = listsLive.value ? told : whenLastHeard(told);
   const name = missions.value?.find((m) => m.id === v.mission_id)?.name;
@@ -81,6 +105,7 @@ function Line({ vehicle: v }: { vehicle: VehicleView }) {
           ? "–"
           : place([v.lon_deg, v.lat_deg], coordinateFormat.value)}
       </td>
+      {from ? <td title={say("cards.distanceAndTrueBearing")}>{wayTo(v, from) ?? "–"}</td> : null}
       <td>{link.filter((part) => part !== null).join(" · ")}</td>
     </tr>
   );

@@ -5,11 +5,14 @@ import type { PlanView } from "../../api/types";
 import { vehicleColour } from "../../map/picture/palette";
 import { comingFrom, inAll, inSequence, type PlannedVehicle, total } from "../../state/form/blocks";
 import type { Estimate, Share } from "../../state/form/draft";
+import { type NamedPlan, planFileName, planGeoJson, planGpx } from "../../state/form/planFile";
 import { LatestAsker, plansOf } from "../../state/form/planning";
 import { distance, duration, durations, percent } from "../../state/format";
 import { said } from "../../state/session";
 import { fleet, planned } from "../../state/store";
 import { say } from "../../words/say";
+import { Button } from "../parts/Controls";
+import { save } from "../parts/download";
 import { WholeSurvey } from "./WholeSurvey";
 
 const PERCENT = 100;
@@ -68,6 +71,8 @@ function reasonOf(error: unknown): string {
 
 interface PlannedProps {
   of: Estimate;
+  /** Of the mission. */
+  name: string;
   /** Of the blocks, in their order. */
   names: readonly string[];
   /** Which of them the form's fields describe. */
@@ -76,7 +81,7 @@ interface PlannedProps {
 }
 
 /** What each vehicle does by the plan, or at most while there is none, beside the energy that it has. */
-export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
+export function Planned({ of: { shares }, name, names, turn, fault }: PlannedProps) {
   const { plans: all, fresh } = planned.value ?? { plans: [], fresh: 0 };
   // What is answered late may be of more blocks than there are now.
   const plans = all.slice(0, names.length);
@@ -121,6 +126,12 @@ export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
       ) : (
         <Team shares={shares} partsOf={(name) => (only ? partsOf(name)(only) : [])} />
       )}
+      {state === "new" ? (
+        <SavePlan
+          plans={plans.map((plan, i) => ({ block: several ? (names[i] ?? "") : "", plan }))}
+          name={name}
+        />
+      ) : null}
       {fault ? (
         <p class="reason" role="status" data-testid="plan-fault">
           {several && plans.length < names.length
@@ -130,6 +141,29 @@ export function Planned({ of: { shares }, names, turn, fault }: PlannedProps) {
       ) : null}
       {only && !several ? <Assumptions plan={only} /> : null}
     </div>
+  );
+}
+
+/** Gives the ways that are drawn as files; made here, of what the page has. */
+function SavePlan({ plans, name }: { plans: readonly NamedPlan[]; name: string }) {
+  const button = (format: string, made: (plans: readonly NamedPlan[]) => string, type: string) => {
+    const ending = format.toLowerCase();
+    return (
+      <Button
+        id={`save-plan-${ending}`}
+        kind="link-button"
+        aria-label={say("planned.savePlanAs", { format })}
+        onClick={() => save(planFileName(name, ending), new Blob([made(plans)], { type }))}
+      >
+        {format}
+      </Button>
+    );
+  };
+  return (
+    <p class="save-plan">
+      {say("planned.savePlan")}: {button("GeoJSON", planGeoJson, "application/geo+json")}{" "}
+      {button("GPX", planGpx, "application/gpx+xml")}
+    </p>
   );
 }
 

@@ -201,7 +201,7 @@ function Expected() {
               : say("asked.upToFromTheRecoveryPoint", { farthestM: distance(found.farthest_m) }),
         })}
       </p>
-      <Planned of={found} names={names} turn={draft.turn} fault={fault} />
+      <Planned of={found} name={draft.name} names={names} turn={draft.turn} fault={fault} />
       {mine ? (
         <Forecast
           of={mine}
