@@ -58,9 +58,10 @@ def export(
     """Write a mission's map, soundings or tracks to a file, from the database; no service has to run."""
     settings = command_settings(database_url=database)
     from app.mapping.s44 import Order
-    from app.missions.maps.products import PRODUCTS, FileOption, Product, ProductOptions
+    from app.missions.maps.products import PRODUCTS, Product, ProductOptions
     from app.missions.operations.maps import mission_maps
     from app.missions.service import MissionService
+    from app.missions.views.maps.map import FileOption
 
     wanted = format or "tif"
     if wanted not in PRODUCTS:

@@ -45,7 +45,7 @@ from app.missions.operations.reports import ReportOptions
 from app.missions.report.kinds import REPORTS, ReportKind
 from app.missions.report.texts import Language
 from app.missions.spec.base import Name
-from app.missions.views.maps.map import LayerView, MapView, ProductView, QualityView
+from app.missions.views.maps.map import FileOption, LayerView, MapView, ProductView, QualityView
 from app.missions.views.measurements.crossovers import CrossoversView
 from app.missions.views.measurements.uncertainty import UncertaintyBudgetView
 
@@ -390,6 +390,7 @@ async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
             media_type=kind.media_type,
             href=f"{base}/report.{name}",
             needs_map=True,
+            options=[FileOption.ORDER, FileOption.LANGUAGE],
         )
         for name, kind in REPORTS.items()
     ]
@@ -400,6 +401,7 @@ async def list_products(reader: Reader, mission: Mission) -> list[ProductView]:
             media_type=kind.media_type,
             href=f"{base}/{kind.resource}.{kind.extension}",
             needs_map=not {MAP, CROSSOVERS}.isdisjoint(kind.needs),
+            options=list(kind.options),
         )
         for name, kind in PRODUCTS.items()
         if (SEARCH not in kind.needs or mission.spec.search is not None)

@@ -5,7 +5,6 @@ import zipfile
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from enum import StrEnum
 
 import numpy as np
 import orjson
@@ -46,6 +45,7 @@ from app.missions.maps.file_content import FileContent
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
+from app.missions.views.maps.map import FileOption
 
 MAP, SOUNDINGS, ACCEPTED, RAW, POINTS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CROSSOVERS = (
     "map",
@@ -79,15 +79,6 @@ GEOJSON, KML, TEXT, CSV = (
     "text/plain; charset=utf-8",
     "text/csv; charset=utf-8",
 )
-
-
-class FileOption(StrEnum):
-    """What may be asked of files, as REST calls it."""
-
-    ORDER = "order"
-    INTERVAL = "interval_m"
-    CRS = "crs"
-    VEHICLE = "vehicle"
 
 
 @dataclass(frozen=True)
@@ -443,7 +434,7 @@ def _soundings(material: Material, _: ProductOptions) -> FileContent:
     return material.soundings
 
 
-ORDER, INTERVAL, CRS, VEHICLE = FileOption
+ORDER, INTERVAL, CRS, VEHICLE, _ = FileOption
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
 TIMED_TRACKS = "the vehicles' tracks with times and depths"
 
@@ -503,7 +494,15 @@ PRODUCTS = {
             {MAP, SURVEY},
             filename=lambda facts: file_name(facts.title, facts.mission_id),
         ),
-        ProductKind(MAP, "xyz", TEXT, "longitude, latitude and depth of every cell", _map_xyz, {MAP}, options=(CRS,)),
+        ProductKind(
+            MAP,
+            "xyz",
+            TEXT,
+            "positions and depths of all cells: degrees, or easting and northing",
+            _map_xyz,
+            {MAP},
+            options=(CRS,),
+        ),
         ProductKind(MAP, "csv", CSV, EVERY_SOUNDING, _soundings, {SOUNDINGS}),
         ProductKind(
             MAP, "geojson", GEOJSON, "depth contours, area and tracks", _map_geojson, {MAP, TRACKS}, options=(INTERVAL,)
@@ -525,7 +524,7 @@ PRODUCTS = {
             SOUNDINGS,
             "xyz",
             TEXT,
-            "longitude, latitude and corrected depth of accepted soundings",
+            "positions and corrected depths of accepted soundings: degrees, or easting and northing",
             _soundings,
             {ACCEPTED},
             options=(CRS,),

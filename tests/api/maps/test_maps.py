@@ -230,6 +230,17 @@ async def test_a_system_that_cannot_be_is_refused_by_name(
     assert remedy in error["expected"]
 
 
+async def test_the_list_of_files_says_what_may_be_asked_of_each(client: httpx.AsyncClient, measured: str) -> None:
+    listed = {entry["name"]: entry["options"] for entry in (await client.get(f"{measured}/products")).json()}
+    assert listed["tif"] == ["order", "crs"]
+    assert listed["contours.dxf"] == ["interval_m", "crs"]
+    assert listed["soundings.geojson"] == ["vehicle"]
+    assert listed["report.pdf"] == ["order", "lang"]
+    assert listed["csv"] == listed["s102"] == []
+    takes_crs = {name for name, options in listed.items() if "crs" in options}
+    assert takes_crs == {"tif", "nc", "bag", "xyz", "soundings.xyz", "contours.dxf"}
+
+
 async def test_contours_come_as_a_drawing(client: httpx.AsyncClient, measured: str, tmp_path: Path) -> None:
     answer = await client.get(f"{measured}/contours.dxf", params={"crs": "utm", "interval_m": 0.2})
     assert answer.headers["content-disposition"] == 'attachment; filename="harbour-basin-contours-epsg32629.dxf"'

@@ -128,6 +128,45 @@ def test_the_files_of_a_mission_are_downloaded_from_a_list(page: Page, service: 
     expect(by_id(page, "file-fault")).to_contain_text("set provider.organization and provider.email")
 
 
+def test_files_come_as_they_are_chosen(page: Page, service: Service) -> None:
+    mission = service.create(vehicles=[{"name": name, "kind": "rest"} for name in ("rover", "diver")])
+    items = [
+        {"vehicle": vehicle, "time_s": 1.79e9 + i, "lat_deg": 41.1851 + 1e-5 * i, "lon_deg": -8.7049 + 2e-5 * i}
+        | {"depth_m": 2.0, "range_m": 8.0 + 0.1 * i}
+        for vehicle in ("rover", "diver")
+        for i in range(12)
+    ]
+    service.post(f"/missions/{mission}/measurements", {"items": items})
+    service.get(f"/missions/{mission}/map")
+    show(page, mission)
+    by_id(page, "toggle-files").click()
+    expect(by_id(page, "files-order")).to_have_value("1a")
+    expect(by_id(page, "files-lang")).to_have_value("en")
+    by_id(page, "files-crs").select_option("utm")
+    by_id(page, "files-interval_m").select_option("0.5")
+    by_id(page, "files-order").select_option("special")
+    for name, words in (
+        ("xyz", b"WGS 84 / UTM zone 29N (EPSG:32629)"),
+        ("contours.dxf", b"WGS 84 / UTM zone 29N (EPSG:32629)"),
+        ("geojson", b'"depth_m":10.5'),
+        ("tracks.gpx", b"<gpx"),
+    ):
+        with page.expect_download() as waited:
+            by_id(page, f"file-{name}").click()
+        assert ("epsg32629" in waited.value.suggested_filename) == (b"UTM" in words)
+        assert words in waited.value.path().read_bytes().replace(b": ", b":")
+    # A file of one vehicle asks for it, and no other does.
+    expect(by_id(page, "files").locator("li select")).to_have_count(1)
+    by_id(page, "file-soundings.geojson").click()
+    expect(by_id(page, "file-fault")).to_contain_text("several vehicles have soundings")
+    by_id(page, "vehicle-soundings.geojson").select_option("diver")
+    by_id(page, "file-soundings.geojson").click()
+    expect(by_id(page, "file-fault")).to_contain_text("set provider.organization and provider.email")
+    page.reload()
+    by_id(page, "toggle-files").click()
+    expect(by_id(page, "files-crs")).to_have_value("utm")
+
+
 def test_a_rejected_sounding_is_found_on_the_map_restored_and_rejected_again(page: Page, service: Service) -> None:
     mission = service.create(vehicles=[{"name": "rover", "kind": "rest"}])
     items = [

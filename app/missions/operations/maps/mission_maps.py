@@ -24,7 +24,6 @@ from app.missions.maps.products import (
     SOUNDINGS,
     SURVEY,
     TRACKS,
-    FileOption,
     Material,
     Product,
     ProductOptions,
@@ -41,6 +40,7 @@ from app.missions.operations.maps.sounding_files import accepted_xyz, all_lines,
 from app.missions.operations.scans import search_of
 from app.missions.running.final_maps import FinalMaps
 from app.missions.settings import ProviderSettings
+from app.missions.views.maps.map import FileOption
 from app.missions.views.measurements.soundings import Verdict
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import pings as ping_queries

@@ -1,5 +1,7 @@
 """What is answered about a map, its quality and its products."""
 
+from enum import StrEnum
+
 from pydantic import Field
 
 from app.mapping.layers import Fit, Palette
@@ -94,6 +96,16 @@ class QualityView(View):
     difference: DifferenceView | None = Field(description="To the reference grid; null: there is none that it meets")
 
 
+class FileOption(StrEnum):
+    """What may be asked of a file, by the name of REST's parameter."""
+
+    ORDER = "order"
+    INTERVAL = "interval_m"
+    CRS = "crs"
+    VEHICLE = "vehicle"
+    LANGUAGE = "lang"
+
+
 class ProductView(View):
     """A file that can be downloaded."""
 
@@ -102,3 +114,4 @@ class ProductView(View):
     media_type: str
     href: str = Field(description="Path on this service")
     needs_map: bool = Field(description="Whether a first map is needed")
+    options: list[FileOption] = Field(description="Which of the parameters of its path make a difference to it")

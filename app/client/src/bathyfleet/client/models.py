@@ -42,6 +42,9 @@ ErrorKind: TypeAlias = Annotated[Literal["depth", "water_level", "roll_offset", 
 Failsafe: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "no_position", "low_energy", "link_lost", "traffic", "geofence_left", "separation_lost", "vehicle_error", "other_console", "all_links_lost", "service_restarted"], Open]
 """What may go wrong with a vehicle, or with all of them."""
 
+FileOption: TypeAlias = Annotated[Literal["order", "interval_m", "crs", "vehicle", "lang"], Open]
+"""What may be asked of a file, by the name of REST's parameter."""
+
 Fit: TypeAlias = Annotated[Literal["data", "from_zero", "about_zero"], Open]
 """How a range of colours follows the values: from the least, from zero, or as far below zero as above."""
 
@@ -1384,6 +1387,8 @@ class ProductView(Model):
     """Path on this service"""
     needs_map: bool
     """Whether a first map is needed"""
+    options: list[FileOption]
+    """Which of the parameters of its path make a difference to it"""
 
 
 class ProfilePointView(Model):

@@ -3149,6 +3149,12 @@ export interface components {
             expected: string;
         };
         /**
+         * FileOption
+         * @description What may be asked of a file, by the name of REST's parameter.
+         * @enum {string}
+         */
+        FileOption: "order" | "interval_m" | "crs" | "vehicle" | "lang";
+        /**
          * Finding
          * @description One observation, and what to do about it.
          */
@@ -4977,6 +4983,11 @@ export interface components {
              * @description Whether a first map is needed
              */
             needs_map: boolean;
+            /**
+             * Options
+             * @description Which of the parameters of its path make a difference to it
+             */
+            options: components["schemas"]["FileOption"][];
         };
         /**
          * ProfilePointView
@@ -14045,7 +14056,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.tif`: Cloud-Optimized GeoTIFF with every layer; `.nc`: CF-NetCDF with every layer; `.bag`: Bathymetric Attributed Grid: elevation, uncertainty and numbers of soundings; `.vr.bag`: Bathymetric Attributed Grid of variable resolution: cells by depth; `.tiers.zip`: a GeoTIFF of each tier of cells by depth; `.s102`: Bathymetric Surface for charts (IHO S-102 3.0): depth, uncertainty and quality; `.xyz`: longitude, latitude and depth of every cell; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.kml`: depth contours; `.png`: a picture with axes, colour bar and scale */
+            /** @description `.tif`: Cloud-Optimized GeoTIFF with every layer; `.nc`: CF-NetCDF with every layer; `.bag`: Bathymetric Attributed Grid: elevation, uncertainty and numbers of soundings; `.vr.bag`: Bathymetric Attributed Grid of variable resolution: cells by depth; `.tiers.zip`: a GeoTIFF of each tier of cells by depth; `.s102`: Bathymetric Surface for charts (IHO S-102 3.0): depth, uncertainty and quality; `.xyz`: positions and depths of all cells: degrees, or easting and northing; `.csv`: every sounding, raw and corrected, with its verdict; `.geojson`: depth contours, area and tracks; `.kml`: depth contours; `.png`: a picture with axes, colour bar and scale */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14238,7 +14249,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: longitude, latitude and corrected depth of accepted soundings; `.laz`: point cloud (LAZ, in UTM unless asked otherwise) of the accepted soundings of every sonar, beams included; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
+            /** @description `.csv`: every sounding, raw and corrected, with its verdict; `.xyz`: positions and corrected depths of accepted soundings: degrees, or easting and northing; `.laz`: point cloud (LAZ, in UTM unless asked otherwise) of the accepted soundings of every sonar, beams included; `.geojson`: raw soundings of one vehicle as crowdsourced bathymetry (IHO B-12) */
             200: {
                 headers: {
                     [name: string]: unknown;

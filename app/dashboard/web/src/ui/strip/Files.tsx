@@ -2,12 +2,16 @@ import "./Files.css";
 import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
 import { api, ServiceError } from "../../api/client";
 import type { ProductView, QualityView } from "../../api/types";
+import { chosenHref, type FileOption, fileChoice, taken } from "../../state/fileChoice";
 import { duration, fixed, megabytes } from "../../state/format";
-import { now, selectedId, view } from "../../state/store";
-import { say } from "../../words/say";
+import { mission, now, selectedId, view } from "../../state/store";
+import { LANGUAGES, language, OWN_NAMES, say } from "../../words/say";
 import { mapPicture, type PictureKind, shownChart } from "../chart/mapPicture";
-import { Button } from "../parts/Controls";
+import { Button, Choice, into, same } from "../parts/Controls";
 import { save } from "../parts/download";
+
+/** Metres between contours that are offered. */
+const INTERVALS_M = ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"];
 
 /** A file that is on its way. */
 interface Making {
@@ -23,12 +27,15 @@ export function Files() {
   const quality = useSignal<QualityView | null>(null);
   const making = useSignal<Readonly<Record<string, Making>>>({});
   const fault = useSignal("");
+  const vehicle = useSignal("");
+  const vehicles = useComputed(() => (mission.value?.vehicles ?? []).map(({ name }) => name));
   const hasMap = useComputed(() => view.value.mapVersion > 0);
 
   useSignalEffect(() => {
     const id = selectedId.value;
     products.value = [];
     fault.value = "";
+    vehicle.value = "";
     if (!id) return;
     api.products(id).then(
       (list) => {
@@ -63,7 +70,8 @@ export function Files() {
     note(0);
     fault.value = "";
     try {
-      const file = await api.file(product.href, note, stop.signal);
+      const choice = { lang: language.value, ...fileChoice.value, vehicle: vehicle.value };
+      const file = await api.file(chosenHref(product, choice), note, stop.signal);
       save(file.name, file.content);
     } catch (error) {
       if (!stop.signal.aborted) fault.value = `${product.name}: ${said(error)}`;
@@ -90,6 +98,7 @@ export function Files() {
           ✕ {fault.value}
         </p>
       ) : null}
+      <Options products={products.value} />
       <Quality found={quality.value} />
       <ul>
         {(["png", "pdf"] as const).map((kind) => (
@@ -111,6 +120,15 @@ export function Files() {
               {product.name}
             </Button>
             <span>{product.title}</span>
+            {product.options.includes("vehicle") && vehicles.value.length > 1 ? (
+              <Choice
+                label={say("log.vehicle")}
+                value={vehicle.value}
+                options={[["", say("files.ofWhichVehicle")], ...same(vehicles.value)]}
+                id={`vehicle-${product.name}`}
+                onChoose={into(vehicle)}
+              />
+            ) : null}
             {making.value[product.name] ? (
               <Progress making={making.value[product.name] as Making} name={product.name} />
             ) : null}
@@ -118,6 +136,57 @@ export function Files() {
         ))}
       </ul>
       {hasMap.value ? null : <p class="empty">{say("files.filesOfTheMapFollowWith")}</p>}
+    </div>
+  );
+}
+
+/** What is asked of all files that take it. */
+function Options({ products }: { products: readonly ProductView[] }) {
+  const one = (
+    option: FileOption,
+    words: string,
+    choices: readonly (readonly [string, string])[],
+    value = "",
+  ) =>
+    taken(products, option) ? (
+      <label class="field">
+        {words}
+        <Choice
+          value={fileChoice.value[option] ?? value}
+          options={choices}
+          id={`files-${option}`}
+          onChoose={(chosen) => {
+            fileChoice.value = { ...fileChoice.peek(), [option]: chosen };
+          }}
+        />
+      </label>
+    ) : null;
+  return (
+    <div class="filters" data-testid="file-options">
+      {one("crs", say("files.grid"), [
+        ["", say("files.own")],
+        ["utm", "UTM"],
+      ])}
+      {one("interval_m", say("files.contourInterval"), [
+        ["", say("files.aboutTen")],
+        ...INTERVALS_M.map((metres) => [metres, `${metres} m`] as const),
+      ])}
+      {one(
+        "order",
+        say("files.order"),
+        [
+          ["exclusive", say("files.exclusive")],
+          ["special", say("files.special")],
+          ...same(["1a", "1b", "2"]),
+        ],
+        "1a",
+      )}
+      {one(
+        "lang",
+        say("files.report"),
+        LANGUAGES.map((name) => [name, OWN_NAMES[name]] as const),
+        language.value,
+      )}
     </div>
   );
 }
