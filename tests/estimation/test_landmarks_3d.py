@@ -38,6 +38,7 @@ def nees(truth: FloatArray, known: Landmarks3D) -> FloatArray:
     return np.einsum("ki,kij,kj->k", error, np.linalg.inv(known.covariance_m2[seen]), error)
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_the_filter_says() -> None:
     """Normalised estimation error squared: chi-square with 3 degrees per landmark, independent between landmarks."""
     runs = [[nees(t, k) for t, k in patrol(seed, 25, 4)] for seed in range(50)]

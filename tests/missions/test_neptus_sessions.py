@@ -196,6 +196,7 @@ async def test_a_panel_that_waits_goes_on_after_our_restart(
         await gateway.close()
 
 
+@pytest.mark.slow
 async def test_nobody_is_led_on_after_the_mission(make_gateway: Callable[..., Gateway]) -> None:
     gateway = make_gateway(repeat_after_s=SOON_S)
     await gateway.open()
@@ -262,6 +263,7 @@ async def test_the_servers_log_does_not_grow_while_nothing_happens(
     assert [record.message for record in caplog.records if record.name.startswith("pyftpdlib")] == []
 
 
+@pytest.mark.slow
 async def test_answers_404_hold_no_connections(gateway: Gateway) -> None:
     panel = gateway.real(floor_m, two(), session="Neptus_User_404")
     with flying(panel, 1):

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, show
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 
 def described(page: Page, name: str) -> None:

@@ -49,6 +49,7 @@ def measured(extended: Service) -> str:
     return mission
 
 
+@pytest.mark.slow
 def test_an_added_layer_is_in_rest_and_its_document(extended: Service, measured: str) -> None:
     assert "roughness" in {layer["name"] for layer in extended.get("/layers")}
     assert "roughness" in extended.get(f"/missions/{measured}/map?layer=roughness")["layers"]
@@ -57,6 +58,7 @@ def test_an_added_layer_is_in_rest_and_its_document(extended: Service, measured:
         assert "roughness" in schemas[name]["enum"]
 
 
+@pytest.mark.slow
 def test_an_added_layer_can_be_chosen_on_the_page(extended: Service, measured: str, browser: Browser) -> None:
     page = browser.new_page(base_url=extended.url)
     show(page, measured)
@@ -66,11 +68,13 @@ def test_an_added_layer_can_be_chosen_on_the_page(extended: Service, measured: s
     page.close()
 
 
+@pytest.mark.slow
 def test_an_added_kind_of_file_is_made_on_the_command_line(extended: Service, measured: str) -> None:
     assert "names of the vehicles" in extended.command("export", "--formats")
     assert extended.command("export", measured, "--format", "tracks.txt", "--out", "-") == "these"
 
 
+@pytest.mark.slow
 def test_an_added_kind_of_file_is_downloaded_from_the_list(extended: Service, measured: str, browser: Browser) -> None:
     page = browser.new_page(base_url=extended.url)
     show(page, measured)

@@ -9,7 +9,7 @@ from app.missions.search.examples import example
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 
 def test_an_operator_sees_what_a_search_has_looked_at(watched: Watched, service: Service) -> None:

@@ -9,7 +9,7 @@ from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.missions.specs import AREA
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.timeout(400)]
 
 
 def test_an_operator_sees_where_a_target_is_thought_to_be(watched: Watched, service: Service) -> None:

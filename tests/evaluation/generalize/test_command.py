@@ -32,6 +32,7 @@ def test_the_tasks_are_those_of_the_project() -> None:
     assert list(TASKS) == ["explore", "track", "pcao", "search", "survey", "coverage"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(TASKS))
 def test_every_task_has_its_table_and_its_picture(name: str, tmp_path: Path) -> None:
     result = call("--quick", "--tasks", name, "--floors", "1", "--seeds", "even", "--json", "--out", str(tmp_path))

@@ -2,6 +2,8 @@
 
 import math
 
+import pytest
+
 from imc_bridge import Guidance, WaypointStatus
 from imc_bridge.doctor.doctor import Cause, judge
 from tests.support.imc.sea import Sea, open_sea
@@ -16,6 +18,7 @@ def by_depth(sea: Sea) -> list[tuple[float, float, float]]:
     return sorted(((e, n, float(sea.floor.depth_at_point(e, n))) for e, n in corners), key=lambda corner: corner[2])
 
 
+@pytest.mark.slow
 async def test_vehicle_that_loses_its_position_over_a_slope_comes_up_and_goes_on_when_it_has_it_again() -> None:
     async with open_sea(speed=SPEED, family="slope") as sea:
         (name,) = await sea.ready()
@@ -52,6 +55,7 @@ async def test_vehicle_that_loses_its_position_over_a_slope_comes_up_and_goes_on
         assert WaypointStatus.REFUSED not in sea.statuses(name, 1)
 
 
+@pytest.mark.slow
 async def test_leg_of_a_vehicle_that_loses_its_position_is_ended_and_flown_when_it_has_it_again() -> None:
     async with open_sea(speed=SPEED, family="slope") as sea:
         (name,) = await sea.ready()
