@@ -206,6 +206,8 @@ class LawnmowerPlanner(PlannerBase):
         """How often vehicles got more lines."""
         self._dealt: list[FloatArray] = []
         """All ways that vehicles got, (k, 2) each."""
+        self._left_out_m = 0.0
+        """Metres of lines at a distance that nobody can reach."""
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
@@ -234,12 +236,26 @@ class LawnmowerPlanner(PlannerBase):
         """See :meth:`app.exploration.planner.base.PlannerBase.ways_ahead_m`."""
         return dict(self._routes)
 
+    def lines_left_m(self) -> float:
+        """See :meth:`app.exploration.planner.base.PlannerBase.lines_left_m`."""
+        if self.options.line_spacing_m is None:
+            return 0.0
+        rests = (route_length(route[0], route) for route in self._routes.values() if len(route))
+        return self._left_out_m + sum(rests)
+
+    @property
+    def left_out_m(self) -> float:
+        """How long the lines at a distance are that nobody can reach."""
+        return self._left_out_m
+
     def _remember(self) -> dict[str, Any]:
-        return {"routes": self._routes, "passes": self._passes, "dealt": self._dealt}
+        own = {"routes": self._routes, "passes": self._passes, "dealt": self._dealt}
+        return own | ({"left_out_m": self._left_out_m} if self._left_out_m else {})
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._routes = {k: np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state["routes"].items()}
         self._passes = {k: int(count) for k, count in state.get("passes", {}).items()}
+        self._left_out_m = float(state.get("left_out_m", 0.0))
         dealt = state.get("dealt", list(state["routes"].values()))
         self._dealt = [np.array(way, dtype=np.float64).reshape(-1, 2) for way in dealt]
 
@@ -269,7 +285,8 @@ class LawnmowerPlanner(PlannerBase):
                 passed = vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which][i]) or 0
             self._routes[name] = route[passed:]
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
-        return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
+        terms = {"left_m": left_m} | ({"left_out_m": self._left_out_m} if self._left_out_m else {})
+        return Proposal(positions, 0.0, terms, done=done)
 
     def _lines_for(self, team: Situation, corner_m: float) -> list[FloatArray]:
         """Return each vehicle's route, (k, 2), over lines at the distance asked for, or as close as can be flown."""
@@ -278,15 +295,14 @@ class LawnmowerPlanner(PlannerBase):
         spacing_m, vehicles = self.options.line_spacing_m, Vehicles(en, np.full(len(en), np.nan), left_m)
         direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
         turns = [Turns(float(radius_m), corner_m) for radius_m in radii_m]
-        routes = None
-        if spacing_m is not None:
-            routes = spaced_lines(constraints, BORDER_MARGIN_M, direction_rad, spacing_m, vehicles, turns)
-        if routes is None or spacing_m is None:
+        if spacing_m is None:
             return shared_lines(constraints, en, left_m, radii_m, corner_m, heading_deg)
+        lines = spaced_lines(constraints, BORDER_MARGIN_M, direction_rad, spacing_m, vehicles, turns)
+        self._left_out_m = lines.left_out_m
         if team.crosslines == 0.0:
-            return routes
+            return lines.routes
         across_m = team.crosslines * FreeSpace(constraints, BORDER_MARGIN_M).region.area / spacing_m
-        return with_crosslines(constraints, BORDER_MARGIN_M, direction_rad, across_m, vehicles, routes)
+        return with_crosslines(constraints, BORDER_MARGIN_M, direction_rad, across_m, vehicles, lines.routes)
 
     def _turn_radii_m(self, team: Situation) -> FloatArray:
         """Return the radius of each vehicle's circles, (n_vehicles,); 0 where turns take no way."""
@@ -330,9 +346,13 @@ class LawnmowerPlanner(PlannerBase):
         needs = np.array([self._left(team, k) for k in range(len(en))]) / np.maximum(left_m, LEAST_BUDGET_M)
         other = int(np.argmax(needs))
         donor = team.vehicles[other]
+        if len(self._routes[donor]) < LEAST_SHARED:
+            return False
         kept, given = halves(self._routes[donor], en[i])
-        way_m = route_length(en[i], given)
-        if len(self._routes[donor]) < LEAST_SHARED or way_m >= min(left_m[i], SOONER * needs[other] * left_m[i]):
+        if any(is_cut_off(team.constraints, BORDER_MARGIN_M, en[i], stop) for stop in given):
+            return False
+        way_m = route_length(en[i], FreeSpace(team.constraints, BORDER_MARGIN_M).connect(en[i], given))
+        if way_m >= min(left_m[i], SOONER * needs[other] * left_m[i]):
             return False
         self._routes[donor], self._routes[name] = kept, given
         return True
@@ -348,7 +368,7 @@ class LawnmowerPlanner(PlannerBase):
     def _lead_round(self, team: Situation) -> None:
         """Lead vehicles round zones between them and their next stop: routes that are handed over begin anywhere.
 
-        Stops to which no way leads are left out.
+        Stops to which no way leads go to somebody who gets there; where nobody does they are left out.
         """
         zones = [Polygon(zone) for zone in team.constraints.keep_out]
         for i, name in enumerate(team.vehicles):
@@ -357,11 +377,24 @@ class LawnmowerPlanner(PlannerBase):
                 continue
             route = self._routes[name]
             while len(route) and is_cut_off(team.constraints, BORDER_MARGIN_M, here, route[0]):
-                route = route[1:]
+                beyond = next((k for k, stop in enumerate(route) if not self._cut_off(team, i, stop)), len(route))
+                self._hand_on(team, i, route[:beyond])
+                route = route[beyond:]
             if len(route) and any(zone.intersects(LineString([here, route[0]])) for zone in zones):
                 free = FreeSpace(team.constraints, BORDER_MARGIN_M)
                 route = np.vstack([free.way(here, route[0]), route[1:]])
             self._routes[name] = route
+
+    def _cut_off(self, team: Situation, i: int, stop_m: FloatArray) -> bool:
+        return is_cut_off(team.constraints, BORDER_MARGIN_M, team.positions[i, :2], stop_m)
+
+    def _hand_on(self, team: Situation, i: int, stops_m: FloatArray) -> None:
+        """Give stops (k, 2) that a vehicle cannot reach to one that can; without any they are counted as left out."""
+        for k, name in enumerate(team.vehicles):
+            if k != i and not self._cut_off(team, k, stops_m[0]):
+                self._routes[name] = np.vstack([self._routes[name], stops_m])
+                return
+        self._left_out_m += route_length(stops_m[0], stops_m)
 
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""

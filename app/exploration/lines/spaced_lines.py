@@ -1,6 +1,7 @@
 """Lines at the distance that an operator asks for, dealt so that all vehicles are done at about the same time."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +17,8 @@ SPARE = 0.05
 WHOLE_LINES = 4
 """Vehicles with so many lines each, on average, fly whole ones; else they may share one, in eight parts."""
 PARTS = 8
+LEAST_LEFT = 0.01
+"""Less of the area counts as nothing left out."""
 HALVINGS = 8
 """How often the share of what vehicles can fly is halved in: to less than a hundredth."""
 MOST_SHARE = 2.0**16
@@ -37,6 +40,14 @@ def check_line_count(area: FloatArray, direction_rad: float, spacing_m: float) -
         )
 
 
+@dataclass(frozen=True)
+class SpacedLines:
+    """Each vehicle's route (k, 2), and the metres of lines in parts of the area that no vehicle can reach or fly in."""
+
+    routes: list[FloatArray]
+    left_out_m: float
+
+
 def spaced_lines(
     constraints: Constraints,
     margin_m: float,
@@ -44,11 +55,12 @@ def spaced_lines(
     spacing_m: float,
     vehicles: Vehicles,
     turns: list[Turns],
-) -> list[FloatArray] | None:
-    """Return each vehicle's route (k, 2) over lines at a distance; None where nobody can fly any.
+) -> SpacedLines:
+    """Return each vehicle's route over lines at a distance.
 
     Neighbouring lines go to one vehicle, by what each can fly: as large a share of it from all. Where the lines take
-    more than the team can fly, everybody's route is longer than it can fly, by the same share.
+    more than the team can fly, everybody's route is longer than it can fly, by the same share. Where keep-out zones cut
+    the area into parts between which no way leads, the vehicles in each part share the lines of that part.
 
     Parameters
     ----------
@@ -64,15 +76,19 @@ def spaced_lines(
         What they cost each vehicle.
     """
     routes: list[FloatArray] = [np.zeros((0, 2))] * len(vehicles.en_m)
-    for part, members in parts_of(constraints, FreeSpace(constraints, margin_m), vehicles.en_m):
+    free = FreeSpace(constraints, margin_m)
+    left_m2 = free.region.area
+    for part, members in parts_of(constraints, free, vehicles.en_m):
         sweep = Sweep(part, FreeSpace(part, margin_m), direction_rad)
         there = Vehicles(*(of_all[members] for of_all in vehicles))
         survey = _least_share(sweep, there, [turns[i] for i in members], spacing_m)
         if survey is None:
-            return None
+            continue
+        left_m2 -= sweep.free.region.area
         for i, route in zip(members, survey.routes, strict=True):
             routes[i] = route
-    return routes
+    # Parts that are narrower than a vehicle may fly in are nobody's.
+    return SpacedLines(routes, left_m2 / spacing_m if left_m2 > LEAST_LEFT * free.region.area else 0.0)
 
 
 def with_crosslines(
@@ -85,7 +101,8 @@ def with_crosslines(
 ) -> list[FloatArray]:
     """Return routes with evenly spaced lines across all others at their ends, at least one in each part of the area.
 
-    Each goes to the vehicle that can be done with it first, by the share of what it can fly.
+    Each goes to the vehicle that can be done with it first, by the share of what it can fly. Parts in which nobody
+    flies lines get none.
 
     Parameters
     ----------
@@ -96,15 +113,16 @@ def with_crosslines(
     """
     found, area_m2 = list(routes), FreeSpace(constraints, margin_m).region.area
     for part, members in parts_of(constraints, FreeSpace(constraints, margin_m), vehicles.en_m):
+        flying = [i for i in members if vehicles.left_m[i] > 0.0]
         sweep = Sweep(part, FreeSpace(part, margin_m), direction_rad + np.pi / 2)
         u, mine_m2 = sweep.to_uv(part.area)[:, 0], sweep.free.region.area
         line_m = mine_m2 / max(float(np.ptp(u)), margin_m)
-        count = max(1, round(length_m * mine_m2 / area_m2 / line_m))
+        count = min(max(1, round(length_m * mine_m2 / area_m2 / line_m)), MAX_LINES)
         for line_u in even_lines(float(u.min()), float(u.max()), count):
             tries = []
             for upwards in (True, False):
                 stops = sweep.stops(np.array([line_u]), upwards=upwards)
-                for i in members if len(stops) else ():
+                for i in flying if len(stops) else ():
                     end_m = found[i][-1] if len(found[i]) else vehicles.en_m[i]
                     route = np.vstack([found[i], sweep.free.connect(end_m, stops)])
                     tries.append((route_length(vehicles.en_m[i], route) / max(vehicles.left_m[i], 1.0), i, route))

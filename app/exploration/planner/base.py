@@ -168,6 +168,13 @@ class PlannerBase(ABC):
         """
         return {}
 
+    def lines_left_m(self) -> float:
+        """Return how long those lines are that nobody has been given, or can reach.
+
+        Of lines at a distance that was asked for; 0 without such.
+        """
+        return 0.0
+
     def snapshot(self) -> bytes:
         """Return the planner's memory."""
         errands = self._errands.remember()

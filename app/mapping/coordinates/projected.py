@@ -17,8 +17,11 @@ from app.mapping.types import BathymetricMap, Grid
 UTM = "utm"
 """The zone of a place."""
 
-MOST_STRETCHED = 0.05
+MOST_STRETCHED = 0.01
 """A system whose metre differs by a larger share from one on the ground was made for another place."""
+
+BESIDE_DEG = 4.0
+"""A system may be used so far outside of where it was made for: surveys lie across the borders of zones."""
 
 LEAST_ACCURATE_M = 5.0
 """A datum that WGS 84 is taken to no better than this is none that depths are delivered in."""
@@ -112,12 +115,28 @@ def named_frame(name: str, local: LocalFrame, east_m: float, north_m: float) -> 
         factors = pyproj.Proj(crs).get_factors(lon, lat, errcheck=True)
     except ProjError:
         raise ValueError(f"{frame.statement} does not reach to the area") from None
+    if not _reaches(crs, lat, lon):
+        where = "" if crs.area_of_use is None else f": {crs.area_of_use.name}"
+        raise ValueError(f"{frame.statement} was made for another place{where}")
     stretched = max(abs(factors.tissot_semimajor - 1.0), abs(factors.tissot_semiminor - 1.0))
     if not stretched <= MOST_STRETCHED:
         raise ValueError(f"{frame.statement} was made for another place: lengths at the area are wrong by a lot")
     if frame.accuracy_m(east_m, north_m) > LEAST_ACCURATE_M:
         raise ValueError(f"no way from WGS 84 to {frame.statement} is known to be within {LEAST_ACCURATE_M:g} m")
     return frame
+
+
+def _reaches(crs: pyproj.CRS, lat_deg: float, lon_deg: float) -> bool:
+    """Whether a place lies where a system was made for, or close by, on the same side of the equator as all of that."""
+    area = crs.area_of_use
+    if area is None:
+        return True
+    south = area.south if area.south == 0.0 else area.south - BESIDE_DEG
+    north = area.north if area.north == 0.0 else area.north + BESIDE_DEG
+    # East of its western edge, which may be beyond 180 degrees from its eastern one.
+    width_deg = (area.east - area.west) % 360.0 or 360.0
+    east_deg = (lon_deg - (area.west - BESIDE_DEG)) % 360.0
+    return south <= lat_deg <= north and east_deg <= width_deg + 2.0 * BESIDE_DEG
 
 
 @dataclass(frozen=True)

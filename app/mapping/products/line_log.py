@@ -56,7 +56,7 @@ def lines_csv(check: SurveyCheck, frame: LocalFrame, order: Order) -> bytes:
                 _utc(lines.start_s[k]),
                 _utc(lines.end_s[k]),
                 *(round(float(of[k]), 8) for of in (*begins, *ends)),
-                round(float(np.degrees(lines.heading_rad[k])), 1),
+                round(float(np.degrees(lines.heading_rad[k])), 1) % 360.0,
                 round(float(length_m), 2),
                 round(float(duration_s), 2),
                 round(float(length_m / duration_s), 3) if duration_s > 0.0 else "",

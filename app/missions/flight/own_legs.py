@@ -68,6 +68,11 @@ HARDLY_BEGUN = 0.6
 ANYWHERE = 2.0
 """Who can still fly this many times across the area has nothing left to survey when its planner has no leg for it."""
 
+LINES_FLOWN = "all lines are flown"
+
+LEAST_TOLD_M = 5.0
+"""Less of lines that are left is not told: where they end they are cut short."""
+
 TOLD_PCT = 0.1
 """A mission that leaves more of its area unseen says so when it ends."""
 
@@ -168,14 +173,22 @@ class OwnLegs:
             await asyncio.gather(sending, return_exceptions=True)
         left = [m for m in self._live.team.surveying if self._wants_legs(m) or m.ordered or m.ahead]
         if self._done and any(self._wants_legs(member) for member in left):
-            return self._all_seen() if self._measured else "nobody can fly a further line"
+            return self._all_seen() if self._measured else self._with_lines("nobody can fly a further line")
         team = self._live.team
         gave_up = (m for m in team if m.withdrawal is not None and not m.withdrawal.done)
         if any(m.name not in self._sent_home and self._has_way(m) for m in gave_up):
             return f"nobody surveys any more{left_words(self._spec, self._live.team)}"
         words = "every step is done" if self._spec.budget.steps is not None else "everybody has flown its way"
+        words = self._with_lines(words)
         words += f" but {', '.join(m.name for m in left)}" if left else ""
         return words + team.missed_words({m.name for m in left})
+
+    def _with_lines(self, words: str) -> str:
+        """Return why nobody goes on, in words, and what that says of lines at a distance that was asked for."""
+        if self._spec.planner.options.line_spacing_m is None:
+            return words
+        left_m = self._decider.planner.planner.lines_left_m()
+        return f"{words}: {left_m / 1000.0:.2f} km of lines are not flown" if left_m > LEAST_TOLD_M else LINES_FLOWN
 
     async def _take_lines_back(self) -> bool:
         """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet.
@@ -387,7 +400,9 @@ class OwnLegs:
             idle = not member.ahead and not member.ordered
             if member.name in done and idle and self._spec.ends_at_home(member.spec):
                 energy_m, left_m = self._range.beyond_m(member), member.way_left_m(self._spec)
-                if energy_m is not None and energy_m < left_m:
+                if self._spec.planner.options.line_spacing_m is not None:
+                    why, cause = "no line is left for it", WithdrawalCause.PART_DONE
+                elif energy_m is not None and energy_m < left_m:
                     why, cause = "its energy lasts for its way home and for no further line", WithdrawalCause.CALLED
                 elif left_m > ANYWHERE * float(np.hypot(*np.ptp(self._spec.local_area(), axis=0))):
                     why, cause = "nothing is left for it to survey", WithdrawalCause.PART_DONE

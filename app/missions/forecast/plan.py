@@ -117,6 +117,8 @@ class Plan:
     whole_survey: dict[str, WholeWay] | None = None
     """What each vehicle does until nothing is left to ensonify, or all lines at the distance asked for are flown,
     whatever its budget; None: that was not planned."""
+    left_out_m: float = 0.0
+    """How long the lines at the distance asked for are that no vehicle can reach from where it begins."""
 
 
 def plan(
@@ -166,7 +168,7 @@ def plan(
             )
         return found
 
-    all_of_it = None
+    all_of_it, left_out_m = None, 0.0
     if spec.planner.name in COVERERS:
         routes, done = _swath_lines(spec, members, constraints, begin_m, depth_m, over)
         all_of_it = ways_whole(routes) if done else None
@@ -176,9 +178,9 @@ def plan(
             for i, (member, route) in enumerate(zip(members, routes, strict=True))
         )
     else:
-        routes, whole = _planned(spec, members, constraints, begin_m, depth_m, over)
+        routes, whole, left_out_m = _planned(spec, members, constraints, begin_m, depth_m, over)
         if spec.planner.name == LawnmowerPlanner.name and spec.planner.options.line_spacing_m is not None:
-            all_of_it = ways_whole(routes)
+            all_of_it = None if left_out_m else ways_whole(routes)
     ways_in_m = np.where(
         [from_outside(start, inner, spec) for start in starts_m], np.hypot(*(begin_m - starts_m).T), 0.0
     )
@@ -191,7 +193,7 @@ def plan(
         )
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
-    return Plan(ways, whole, own, depth_m, all_of_it)
+    return Plan(ways, whole, own, depth_m, all_of_it, left_out_m)
 
 
 def _planned(
@@ -201,8 +203,11 @@ def _planned(
     begin_m: FloatArray,
     depth_m: float,
     over: Callable[[], bool],
-) -> tuple[list[FloatArray], bool]:
-    """Ask the planner for its first step and what it plans after that, or fly it ahead where it plans no further."""
+) -> tuple[list[FloatArray], bool, float]:
+    """Ask the planner for its first step and what it plans after that, or fly it ahead where it plans no further.
+
+    Returns each vehicle's way, whether that is all, and how long the lines are that nobody can reach.
+    """
     planner = make_planner(spec)
     builder = MapBuilder(spec.local_area(), forecast_cell_m(spec), spec.accuracy_m)
     builder.build()
@@ -212,7 +217,8 @@ def _planned(
     if ahead:
         legs = {leg.vehicle: leg.target_m[None, :2] for leg in first.legs}
         none = np.zeros((0, 2))
-        return [np.vstack([legs.get(m.name, none), ahead.get(m.name, none)]) for m in members], True
+        left_out_m = planner.left_out_m if isinstance(planner, LawnmowerPlanner) else 0.0
+        return [np.vstack([legs.get(m.name, none), ahead.get(m.name, none)]) for m in members], True, left_out_m
     side = forecast_cell_m(spec)
     grid, _ = make_grid(spec.local_area(), side)
     level = Terrain(np.full((grid.rows + 2, grid.cols + 2), depth_m), side, name="level")
@@ -221,8 +227,8 @@ def _planned(
         for i, place in enumerate(step.here_m):
             here[i].append(place)
         if over():
-            return [np.array(one).reshape(-1, 2) for one in here], False
-    return [np.array(one).reshape(-1, 2) for one in here], True
+            return [np.array(one).reshape(-1, 2) for one in here], False, 0.0
+    return [np.array(one).reshape(-1, 2) for one in here], True, 0.0
 
 
 def _swath_lines(

@@ -144,6 +144,11 @@ def _view(spec: MissionSpec, found: Plan, where: str, *, guessed: bool) -> PlanV
         )
     if not found.own:
         assumptions.append("Drawn as even lines: for so many vehicles and zones the planner lays its own at the start.")
+    if found.left_out_m:
+        assumptions.append(
+            f"{found.left_out_m / 1000.0:.2f} km of lines are left out: keep-out zones cut the area into parts, and no "
+            "vehicle that can fly them begins in one of these."
+        )
     if not found.whole:
         assumptions.append(f"Only what could be planned in {BUDGET_S:g} s of the processor is drawn.")
     if spec.surface_policy is not None and spec.surface_policy.every_min is None:

@@ -434,7 +434,7 @@ def _soundings(material: Material, _: ProductOptions) -> FileContent:
     return material.soundings
 
 
-ORDER, INTERVAL, CRS, VEHICLE, _ = FileOption
+ORDER, INTERVAL, CRS, VEHICLE = FileOption.ORDER, FileOption.INTERVAL, FileOption.CRS, FileOption.VEHICLE
 EVERY_SOUNDING = "every sounding, raw and corrected, with its verdict"
 TIMED_TRACKS = "the vehicles' tracks with times and depths"
 
@@ -536,7 +536,7 @@ PRODUCTS = {
             "point cloud (LAZ, in UTM unless asked otherwise) of the accepted soundings of every sonar, beams included",
             _soundings,
             {POINTS},
-            options={FileOption.CRS},
+            options=(CRS,),
         ),
         ProductKind(
             SOUNDINGS,
@@ -581,7 +581,7 @@ PRODUCTS = {
             "the lines that were flown: when, where, how long and how straight, and what crosses them",
             _lines,
             {CROSSOVERS},
-            options={FileOption.ORDER},
+            options=(ORDER,),
         ),
         ProductKind(
             f"{SEARCH}/obstacles", "geojson", GEOJSON, "obstacles of the search, known and found", _obstacles, {SEARCH}

@@ -140,6 +140,7 @@ async def test_every_file_is_downloaded_under_its_name(client: httpx.AsyncClient
         assert answer.headers["content-type"].startswith(media)
         resource, _, extension = name.partition(".")
         saved = f"harbour-basin.{extension}" if resource == "map" else f"harbour-basin-{resource}.{extension}"
+        saved = saved.replace(".laz", "-epsg32629.laz")
         assert answer.headers["content-disposition"] == f'attachment; filename="{saved}"'
         assert answer.content.startswith(begin)
         if extension == "tif":
@@ -238,7 +239,7 @@ async def test_the_list_of_files_says_what_may_be_asked_of_each(client: httpx.As
     assert listed["report.pdf"] == ["order", "lang"]
     assert listed["csv"] == listed["s102"] == []
     takes_crs = {name for name, options in listed.items() if "crs" in options}
-    assert takes_crs == {"tif", "nc", "bag", "xyz", "soundings.xyz", "contours.dxf"}
+    assert takes_crs == {"tif", "nc", "bag", "xyz", "soundings.xyz", "soundings.laz", "contours.dxf"}
 
 
 async def test_contours_come_as_a_drawing(client: httpx.AsyncClient, measured: str, tmp_path: Path) -> None:

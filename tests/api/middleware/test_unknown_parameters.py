@@ -25,7 +25,7 @@ async def test_a_start_that_was_to_be_tried_only_is_none(client: httpx.AsyncClie
 @pytest.mark.parametrize(
     ("target", "field", "expected"),
     [
-        ("/map.png?layer=slope", "layer", "one of interval_m, max, min, order, vehicle"),
+        ("/map.png?layer=slope", "layer", "one of crs, interval_m, max, min, order, vehicle"),
         ("/map.geojson?interval=2", "interval", "did you mean interval_m?"),
         ("/map/tiles?stp=1", "stp", "did you mean step?"),
         ("/tiles/depth/14/7799/6125.png?colours=3", "colours", "one of max, min"),

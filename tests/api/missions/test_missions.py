@@ -109,7 +109,8 @@ async def test_vehicles_and_planners_are_listed(client: httpx.AsyncClient, missi
     planners = {p["name"]: p for p in (await client.get("/planners")).json()}
     assert {"cao", "random", "lawnmower"} <= set(planners)
     assert planners["cao"]["options"]["type"] == "object"
-    assert set(planners["lawnmower"]["options"]["properties"]) == {"cruise_depth_m", "turn_radius_m"}
+    of_lines = {"cruise_depth_m", "turn_radius_m", "line_spacing_m", "line_heading_deg"}
+    assert set(planners["lawnmower"]["options"]["properties"]) == of_lines
     assert "rollouts" in planners["rollout"]["options"]["properties"]
     assert "rollouts" not in planners["cao"]["options"]["properties"]
 

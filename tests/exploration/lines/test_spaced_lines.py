@@ -29,11 +29,11 @@ def lines_for(
     starts = TEAM[: len(budgets_m)]
     vehicles = Vehicles(starts, np.full(len(starts), np.nan), budgets_m)
     direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
-    routes = spaced_lines(
+    lines = spaced_lines(
         constraints, MARGIN_M, direction_rad, spacing_m, vehicles, [Turns(radius_m, 0.0)] * len(starts)
     )
-    assert routes is not None
-    return routes
+    assert lines.left_out_m == 0.0
+    return lines.routes
 
 
 def across_m(routes: list[FloatArray], heading_deg: float) -> tuple[FloatArray, FloatArray]:
@@ -100,16 +100,37 @@ def test_crosslines_lie_across_all_others_and_go_to_who_is_done_first(length_m: 
     assert max(needs) - min(needs) < (HEIGHT + 2 * WIDTH) / 3000.0
 
 
+BAR = np.array([[-10.0, 140.0], [WIDTH + 10.0, 140.0], [WIDTH + 10.0, 160.0], [-10.0, 160.0]])
+"""A zone that cuts the area in two."""
+PART_M = 140.0 - 2 * MARGIN_M
+
+
 def test_crosslines_are_flown_on_each_side_of_a_zone_that_cuts_the_area() -> None:
-    bar = np.array([[-10.0, 140.0], [WIDTH + 10.0, 140.0], [WIDTH + 10.0, 160.0], [-10.0, 160.0]])
-    constraints, vehicles = Constraints(AREA, (bar,)), Vehicles(TEAM, np.full(3, np.nan), np.full(3, 5000.0))
+    constraints, vehicles = Constraints(AREA, (BAR,)), Vehicles(TEAM, np.full(3, np.nan), np.full(3, 5000.0))
     starts = np.array([[20.0, 20.0], [60.0, 100.0], [60.0, 280.0]])
     vehicles = vehicles._replace(en_m=starts)
     none = [np.zeros((0, 2))] * 3
     ways = with_crosslines(constraints, MARGIN_M, np.pi / 2, 50.0, vehicles, none)
     flown = [LineString(np.vstack([at, way])) for at, way in zip(starts, ways, strict=True) if len(way)]
     assert len(flown) == 2
-    assert not any(line.intersects(Polygon(bar)) for line in flown)
+    assert not any(line.intersects(Polygon(BAR)) for line in flown)
+
+
+def test_lines_in_a_part_where_nobody_is_are_counted_as_left_out() -> None:
+    vehicles = Vehicles(np.array([[20.0, 20.0]]), np.full(1, np.nan), np.full(1, 9000.0))
+    lines = spaced_lines(Constraints(AREA, (BAR,)), MARGIN_M, np.pi / 2, 20.0, vehicles, [Turns(0.0, 0.0)])
+    assert lines.left_out_m == pytest.approx(6 * PART_M, rel=0.02)
+    _, length_m = across_m(lines.routes, 0.0)
+    assert length_m.sum() == pytest.approx(6 * PART_M, rel=0.01)
+
+
+def test_a_vehicle_that_can_fly_nothing_does_not_bring_the_others_lines_closer() -> None:
+    starts = np.array([[20.0, 20.0], [60.0, 280.0]])
+    vehicles = Vehicles(starts, np.full(2, np.nan), np.array([0.0, 30_000.0]))
+    lines = spaced_lines(Constraints(AREA, (BAR,)), MARGIN_M, np.pi / 2, 60.0, vehicles, [Turns(0.0, 0.0)] * 2)
+    _, length_m = across_m(lines.routes, 0.0)
+    assert length_m.sum() == pytest.approx(2 * PART_M, rel=0.01)
+    assert lines.left_out_m == pytest.approx(2 * PART_M, rel=0.02)
 
 
 def test_more_lines_than_a_survey_can_have_are_refused_with_the_least_distance() -> None:
@@ -119,7 +140,9 @@ def test_more_lines_than_a_survey_can_have_are_refused_with_the_least_distance()
     check_line_count(area, np.pi / 2, 1.2)
 
 
-def situation(places: FloatArray, left_m: FloatArray, present: tuple[str, ...]) -> Situation:
+def situation(
+    places: FloatArray, left_m: FloatArray, present: tuple[str, ...], zones: tuple[FloatArray, ...] = ()
+) -> Situation:
     belief = Belief(np.array([[60.0, 150.0]]), np.array([20.0]), np.array([1.0]), np.zeros(1, bool), np.ones(1), 10.0)
     return Situation(
         step=1,
@@ -129,21 +152,27 @@ def situation(places: FloatArray, left_m: FloatArray, present: tuple[str, ...]) 
         headings_rad=np.zeros(len(places)),
         soundings_en_m=np.zeros((0, 2)),
         belief=belief,
-        constraints=Constraints(AREA, max_step_m=60.0, max_depth_m=10.0),
+        constraints=Constraints(AREA, zones, max_step_m=60.0, max_depth_m=10.0),
         left_m=left_m,
     )
 
 
-def fly(options: PlannerOptions, names: tuple[str, ...], lost: str = "", lost_at: int = 0) -> tuple[float, int]:
-    """Let a team fly until all are done; return the length of the lines flown, and the number of rounds."""
+def fly(
+    options: PlannerOptions,
+    starts: dict[str, tuple[float, float]],
+    lost: str = "",
+    lost_at: int = 0,
+    zones: tuple[FloatArray, ...] = (),
+) -> tuple[float, int, float]:
+    """Let a team fly until all are done; return the length of the lines flown, the rounds, and what is left."""
     planner, rng = create_planner("lawnmower", options), np.random.default_rng(0)
-    here = {name: TEAM[k].copy() for k, name in enumerate(names)}
+    here = {name: np.array(start) for name, start in starts.items()}
     flown: list[LineString] = []
     for rounds in range(200):
         if rounds == lost_at:
             here.pop(lost, None)
         present = tuple(here)
-        told = situation(np.array(list(here.values())), np.full(len(here), 1e4), present)
+        told = situation(np.array(list(here.values())), np.full(len(here), 1e4), present, zones)
         proposal = planner.propose(told, rng)
         for name, end in zip(present, proposal.positions[:, :2], strict=True):
             if np.hypot(*(end - here[name])) > 1e-3:
@@ -155,24 +184,45 @@ def fly(options: PlannerOptions, names: tuple[str, ...], lost: str = "", lost_at
         planner = create_planner("lawnmower", options)
         planner.restore(memory)
     assert proposal.done == frozenset(present), "they do not fly for ever"
-    steep = [leg for leg in flown if abs(leg.coords[1][1] - leg.coords[0][1]) > 5.0 * abs(
-        leg.coords[1][0] - leg.coords[0][0]
-    )]  # fmt: skip
-    return sum(leg.length for leg in steep), rounds
+    assert not any(leg.intersects(Polygon(zone)) for leg in flown for zone in zones)
+    ways = [np.diff(np.array(leg.coords), axis=0)[0] for leg in flown]
+    along_m = sum(float(np.hypot(*way)) for way in ways if abs(way[1]) > 5.0 * abs(way[0]))
+    return along_m, rounds, planner.lines_left_m()
+
+
+SOUTH, MIDDLE, NORTH = (20.0, 20.0), (60.0, 100.0), (60.0, 280.0)
+
+
+@pytest.mark.parametrize("starts", [{"a": SOUTH, "b": NORTH}, {"a": NORTH, "b": SOUTH}])
+def test_lines_on_both_sides_of_a_zone_are_flown_by_those_who_are_there(starts: dict[str, tuple[float, float]]) -> None:
+    """Who was done took lines of the other that it could not reach, and these were lost."""
+    options = PlannerOptions(line_spacing_m=10.0, line_heading_deg=0.0)
+    length_m, _, left_m = fly(options, starts, zones=(BAR,))
+    assert length_m >= 2 * 12 * PART_M - 20.0
+    assert left_m == 0.0
+
+
+def test_lines_that_only_a_vehicle_that_is_lost_could_reach_are_told() -> None:
+    options = PlannerOptions(line_spacing_m=20.0, line_heading_deg=0.0)
+    length_m, _, left_m = fly(options, {"a": SOUTH, "b": NORTH}, lost="b", lost_at=2, zones=(BAR,))
+    assert length_m >= 6 * PART_M - 20.0
+    assert left_m > 3 * PART_M
 
 
 def test_a_survey_at_a_distance_ends_when_its_lines_are_flown_though_there_is_way_left() -> None:
     options = PlannerOptions(line_spacing_m=20.0, line_heading_deg=0.0)
-    length_m, _ = fly(options, ("a", "b"))
+    length_m, _, left_m = fly(options, {"a": MIDDLE, "b": NORTH})
+    assert left_m == 0.0
     # The ways to where lines begin may lie along them, too.
     assert 6 * (HEIGHT - 1.0) - 10.0 <= length_m <= 6 * HEIGHT + 2 * HEIGHT
 
 
 def test_the_lines_of_who_is_lost_are_flown_and_shared() -> None:
     options = PlannerOptions(line_spacing_m=10.0, line_heading_deg=0.0)
-    length_m, rounds = fly(options, ("a", "b", "c"), lost="b", lost_at=4)
+    length_m, rounds, left_m = fly(options, {"a": SOUTH, "b": MIDDLE, "c": NORTH}, lost="b", lost_at=4)
+    assert left_m == 0.0
     assert length_m >= 12 * (HEIGHT - 1.0) - 60.0
-    _, alone = fly(options, ("a",))
+    _, alone, _ = fly(options, {"a": SOUTH})
     assert rounds < 0.75 * alone, "whoever is done takes a part of what is left to another"
 
 

@@ -107,6 +107,10 @@ def test_a_system_has_its_name(name: str, epsg: int) -> None:
         ("EPSG:2048", "does not count to the east and to the north"),
         ("EPSG:3857", "was made for another place"),
         ("EPSG:32650", "made for another place|does not reach"),
+        ("EPSG:25832", "was made for another place: Europe between 6°E and 12°E"),
+        ("EPSG:32729", "was made for another place: .*southern hemisphere"),
+        ("EPSG:27700", "was made for another place: United Kingdom"),
+        ("EPSG:2193", "was made for another place: New Zealand"),
     ],
 )
 def test_what_is_no_system_for_the_place_is_refused(name: str, why: str) -> None:

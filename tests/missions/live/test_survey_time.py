@@ -234,8 +234,9 @@ async def test_a_survey_with_lines_at_a_distance_ends_with_the_last_of_them_and_
         "with turns, ways to lines, and half a line more for one"
     )
     assert max(told_s) < 2.0 * lines_s, "the time that is left of the budget is not told"
+    assert live.header.reason == "all lines are flown"
     told = [event.message for event in await events_after(live)]
-    assert {f"{name} goes home: nothing is left for it to survey" for name in "ab"} <= set(told)
+    assert {f"{name} goes home: no line is left for it" for name in "ab"} <= set(told)
 
 
 async def test_when_everybody_goes_home_no_leg_is_to_come(under_way: Callable[..., Awaitable[UnderWay]]) -> None:

@@ -141,6 +141,8 @@ async def export(
     check_options(name, live.facts, chosen)
     if FileOption.VEHICLE in kind.options:
         chosen = replace(chosen, vehicle=await only_vehicle(live, chosen.vehicle))
+    if POINTS in needs:
+        chosen = replace(chosen, crs=chosen.crs or UTM)
     snapshot = await newest_map(live, maps) if {MAP, CROSSOVERS} & set(needs) else None
     material = Material(
         facts=live.facts,

@@ -81,6 +81,8 @@ async def point_cloud(live: LiveMission, frame: ProjectedFrame) -> FileContent:
     await live.journal.flush()
     async with live.database.reading() as session:
         sounding = await sounding_queries.vehicles_of(session, live.id, Verdict.ACCEPTED)
+    # Whoever sends a first ping from here on is not in it.
+    until = await live.pings.newest_block()
     chunks, waiting = await live.pings.contents()
     names = sorted(sounding | {chunk.vehicle for chunk in chunks} | waiting.keys())
     file = unnamed_file()
@@ -101,7 +103,7 @@ async def point_cloud(live: LiveMission, frame: ProjectedFrame) -> FileContent:
             time_s = pings.time_s[at.ping]
             cloud.add(vehicle, time_s, at.east_m, at.north_m, at.depth_m, beams.sd_m, at.angle_rad)
 
-    async for vehicle, pings in live.pings.all_accepted():
+    async for vehicle, pings in live.pings.all_accepted(until):
         await asyncio.to_thread(add_beams, vehicle, pings)
     await asyncio.to_thread(cloud.close)
     return FileContent.of_file(file)

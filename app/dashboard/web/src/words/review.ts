@@ -37,6 +37,10 @@ export const REVIEW = {
   "corrections.levelM": { en: "Level, m", pt: "Nível, m" },
   "corrections.deviationM": { en: "Standard deviation, m", pt: "Desvio padrão, m" },
   "corrections.applyLevel": { en: "Apply this level", pt: "Aplicar este nível" },
+  "corrections.applyLevelInstead": {
+    en: "Apply this level in place of the table",
+    pt: "Aplicar este nível em vez da tabela",
+  },
   "corrections.tideTable": { en: "Tide table from a file…", pt: "Tabela de marés de um ficheiro…" },
   "corrections.typeNumbers": { en: "Type a number into each field.", pt: "Escreva um número em cada campo." },
   "corrections.soundSpeed": { en: "Sound speed", pt: "Velocidade do som" },

@@ -31,7 +31,14 @@ import {
   vehicleFieldsOf,
   withTexts,
 } from "./missionFields";
-import { fliesCrosslines, optionFault, optionTexts, typedOptions, wayForLines } from "./plannerOptions";
+import {
+  EVEN_LINES,
+  fliesCrosslines,
+  optionFault,
+  optionTexts,
+  typedOptions,
+  wayForLines,
+} from "./plannerOptions";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -313,7 +320,7 @@ function eachByLines(draft: Draft, ring: readonly LngLat[]): number | null {
   const vehicles = vehicleNames(draft).length;
   if (!(spacing_m > 0) || vehicles === 0 || ring.length < 3) return null;
   const { area_m2, east_m, north_m } = sizeOf(ring);
-  const each_m = wayForLines(draft.planner, area_m2 / (spacing_m * vehicles), Math.hypot(east_m, north_m));
+  const each_m = wayForLines(draft, area_m2 / (spacing_m * vehicles), Math.hypot(east_m, north_m));
   return Number((each_m / 1000).toPrecision(3));
 }
 
@@ -427,7 +434,9 @@ function blocksFault(draft: Draft, cell_m: number): string {
 
 /** What is wrong with how far lines are to be apart: with the number, or with the way that it asks of each vehicle. */
 function spacingFault(draft: Draft): string {
-  const fault = numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE);
+  const fault =
+    numberFault(say("draft.distanceOfLines"), draft.spacing_m, SIZE) ||
+    (draft.planner === EVEN_LINES ? optionFault("line_spacing_m", draft.spacing_m) : "");
   if (fault) return fault;
   const most_km = SPEC["budget.km_per_vehicle"].maximum;
   const each_km = Math.max(...allBlocks(draft).map(({ ring }) => eachByLines(draft, ring) ?? 0));

@@ -85,6 +85,14 @@ describe("lines at a distance", () => {
     expect(budget?.km_per_vehicle).toBeGreaterThan(1.3 * (adaptive.budget?.km_per_vehicle as number));
   });
 
+  it("have way enough for lines across, and bounds of their own", () => {
+    const each_km = (changes: Partial<Draft>) =>
+      toMission({ ...lines, ...changes }).budget?.km_per_vehicle as number;
+    expect(each_km({ crosslines_pct: "50" })).toBeGreaterThan(1.1 * each_km({ crosslines_pct: "0" }));
+    expect(faultsOf({ ...lines, spacing_m: "0.2" }).spacing_m).toContain("between 0.5 and");
+    expect(faultsOf({ ...lines, planner: "cao", spacing_m: "0.9" })).toEqual({});
+  });
+
   it("have lines across all others, as full coverage has", () => {
     const spaced = { ...lines, crosslines_pct: "10" };
     expect(toMission(spaced)).toMatchObject({ coverage: { crosslines_pct: 10 } });

@@ -86,7 +86,12 @@ export function typedOptions({ planner, options, base, spacing_m }: Draft): Plan
 
 /**
  * How far a vehicle may fly for lines of so many metres over an area that is so many metres across. Even lines end the
- * mission when they are flown: ways between them, one line more than others have, and the way to the first fit in, too.
+ * mission when they are flown: ways between them, lines across, one line more than others have, and the way to the first
+ * fit in, too.
  */
-export const wayForLines = (planner: string, lines_m: number, across_m: number): number =>
-  planner === EVEN_LINES ? 1.15 * lines_m + 2 * across_m : lines_m;
+export const wayForLines = (
+  { planner, crosslines_pct }: Pick<Draft, "planner" | "crosslines_pct">,
+  lines_m: number,
+  across_m: number,
+): number =>
+  planner === EVEN_LINES ? (1.15 + Number(crosslines_pct) / 100) * lines_m + 3 * across_m : lines_m;

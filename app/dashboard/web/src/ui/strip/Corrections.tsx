@@ -132,7 +132,7 @@ function WaterLevel({ found, busy, change, fault }: PartProps) {
       </div>
       <p class="row">
         <Button id="corrections-set-level" commands busy={busy.value} onClick={stated}>
-          {say("corrections.applyLevel")}
+          {say(table ? "corrections.applyLevelInstead" : "corrections.applyLevel")}
         </Button>
         {whyNotCommand.value ? null : (
           <FileButton accept=".tid,.txt,.csv,.tsv" id="corrections-tide-file" onText={read}>
@@ -143,6 +143,9 @@ function WaterLevel({ found, busy, change, fault }: PartProps) {
     </section>
   );
 }
+
+/** "low – high", or the one that both are. */
+const between = (ends: readonly [number, number]): string => [...new Set(ends.map(plain))].join(" – ");
 
 const SET_IN_SONARS_MPS = 1500;
 
@@ -170,8 +173,8 @@ function SoundSpeed({ found, busy, change, fault }: PartProps) {
       <p data-testid="corrections-sound-speed">
         {speed && ends
           ? say("corrections.profile", {
-              depths: ends.depths.map(plain).join(" – "),
-              speeds: ends.speeds.map(plain).join(" – "),
+              depths: between(ends.depths),
+              speeds: between(ends.speeds),
               count: count(speed.profile.length),
               assumed: plain(speed.assumed_mps),
               source: speed.source,
