@@ -316,4 +316,6 @@ async def test_of_a_mission_that_ended_phase_and_battery_are_told_after_a_restar
     assert after.battery_pct == pytest.approx(before.battery_pct, abs=1.0)
     assert after.energy_left_pct == pytest.approx(before.energy_left_pct, abs=2.0)
     figures = ("flown_m", "on_plan_m", "idle_s")
-    assert [getattr(after, name) for name in figures] == [getattr(before, name) for name in figures]
+    # What it drifts at home until the service ends is written down with the next thing that happens.
+    expected = [pytest.approx(getattr(before, name), abs=0.5) for name in figures]
+    assert [getattr(after, name) for name in figures] == expected
