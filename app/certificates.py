@@ -71,15 +71,20 @@ def wrong_with_authorities(file: Path) -> str:
     return ""
 
 
-def when_not_valid(file: Path, at: datetime) -> str:
-    """Return in words when the first certificate of a file is valid that is not at a time; empty where all are."""
-    for certificate in CERTIFICATE.findall(_text(file)):
-        begin, end = _validity(certificate)
-        if at > end:
-            return f"is valid until {end:%Y-%m-%d %H:%M} UTC: renew it"
-        if at < begin:
-            return f"is valid from {begin:%Y-%m-%d %H:%M} UTC on: is this machine's clock right?"
-    return ""
+def when_not_valid(file: Path, at: datetime, *, any_will_do: bool = False) -> str:
+    """Return in words when the first certificate of a file is valid that is not at a time; empty where all are.
+
+    ``any_will_do``: of authorities one that is valid is enough, since bundles keep old ones.
+    """
+    found = [_words(*_validity(certificate), at) for certificate in CERTIFICATE.findall(_text(file))]
+    wrong = [words for words in found if words]
+    return wrong[0] if wrong and (len(wrong) == len(found) or not any_will_do) else ""
+
+
+def _words(begin: datetime, end: datetime, at: datetime) -> str:
+    if at > end:
+        return f"is valid until {end:%Y-%m-%d %H:%M} UTC: renew it"
+    return "" if at >= begin else f"is valid from {begin:%Y-%m-%d %H:%M} UTC on: is this machine's clock right?"
 
 
 def _text(file: Path) -> str:

@@ -72,14 +72,16 @@ def test_a_file_that_trusts_nobody_stops_the_start(check: Check, tmp_path: Path)
     assert f"ca_file {str(broken)!r} cannot be used: it holds no certificate (PEM)" in problem
 
 
-def test_certificates_that_are_not_valid_now_are_told(check: Check, authority: Authority) -> None:
+def test_certificates_that_are_not_valid_now_are_told(check: Check, authority: Authority, tmp_path: Path) -> None:
     """The service starts with them all the same: vehicles have to be stopped on that day, too."""
     chain, key = authority.sign("auv.example", until="20210101000000Z")
+    (bundle := tmp_path / "bundle.pem").write_text(chain.read_text() + authority.file.read_text())
     problems, said = check(
         f'tls_certificate = "{chain}"\ntls_key = "{key}"\n[compute]\nscheduler = "tls://deck:8786"\n'
-        f'tls_ca_file = "{authority.file}"\ntls_certificate = "{chain}"\ntls_key = "{key}"\n'
+        f'tls_ca_file = "{bundle}"\ntls_certificate = "{chain}"\ntls_key = "{key}"\n'
     )
     assert problems == []
+    # Of authorities' bundles nobody takes old ones out.
     assert said == (
         f"warning: tls_certificate {chain} is valid until 2021-01-01 00:00 UTC: renew it\n"
         f"warning: compute.tls_certificate {chain} is valid until 2021-01-01 00:00 UTC: renew it\n"
