@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import psutil
 import pypdfium2
 import pytest
 
@@ -22,6 +21,7 @@ from app.missions.maps import snapshot
 from app.missions.report.texts import DECIMAL_POINTS, Language
 from app.settings import Settings
 from tests.support.api.rest import mission_spec, running, soundings
+from tests.support.children import new_children
 from tests.support.mapping.tracks import flown, lawnmower, pinged
 from tests.support.missions.specs import rectangle
 from tests.support.waiting import until
@@ -306,16 +306,16 @@ async def test_reports_of_large_maps_end_with_their_client_and_tell_when_they_ar
     server: Server, client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(snapshot, "LARGE_CELLS", 1)
-    path, here = await swath_survey(client), psutil.Process()
+    path, making = await swath_survey(client), new_children()
     leaving = asyncio.create_task(client.get(f"{path}/report.html"))
-    await until(here.children, "a process makes the report")
-    (process,) = here.children()
+    await until(making, "a process makes the report")
+    (process,) = making()
     leaving.cancel()
-    await until(lambda: not process.is_running() or process.status() == psutil.STATUS_ZOMBIE, "it has ended")
-    await until(lambda: not here.children(), "nothing is left of it")
+    await until(lambda: process not in making(), "it has ended")
+    await until(lambda: not making(), "nothing is left of it")
     staying = asyncio.create_task(client.get(f"{path}/map.tif"))
-    await until(here.children, "a process makes the map")
-    here.children()[0].kill()
+    await until(making, "a process makes the map")
+    making()[0].kill()
     answer = await staying
     assert answer.status_code == 503
     assert answer.headers["retry-after"]
