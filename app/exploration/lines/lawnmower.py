@@ -38,9 +38,9 @@ SHARED = Pattern(parts=8)
 ACROSS = 0.9
 """Lines lie across the longer axis where the ground is closer to them by this factor, squared and on average."""
 LEAST_SHARED = 4
-"""Who has as many ends of lines left to fly, those of two, can leave one to another."""
+"""A vehicle hands lines over only while it has so many ends of lines left, those of two lines."""
 SOONER = 0.8
-"""Who takes lines of another is done with them in this part of the time that the other would be done in, or sooner."""
+"""A vehicle takes lines over only where it flies them within this part of the time that their vehicle still needs."""
 LEAST_LEG_M = 5.0
 """Who can fly no farther is done."""
 CORNER_LOSS = 0.4
@@ -285,8 +285,7 @@ class LawnmowerPlanner(PlannerBase):
                 passed = vertices_passed(team.positions[i, :2], end_m, route, steps[i], cuts[which][i]) or 0
             self._routes[name] = route[passed:]
         left_m = float(sum(self._left(team, i) for i in range(len(positions))))
-        terms = {"left_m": left_m} | ({"left_out_m": self._left_out_m} if self._left_out_m else {})
-        return Proposal(positions, 0.0, terms, done=done)
+        return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
     def _lines_for(self, team: Situation, corner_m: float) -> list[FloatArray]:
         """Return each vehicle's route, (k, 2), over lines at the distance asked for, or as close as can be flown."""
@@ -349,7 +348,7 @@ class LawnmowerPlanner(PlannerBase):
         if len(self._routes[donor]) < LEAST_SHARED:
             return False
         kept, given = halves(self._routes[donor], en[i])
-        if any(is_cut_off(team.constraints, BORDER_MARGIN_M, en[i], stop) for stop in given):
+        if any(self._cut_off(team, i, stop) for stop in given):
             return False
         way_m = route_length(en[i], FreeSpace(team.constraints, BORDER_MARGIN_M).connect(en[i], given))
         if way_m >= min(left_m[i], SOONER * needs[other] * left_m[i]):
@@ -376,7 +375,7 @@ class LawnmowerPlanner(PlannerBase):
             if not team.moves[i]:
                 continue
             route = self._routes[name]
-            while len(route) and is_cut_off(team.constraints, BORDER_MARGIN_M, here, route[0]):
+            while len(route) and self._cut_off(team, i, route[0]):
                 beyond = next((k for k, stop in enumerate(route) if not self._cut_off(team, i, stop)), len(route))
                 self._hand_on(team, i, route[:beyond])
                 route = route[beyond:]
@@ -389,7 +388,7 @@ class LawnmowerPlanner(PlannerBase):
         return is_cut_off(team.constraints, BORDER_MARGIN_M, team.positions[i, :2], stop_m)
 
     def _hand_on(self, team: Situation, i: int, stops_m: FloatArray) -> None:
-        """Give stops (k, 2) that a vehicle cannot reach to one that can; without any they are counted as left out."""
+        """Give stops (k, 2) that a vehicle cannot reach to one that can; if there is none, count them as left out."""
         for k, name in enumerate(team.vehicles):
             if k != i and not self._cut_off(team, k, stops_m[0]):
                 self._routes[name] = np.vstack([self._routes[name], stops_m])

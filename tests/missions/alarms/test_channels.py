@@ -188,6 +188,7 @@ async def test_a_mail_server_that_falls_silent_does_not_keep_the_service_from_en
         await asked.wait()
         async with asyncio.timeout(10):  # less than a command to the server may take
             await watch.dispatcher.close()
+        assert not over.is_set(), "it ended while the server was still silent"
         over.set()
 
 
