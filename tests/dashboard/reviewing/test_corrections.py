@@ -44,6 +44,11 @@ def test_levels_tables_and_profiles_correct_what_was_measured(
     tide, sound = by_id(page, "corrections-tide"), by_id(page, "corrections-sound-speed")
     expect(sound).to_contain_text("Not corrected")
 
+    expect(by_id(page, "corrections-tide-source")).to_have_value("")
+    by_id(page, "corrections-level").fill("0.5")
+    by_id(page, "corrections-set-level").click()
+    expect(tide).to_have_text("0.5 m (stated by the operator)")
+
     by_id(page, "corrections-level").fill("1,25")
     by_id(page, "corrections-tide-sd").fill("0.1")
     by_id(page, "corrections-tide-source").fill("harbour gauge")

@@ -1,6 +1,7 @@
 import "./Corrections.css";
 import { type Signal, useSignal, useSignalEffect } from "@preact/signals";
 import { api } from "../../api/client";
+import SPEC from "../../api/mission.json";
 import type { CorrectionsView } from "../../api/types";
 import { whyNotCommand } from "../../state/access";
 import { profileEnds, profileOf } from "../../state/analysis/soundSpeedProfile";
@@ -78,7 +79,8 @@ function WaterLevel({ found, busy, change, fault }: PartProps) {
   const { tide, tide_table: table } = found;
   const level = useSignal(plain(tide.level_m));
   const sd = useSignal(plain(tide.sd_m));
-  const source = useSignal(table ? "" : tide.source);
+  const isNamed = !table && tide.source !== SPEC["tide.source"].default;
+  const source = useSignal(isNamed ? tide.source : "");
   const stated = () => {
     const [level_m, sd_m] = [numberOf(level), numberOf(sd)];
     if (level_m === null || sd_m === null) {
