@@ -54,7 +54,11 @@ def export_site(
     site: Site,
     format: Annotated[  # noqa: A002 - the option's name
         str,
-        typer.Option("--format", "-f", help="tif, png or xyz: its map; changes.tif, changes.csv or changes.png."),
+        typer.Option(
+            "--format",
+            "-f",
+            help="tif, png or xyz: its map; geojson, kml or dxf: contours; changes.tif, changes.csv or changes.png.",
+        ),
     ] = "tif",
     earlier: Annotated[
         str | None,
@@ -66,6 +70,10 @@ def export_site(
     confidence: Annotated[
         float, typer.Option(min=0.5, max=0.9999, help="Of unchanged ground this share is not called changed.")
     ] = 0.95,
+    crs: Annotated[
+        str | None,
+        typer.Option(help="System of positions in tif, xyz, dxf: utm or EPSG:32629, ….", show_default="the site's own"),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; '-' is stdout.", show_default="in output_dir")
     ] = None,
@@ -73,11 +81,14 @@ def export_site(
 ) -> None:
     """Write a site's map, or what changed between two of its surveys, to a file; no service has to run."""
     settings = command_settings(database_url=database)
-    from app.missions.maps.site_maps import CHANGE_FILES, MAP_FILES, changes_file, site_map_file
+    from app.missions.maps.site_files import CHANGE_FILES, MAP_FILES, changes_file, site_map_file
 
     formats = [*MAP_FILES, *(f"{CHANGES}{ending}" for ending in CHANGE_FILES)]
     if format not in formats:
         raise typer.BadParameter(f"{format!r} is not one of {', '.join(formats)}", param_hint="--format")
+    if crs is not None and not (format in MAP_FILES and MAP_FILES[format].projected):
+        heeding = ", ".join(name for name, kind in MAP_FILES.items() if kind.projected)
+        raise typer.BadParameter(f"{format} does not depend on it, {heeding} do", param_hint="--crs")
 
     async def run(service: "MissionService") -> "Product":
         meant = (await _meant(service, site)).id
@@ -85,7 +96,7 @@ def export_site(
             if survey.left_out:
                 typer.echo(f"note: mission {survey.mission_id} is left out: {survey.left_out}", err=True)
         if format in MAP_FILES:
-            return site_map_file(format, await service.site_models.map(meant))
+            return site_map_file(format, await service.site_models.map(meant), crs)
         change = await service.site_models.changes(meant, earlier, later, confidence)
         return changes_file(format.removeprefix(CHANGES), change)
 

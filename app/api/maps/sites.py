@@ -1,6 +1,7 @@
 """Sites: places that are surveyed again and again, their map, and what changed between surveys."""
 
 import asyncio
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Path, Query, Response
@@ -12,7 +13,7 @@ from app.api.maps.maps import file_answer
 from app.api.mission import Mission
 from app.api.schemas import API, SiteChoice
 from app.api.state import Service
-from app.missions.maps.site_maps import CHANGE_FILES, MAP_FILES, Maker, changes_file, site_map_file
+from app.missions.maps.site_files import CHANGE_FILES, MAP_FILES, ChangeFile, MapFile, changes_file, site_map_file
 from app.missions.running.mission_views import mission_view
 from app.missions.spec.site import SiteChanges, SiteId, SiteSpec
 from app.missions.views.maps.sites import ChangesView, SiteMapView, SiteView, SurveyView
@@ -38,6 +39,16 @@ _Later = Annotated[SiteId | None, Query(alias="to", description="Mission of the 
 _Confidence = Annotated[
     float,
     Query(gt=0, lt=1, allow_inf_nan=False, description="Of unchanged ground this share is not called changed"),
+]
+
+_Crs = Annotated[
+    str | None,
+    Query(
+        max_length=40,
+        description="System of positions in `.tif`, `.xyz` and `.dxf`, in metres: `utm`, the zone of the site's "
+        "middle, or `EPSG:nnnn`; default: the site's own frame",
+        examples=["utm"],
+    ),
 ]
 
 EXAMPLE_SITE = {
@@ -149,17 +160,17 @@ async def get_changes(
     return await asyncio.to_thread(change.view)
 
 
-def _files(kinds: dict[str, tuple[str, str, Maker]]) -> dict[int | str, dict[str, Any]]:
+def _files(kinds: Mapping[str, MapFile | ChangeFile]) -> dict[int | str, dict[str, Any]]:
     binary = {"schema": {"type": "string", "format": "binary"}}
     return problems("format-not-found") | {
         200: {
-            "description": "; ".join(f"`.{ending}`: {title}" for ending, (_, title, _) in kinds.items()),
-            "content": {media.partition(";")[0]: binary for media, _, _ in kinds.values()},
+            "description": "; ".join(f"`.{ending}`: {kind.title}" for ending, kind in kinds.items()),
+            "content": {kind.media_type.partition(";")[0]: binary for kind in kinds.values()},
         }
     }
 
 
-def _check(what: str, ending: str, kinds: dict[str, tuple[str, str, Maker]]) -> None:
+def _check(what: str, ending: str, kinds: Mapping[str, MapFile | ChangeFile]) -> None:
     if ending not in kinds:
         raise ProblemError(
             "format-not-found",
@@ -180,11 +191,12 @@ async def get_site_map_file(
     format: Annotated[str, Path(description=f"One of {', '.join(MAP_FILES)}", examples=["tif"])],  # noqa: A002
     service: Service,
     reader: Reader,
+    crs: _Crs = None,
 ) -> Response:
     """Return the site's map as a file."""
     _check("the map of a site is", format, MAP_FILES)
     site = await service.site_models.map(site_id)
-    return file_answer(await asyncio.to_thread(site_map_file, format, site))
+    return file_answer(await asyncio.to_thread(site_map_file, format, site, crs))
 
 
 @router.get(

@@ -3,7 +3,7 @@
 import io
 import zipfile
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
@@ -11,8 +11,7 @@ import orjson
 from shapely.geometry import Polygon, mapping
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.coordinates.projected import Frame, ProjectedFrame, named_frame, projected_cells
-from app.mapping.coordinates.utm import utm_epsg
+from app.mapping.coordinates.projected import Frame, ProjectedFrame
 from app.mapping.layers import Layer, LayerSource, file_layers
 from app.mapping.products.bag import bag
 from app.mapping.products.contours import (
@@ -42,6 +41,7 @@ from app.mapping.tiers import tiers
 from app.mapping.types import BathymetricMap
 from app.missions.errors import ConflictError, InvalidRequestError, MapNotReadyError
 from app.missions.maps.file_content import FileContent
+from app.missions.maps.projection import NOT_SOUNDED, placed, projected_frame
 from app.missions.maps.snapshot import MapSnapshot, MissionFacts
 from app.missions.search.obstacles import obstacles_geojson
 from app.missions.search.state import Search
@@ -65,17 +65,15 @@ MAP, SOUNDINGS, ACCEPTED, RAW, POINTS, TRACKS, SEARCH, SWATHS, SURVEY, TIERS, CR
 CONTOURS = "contours"
 """A resource whose files are made of the map."""
 
-
-NOT_SOUNDED = ("no cell of the map was sounded", "wait for soundings inside of the area")
-
 LEAST_DEPTH = "least depth below the vertical datum of the smallest cells in each, positive down"
 
 ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 """The same content is the same archive."""
 
-GEOJSON, KML, TEXT, CSV = (
+GEOJSON, KML, DXF, TEXT, CSV = (
     "application/geo+json",
     "application/vnd.google-earth.kml+xml",
+    "image/vnd.dxf",
     "text/plain; charset=utf-8",
     "text/csv; charset=utf-8",
 )
@@ -194,38 +192,15 @@ class ProductKind:
 
 def frame_of(facts: MissionFacts, options: ProductOptions) -> Frame:
     """Return what positions are in. Raises InvalidRequestError for a system that cannot be."""
-    return facts.frame if options.crs is None else projected_frame(facts, options.crs)
-
-
-def projected_frame(facts: MissionFacts, name: str) -> ProjectedFrame:
-    """Return a projected system for a mission's area by its name. Raises InvalidRequestError where it cannot be."""
-    lon, lat = np.transpose(facts.spec.area.ring)
-    east, north = (0.5 * float(axis.min() + axis.max()) for axis in facts.frame.to_local(lat, lon))
-    try:
-        return named_frame(name, facts.frame, east, north)
-    except ValueError as error:
-        zone = utm_epsg(*(float(degrees) for degrees in facts.frame.to_geographic(east, north)))
-        raise InvalidRequestError(
-            FileOption.CRS,
-            str(error),
-            f"give utm (here EPSG:{zone}), or EPSG: and the code of a projected system in metres for this place",
-        ) from error
+    return facts.frame if options.crs is None else projected_frame(options.crs, facts.spec.area, facts.frame)
 
 
 def _placed(
     material: Material, options: ProductOptions, layers: Sequence[Layer] = ()
 ) -> tuple[BathymetricMap, Sequence[Layer], Frame]:
     """Return the map and layers of it on the grid that is asked for. Raises ConflictError where no cell is known."""
-    bathymetry, frame = material.snapshot.built.map, frame_of(material.facts, options)
-    if isinstance(frame, LocalFrame):
-        return bathymetry, layers, frame
-    keep = np.logical_or.reduce(
-        [np.isfinite(values) for values in (bathymetry.depth_m, *(one.values for one in layers))]
-    )
-    if not keep.any():
-        raise ConflictError(*NOT_SOUNDED)
-    cells = projected_cells(bathymetry, frame, keep)
-    return cells.map(bathymetry), [replace(one, values=cells.of(one.values, np.nan)) for one in layers], frame
+    frame = frame_of(material.facts, options)
+    return *placed(material.snapshot.built.map, layers, frame), frame
 
 
 def _geotiff(material: Material, options: ProductOptions) -> bytes:
@@ -511,7 +486,7 @@ PRODUCTS = {
         ProductKind(
             CONTOURS,
             "dxf",
-            "image/vnd.dxf",
+            DXF,
             "depth contours for CAD (DXF R12), in metres",
             _contours_dxf,
             {MAP},

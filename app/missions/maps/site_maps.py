@@ -1,7 +1,5 @@
 """A site's model and its changes as they leave the service: as JSON and as files."""
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -11,22 +9,19 @@ import numpy as np
 
 from app.arrays import BoolArray, FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.layers import Fit, Layer
-from app.mapping.products.geotiff import geotiff
-from app.mapping.products.pictures.overlay import overlay_corners, overlay_png
-from app.mapping.products.pictures.picture import picture_png
-from app.mapping.products.text import map_xyz
+from app.mapping.layers import Layer
+from app.mapping.products.pictures.overlay import overlay_corners
 from app.mapping.sites import Change, SiteModel, Survey, Volume
 from app.mapping.types import BathymetricMap, Grid
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
-from app.missions.errors import MapNotReadyError
-from app.missions.maps.file_content import FileContent
-from app.missions.maps.products import CSV, Product, slug
 from app.missions.maps.snapshot import nullable
+from app.missions.spec.base import PolygonGeometry
 from app.missions.views.maps.sites import ChangesView, SiteMapView, SurveyName, VolumeView
-from imc_bridge.printable import printable
 
 DAY_S = 86_400.0
+
+LEAST_COLOUR_M = 0.01
+"""Differences below this are not worth all colours of a picture."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +30,7 @@ class SiteFacts:
 
     id: str
     name: str
+    area: PolygonGeometry
     frame: LocalFrame
     grid: Grid
     inside: BoolArray
@@ -147,6 +143,12 @@ class SiteChange:
     later: Survey
     surveys: tuple[Surveyed, Surveyed]
 
+    @property
+    def last_colour_m(self) -> float:
+        """Return the difference that a picture's last colour stands for; its first one stands for the negative."""
+        compared = np.abs(self.change.difference_m[self.change.compared])
+        return max(float(np.quantile(compared, 0.99)) if compared.size else 0.0, LEAST_COLOUR_M)
+
     def view(self) -> ChangesView:
         """Return it as JSON shows it."""
         change = self.change
@@ -171,6 +173,7 @@ class SiteChange:
             median_sd_m=_rounded(np.median, change.sd_m[change.compared]),
             least_m=_rounded(np.min, difference),
             largest_m=_rounded(np.max, difference),
+            last_colour_m=round(self.last_colour_m, 3),
             corners=overlay_corners(change.grid, self.facts.frame),
             vertical_datum=self.surveys[1].vertical_datum.statement,
             notes=self._notes(),
@@ -194,98 +197,6 @@ class SiteChange:
             Layer("significance", "|difference| over its standard deviation", "1", change.significance),
             Layer("significant", f"1: changed, at {change.confidence:g}; 0: not told from chance", "1", significant),
         ]
-
-
-def site_map_file(kind: str, site: SiteMap) -> Product:
-    """Return a site's map as a file, a key of ``MAP_FILES``."""
-    media_type, _, make = MAP_FILES[kind]
-    return Product(f"{slug(site.facts.name)}.{kind}", media_type, FileContent(make(site)))
-
-
-def changes_file(kind: str, change: SiteChange) -> Product:
-    """Return what changed as a file, a key of ``CHANGE_FILES``."""
-    media_type, _, make = CHANGE_FILES[kind]
-    return Product(f"{slug(change.facts.name)}-changes.{kind}", media_type, FileContent(make(change)))
-
-
-def _map_tif(site: SiteMap) -> bytes:
-    return geotiff(site.bathymetry, site.layers(), site.facts.frame, vertical_datum=site.datum)
-
-
-def _map_png(site: SiteMap) -> bytes:
-    if not site.model.known.any():
-        raise MapNotReadyError("no survey of the site knows a depth within its area", "see its surveys")
-    title = printable(site.facts.name).strip()
-    return picture_png(site.bathymetry, vertical_datum=site.datum.statement, title=title)
-
-
-def _map_xyz(site: SiteMap) -> bytes:
-    # What a survey's soundings share is in the deviations of a site already.
-    return map_xyz(site.bathymetry, site.facts.frame, vertical_datum=site.datum.statement, common_sd_m=0.0)
-
-
-def _changes_tif(change: SiteChange) -> bytes:
-    shape = change.change.difference_m.shape
-    names = [f"{one.mission_id} ({moment(one.last_time_s).date()})" for one in change.surveys]
-    described = BathymetricMap(
-        grid=change.change.grid,
-        depth_m=change.later.depth_m,
-        sd_m=change.later.sd_m,
-        count=np.zeros(shape, dtype=np.int64),
-        sounded=change.later.sounded,
-        roughness=np.ones(shape),
-        correlation_length_m=0.0,
-        model=f"{names[1]} less {names[0]}",
-    )
-    datum = change.surveys[1].vertical_datum
-    return geotiff(described, change.layers(), change.facts.frame, vertical_datum=datum)
-
-
-def _changes_png(change: SiteChange) -> bytes:
-    found = change.change
-    compared = np.abs(found.difference_m[found.compared])
-    most = max(float(np.quantile(compared, 0.99)) if compared.size else 0.0, 0.01)
-    return overlay_png(found.difference_m, found.significant, (-most, most), Fit.ABOUT_ZERO)
-
-
-def _changes_csv(change: SiteChange) -> bytes:
-    found, grid = change.change, change.change.grid
-    rows, cols = np.nonzero(found.compared)
-    lat, lon = change.facts.frame.to_geographic(grid.east_m[cols], grid.north_m[rows])
-    columns: dict[str, Any] = {
-        "lat_deg": np.round(lat, 8),
-        "lon_deg": np.round(lon, 8),
-        "east_m": np.round(grid.east_m[cols], 3),
-        "north_m": np.round(grid.north_m[rows], 3),
-        "earlier_depth_m": np.round(change.earlier.depth_m[rows, cols], 4),
-        "later_depth_m": np.round(change.later.depth_m[rows, cols], 4),
-        "difference_m": np.round(found.difference_m[rows, cols], 4),
-        "sd_m": np.round(found.sd_m[rows, cols], 4),
-        "significance": np.round(found.significance[rows, cols], 3),
-        "significant": found.significant[rows, cols].astype(int),
-    }
-    stream = io.StringIO()
-    datum = change.surveys[1].vertical_datum.statement
-    stream.write(f"# depths: positive down, from {datum}; a positive difference: it is deeper now\n")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-    return stream.getvalue().encode()
-
-
-Maker = Callable[[Any], bytes]
-
-MAP_FILES: dict[str, tuple[str, str, Maker]] = {
-    "tif": ("image/tiff", "GeoTIFF with depth, deviation, age and survey of each cell", _map_tif),
-    "png": ("image/png", "the site's map as a picture", _map_png),
-    "xyz": ("text/plain; charset=utf-8", "text: position, depth, deviation, surveys, sounded", _map_xyz),
-}
-CHANGE_FILES: dict[str, tuple[str, str, Maker]] = {
-    "tif": ("image/tiff", "GeoTIFF with difference, deviation, significance", _changes_tif),
-    "csv": (CSV, "a row for each cell that both surveys know", _changes_csv),
-    "png": ("image/png", "a picture to lay over a web map; pale where the change is not significant", _changes_png),
-}
-"""Kinds of files by their ending: media type, title and what makes them."""
 
 
 def moment(time_s: float) -> datetime:

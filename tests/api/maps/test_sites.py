@@ -1,13 +1,19 @@
 """Sites over REST: one map of several missions' depths, and what changed between them."""
 
 import csv
+import io
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
+import pyogrio
+import pyproj
 import pytest
 import rasterio
+import shapely
+from PIL import Image
 
 from app.settings import Settings
 from tests.support.api.rest import Guarded, make_client, mission_spec, running
@@ -169,8 +175,57 @@ async def test_files_hold_what_the_answers_say(client: httpx.AsyncClient) -> Non
     for path, begins in (("map.png", b"\x89PNG"), ("changes.png", b"\x89PNG"), ("map.xyz", b"# east_m")):
         answer = await client.get(f"/sites/{site}/{path}")
         assert (answer.status_code, answer.content[: len(begins)]) == (200, begins)
+    picture = Image.open(io.BytesIO((await client.get(f"/sites/{site}/changes.png")).content))
+    assert picture.size == (CELLS, CELLS)
+    found = await get(client, f"/sites/{site}/changes")
+    largest = max(abs(found["least_m"]), abs(found["largest_m"]))
+    assert 0.8 * largest <= found["last_colour_m"] <= largest
     missing = await client.get(f"/sites/{site}/map.bag")
     assert (missing.status_code, missing.json()["type"]) == (404, "urn:bathyfleet:problem:format-not-found")
+
+
+async def test_contours_of_a_site_are_at_its_depths(client: httpx.AsyncClient, tmp_path: Path) -> None:
+    site = await new_site(client)
+    await surveyed(client, site, START_S)
+    known = await get(client, f"/sites/{site}/map")
+    lines = (await get(client, f"/sites/{site}/map.geojson"))["features"]
+    depths = {line["properties"]["depth_m"] for line in lines}
+    assert depths
+    assert known["min_depth_m"] <= min(depths) <= max(depths) <= known["max_depth_m"]
+    kml = await client.get(f"/sites/{site}/map.kml")
+    assert "<name>Harbour mouth</name>" in kml.text
+    (path := tmp_path / "own.dxf").write_bytes((await client.get(f"/sites/{site}/map.dxf")).content)
+    drawn = shapely.from_wkb(pyogrio.raw.read(path)[2])
+    assert {round(-float(z), 6) for z in np.unique(shapely.get_coordinates(drawn, include_z=True)[:, 2])} == depths
+    answer = await client.get(f"/sites/{site}/map.dxf", params={"crs": "utm"})
+    assert answer.headers["Content-Disposition"] == 'attachment; filename="harbour-mouth-epsg32629.dxf"'
+    (path := tmp_path / "utm.dxf").write_bytes(answer.content)
+    west, south, east, north = pyogrio.read_info(path, force_total_bounds=True)["total_bounds"]
+    corners = pyproj.Transformer.from_crs(4326, 32629).transform(*np.array(known["corners"]).T[::-1])
+    assert min(corners[0]) <= west < east <= max(corners[0])
+    assert min(corners[1]) <= south < north <= max(corners[1])
+
+
+async def test_a_site_is_had_in_a_grid_that_others_know(client: httpx.AsyncClient) -> None:
+    site = await new_site(client)
+    await surveyed(client, site, START_S)
+    known = await get(client, f"/sites/{site}/map")
+    content = (await client.get(f"/sites/{site}/map.tif", params={"crs": "EPSG:32629"})).content
+    with rasterio.MemoryFile(content) as memory, memory.open() as file:
+        assert pyproj.CRS(file.crs.to_wkt()).sub_crs_list[0].to_epsg() == 32629
+        depth = np.where(file.read(1) == file.nodata, np.nan, file.read(1))
+    assert np.nanmin(depth) == pytest.approx(known["min_depth_m"], abs=2e-3), "the shoalest is in it"
+    assert np.nanmax(depth) <= known["max_depth_m"] + 2e-3
+    text = (await client.get(f"/sites/{site}/map.xyz", params={"crs": "utm"})).text
+    assert "easting_m northing_m" in text.splitlines()[0]
+    for file_, crs, says in (
+        ("map.tif", "utm29", "'utm29' is neither utm nor EPSG: and a code"),
+        ("map.tif", "EPSG:32755", "EPSG:32755"),
+        ("map.png", "utm", "png is not made in utm"),
+    ):
+        refused = await client.get(f"/sites/{site}/{file_}", params={"crs": crs})
+        assert (refused.status_code, refused.json()["type"]) == (422, "urn:bathyfleet:problem:invalid-request")
+        assert says in refused.text
 
 
 async def test_what_nobody_measured_stays_unknown(client: httpx.AsyncClient) -> None:

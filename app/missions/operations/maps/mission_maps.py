@@ -32,8 +32,8 @@ from app.missions.maps.products import (
     frame_of,
     make_product,
     product_kind,
-    projected_frame,
 )
+from app.missions.maps.projection import projected_frame
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.operations.corrections.crossovers import check_of
 from app.missions.operations.maps.sounding_files import accepted_xyz, all_lines, crowdsourced, only_vehicle, point_cloud
@@ -180,7 +180,7 @@ async def _sounding_file(
         if ACCEPTED in needs:
             return await accepted_xyz(live, frame_of(live.facts, options))
         if POINTS in needs:
-            return await point_cloud(live, projected_frame(live.facts, options.crs or UTM))
+            return await point_cloud(live, projected_frame(options.crs or UTM, live.facts.spec.area, live.facts.frame))
         if RAW in needs and options.vehicle is not None:
             return await crowdsourced(live, provider.named(), options.vehicle)
     except OSError as error:

@@ -242,7 +242,7 @@ async def stored_site(session: AsyncSession, site_id: str) -> SiteRow:
 
 def _facts(site_id: str, spec: SiteSpec) -> SiteFacts:
     grid, inside = make_grid(spec.local_area(), spec.cell_m)
-    return SiteFacts(site_id, spec.name, spec.frame(), grid, inside)
+    return SiteFacts(site_id, spec.name, spec.area, spec.frame(), grid, inside)
 
 
 def _placed(content: bytes, facts: SiteFacts) -> Survey:

@@ -110,6 +110,9 @@ class ChangesView(View):
     median_sd_m: float | None = Field(description="Standard deviation of a difference")
     least_m: float | None
     largest_m: float | None
+    last_colour_m: float = Field(
+        description="Difference of the last colour of changes.png, deeper now; that of the first is its negative"
+    )
     corners: list[tuple[Longitude, Latitude]] = Field(description="Of changes.png, as those of a map")
     vertical_datum: str
     notes: list[str] = Field(description="What has to be known to read it, in words")

@@ -372,6 +372,8 @@ class ChangesView(Model):
     """Standard deviation of a difference"""
     least_m: float | None
     largest_m: float | None
+    last_colour_m: float
+    """Difference of the last colour of changes.png, deeper now; that of the first is its negative"""
     corners: list[tuple[float, float]]
     """Of changes.png, as those of a map"""
     vertical_datum: str

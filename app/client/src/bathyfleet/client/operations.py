@@ -304,9 +304,16 @@ class Operations(ABC):
             query={"from": from_, "to": to, "confidence": confidence},
         ))
 
-    def get_site_map_file(self, site_id: str, format: str) -> bytes:
-        """Download a site's map: ``GET /sites/{site_id}/map.{format}``."""
-        return self._call(Call[bytes]("GET", f"/sites/{part(site_id)}/map.{part(format)}", bytes))
+    def get_site_map_file(self, site_id: str, format: str, *, crs: str | None = None) -> bytes:
+        """Download a site's map: ``GET /sites/{site_id}/map.{format}``.
+
+        Parameters
+        ----------
+        crs : str
+            System of positions in `.tif`, `.xyz` and `.dxf`, in metres: `utm`, the zone of the site's middle, or
+            `EPSG:nnnn`; default: the site's own frame
+        """
+        return self._call(Call[bytes]("GET", f"/sites/{part(site_id)}/map.{part(format)}", bytes, query={"crs": crs}))
 
     def get_changes_file(
         self,
@@ -1786,9 +1793,21 @@ class AsyncOperations(ABC):
             query={"from": from_, "to": to, "confidence": confidence},
         ))
 
-    async def get_site_map_file(self, site_id: str, format: str) -> bytes:
-        """Download a site's map: ``GET /sites/{site_id}/map.{format}``."""
-        return await self._call(Call[bytes]("GET", f"/sites/{part(site_id)}/map.{part(format)}", bytes))
+    async def get_site_map_file(self, site_id: str, format: str, *, crs: str | None = None) -> bytes:
+        """Download a site's map: ``GET /sites/{site_id}/map.{format}``.
+
+        Parameters
+        ----------
+        crs : str
+            System of positions in `.tif`, `.xyz` and `.dxf`, in metres: `utm`, the zone of the site's middle, or
+            `EPSG:nnnn`; default: the site's own frame
+        """
+        return await self._call(Call[bytes](
+            "GET",
+            f"/sites/{part(site_id)}/map.{part(format)}",
+            bytes,
+            query={"crs": crs},
+        ))
 
     async def get_changes_file(
         self,

@@ -33,6 +33,7 @@ import type {
   RulingsView,
   SearchGridView,
   SessionView,
+  SiteChanges,
   SiteView,
   SoundingPage,
   SoundingPoints,
@@ -203,7 +204,18 @@ const poll = <T>(path: string): Promise<T> => request<T>(path, {}, POLLED);
 const missionPath = (id: string) => `/missions/${encodeURIComponent(id)}`;
 const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/${encodeURIComponent(name)}`;
 
-const sitePath = (id: string, part: string) => `/sites/${encodeURIComponent(id)}/${part}`;
+const sitePath = (id: string, part = "") => `/sites/${encodeURIComponent(id)}${part && `/${part}`}`;
+
+/** Which two surveys are compared, by their missions; empty: the newest and the one before it. */
+export interface Compared {
+  from: string;
+  to: string;
+}
+
+export const NEWEST_TWO: Compared = { from: "", to: "" };
+
+const between = ({ from, to }: Compared): string =>
+  from && to ? `?${new URLSearchParams({ from, to })}` : "";
 
 /** A mission that nobody has created, and how deep it is there; empty: not known. */
 export interface Described {
@@ -321,8 +333,19 @@ export const api = {
   sites: () => request<SiteView[]>("/sites"),
   createSite: (site: NewSite) => post<SiteView>("/sites", site),
   surveys: (site: string) => request<SurveyView[]>(sitePath(site, "surveys")),
-  changes: (site: string) => request<ChangesView>(sitePath(site, "changes")),
-  siteFile: (site: string, name: string) => file(`${BASE}${sitePath(site, name)}`),
+  changeSite: (site: string, changes: SiteChanges) =>
+    request<SiteView>(
+      sitePath(site),
+      { method: "PATCH", body: JSON.stringify(changes), headers: { "Content-Type": "application/json" } },
+      STORED,
+    ),
+  deleteSite: (site: string) => remove(sitePath(site)),
+  changes: (site: string, compared: Compared) =>
+    request<ChangesView>(`${sitePath(site, "changes")}${between(compared)}`),
+  siteMapFile: (site: string, format: string, crs = "") =>
+    file(`${BASE}${sitePath(site, `map.${format}`)}${crs && `?${new URLSearchParams({ crs })}`}`),
+  changesFile: (site: string, format: string, compared: Compared) =>
+    file(`${BASE}${sitePath(site, `changes.${format}`)}${between(compared)}`),
   quality: (id: string) => request<QualityView>(`${missionPath(id)}/quality`),
   file,
 };

@@ -2529,6 +2529,11 @@ export interface components {
             /** Largest M */
             largest_m: number | null;
             /**
+             * Last Colour M
+             * @description Difference of the last colour of changes.png, deeper now; that of the first is its negative
+             */
+            last_colour_m: number;
+            /**
              * Corners
              * @description Of changes.png, as those of a map
              */
@@ -10690,19 +10695,22 @@ export interface operations {
     };
     getSiteMapFile: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description System of positions in `.tif`, `.xyz` and `.dxf`, in metres: `utm`, the zone of the site's middle, or `EPSG:nnnn`; default: the site's own frame */
+                crs?: string;
+            };
             header?: never;
             path: {
                 /** @description The site's id */
                 site_id: string;
-                /** @description One of tif, png, xyz */
+                /** @description One of tif, png, xyz, geojson, kml, dxf */
                 format: string;
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            /** @description `.tif`: GeoTIFF with depth, deviation, age and survey of each cell; `.png`: the site's map as a picture; `.xyz`: text: position, depth, deviation, surveys, sounded */
+            /** @description `.tif`: GeoTIFF with depth, deviation, age and survey of each cell; `.png`: the site's map as a picture; `.xyz`: text: position, depth, deviation, surveys, sounded; `.geojson`: depth contours; `.kml`: depth contours for virtual globes; `.dxf`: depth contours for CAD (DXF R12), in metres */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10711,6 +10719,9 @@ export interface operations {
                     "image/tiff": string;
                     "image/png": string;
                     "text/plain": string;
+                    "application/geo+json": string;
+                    "application/vnd.google-earth.kml+xml": string;
+                    "image/vnd.dxf": string;
                 };
             };
             /** @description An access token is needed */

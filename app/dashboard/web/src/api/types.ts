@@ -56,6 +56,7 @@ export type SoundingState = Schemas["SoundingState"];
 export type SiteView = Complete<Schemas["SiteView"]>;
 export type SurveyView = Complete<Schemas["SurveyView"]>;
 export type ChangesView = Complete<Schemas["ChangesView"]>;
+export type SiteChanges = Pick<Schemas["SiteChanges"], "name" | "cell_m" | "yearly_change_m">;
 export type NewSite = Pick<Schemas["SiteSpec"], "name" | "area" | "cell_m">;
 export type LayerView = Complete<Schemas["LayerView"]>;
 export type ProductView = Complete<Schemas["ProductView"]>;

@@ -120,6 +120,7 @@ export const dialogOpen = computed(
     preflightOpen.value ||
     linksOpen.value ||
     fleetOpen.value ||
+    sitesOpen.value ||
     accountOpen.value ||
     settingsOpen.value ||
     keysOpen.value,
@@ -281,6 +282,9 @@ export const abortDialogOpen = signal(false);
 export const abortOne = signal<string | null>(null);
 /** Whether the table of all vehicles is shown. */
 export const fleetOpen = signal(false);
+/** Whether the sites are shown, and which one of them; empty: the newest. */
+export const sitesOpen = signal(false);
+export const shownSite = signal("");
 export const preflightOpen = signal(false);
 /** How deep it is where the shown mission goes, as typed in its checklist; it begins with what the form was told. */
 export const floorDepth = signal("");

@@ -34,6 +34,7 @@ import { Heard, Others } from "./notices/Heard";
 import { Notices } from "./notices/Notices";
 import { keepFocus } from "./parts/keptFocus";
 import { watchPrinting } from "./parts/printMap";
+import { SitesDialog } from "./sites/SitesDialog";
 import { SpaceView } from "./space/SpaceView";
 import { BottomStrip } from "./strip/BottomStrip";
 import { TopBar } from "./TopBar";
@@ -108,6 +109,7 @@ export function App() {
       <AbortDialog />
       <LinksDialog />
       <FleetDialog />
+      <SitesDialog />
       <FinishDialog />
       <LengthDialog />
       <AccountDialog />

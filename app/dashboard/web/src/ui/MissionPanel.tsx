@@ -25,6 +25,7 @@ import {
   panelOpen,
   selectedId,
   serviceFault,
+  sitesOpen,
 } from "../state/store";
 import { say, sayWith } from "../words/say";
 import { panelWidth } from "./chart/layout";
@@ -72,6 +73,9 @@ function MissionList() {
         <h2 tabIndex={-1}>{say("missions.missions")}</h2>
         <Button id="open-fleet" onClick={sets(fleetOpen, true)}>
           {say("fleet.fleet")}
+        </Button>
+        <Button id="open-sites" onClick={sets(sitesOpen, true)}>
+          {say("site.sites")}
         </Button>
         <Button id="new-mission" commands onClick={sets(describing, true)}>
           {say("missions.new")}
