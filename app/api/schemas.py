@@ -62,6 +62,17 @@ class ActionRequest(BaseModel):
     note: str = Field(default="", max_length=2000, description="Kept in the mission's log beside the action")
 
 
+class StartRequest(ActionRequest):
+    """What an operator adds when a mission is started."""
+
+    confirmed: list[Annotated[str, Field(max_length=200)]] = Field(
+        default_factory=list,
+        max_length=40,
+        description="Which of the checklist's `questions` the operator has looked at. The mission's log keeps them, "
+        "and those that nobody confirmed",
+    )
+
+
 class EndRequest(ActionRequest):
     """What an operator adds when a mission is ended."""
 

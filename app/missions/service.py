@@ -20,7 +20,7 @@ from app.missions import states
 from app.missions.alarms.dispatcher import AlarmDispatcher
 from app.missions.clock import now
 from app.missions.compilation import Compilation
-from app.missions.errors import MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
+from app.missions.errors import InvalidRequestError, MissionElsewhereError, MissionNotFoundError, MissionUnreadableError
 from app.missions.fleet.hub import FleetHub
 from app.missions.fleet.interface import FleetLink, StopReceipt
 from app.missions.fleet.links.rest import RestFleetLink
@@ -414,6 +414,27 @@ class MissionService:
                     self._supervisor.dismiss(live)
                 live.publish_summary()
         return action_view(live, stops)
+
+    async def start(self, live: LiveMission, confirmed: Sequence[str], *, actor: str, note: str = "") -> ActionView:
+        """Start a mission, and keep in its log which questions of the checklist ``actor`` confirmed, and which not.
+
+        Raises InvalidRequestError for what is no question, else as :meth:`act`.
+        """
+        questions = self.settings.checklist
+        for index, one in enumerate(confirmed):
+            if one not in questions:
+                known = "; ".join(questions) or "none: the setting checklist is empty"
+                raise InvalidRequestError(
+                    f"confirmed.{index}", f"the checklist does not ask {one!r}", f"its questions are: {known}"
+                )
+        found = await self.act(live, Action.START, actor=actor, note=note)
+        looked_at = [question for question in questions if question in confirmed]
+        open_ = [question for question in questions if question not in confirmed]
+        if looked_at:
+            await live.journal.log(Level.INFO, "safety", f"{actor} confirmed before the start: {'; '.join(looked_at)}")
+        if open_:
+            await live.journal.log(Level.WARNING, "safety", f"nobody confirmed before the start: {'; '.join(open_)}")
+        return found
 
     def _may_set_off(self, live: LiveMission) -> Guard:
         """Return what refuses a transaction by which a mission goes to sea that must not."""

@@ -219,6 +219,9 @@ class ProviderSettings(Section):
         return Provider(self.organization, self.email, self.node, self.license)
 
 
+Question = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*$")]
+
+
 class ServiceSettings(Section):
     """Everything the mission service needs to know."""
 
@@ -239,6 +242,12 @@ class ServiceSettings(Section):
         description="Read imported files also where the kernel has neither Landlock nor seccomp, which keep them from "
         "reading other files",
     )
+    checklist: tuple[Question, ...] = Field(
+        default=(),
+        max_length=40,
+        description="What somebody has to have looked at before each start, for example Hatches closed: the page asks "
+        "for it, and the mission's log keeps who confirmed it",
+    )
     imc: ImcSettings = Field(default=ImcSettings(), description="The link to IMC vehicles")
     neptus: NeptusSettings = Field(default=NeptusSettings(), description="The gateway for Neptus' ConvCAO panel")
     ais: AisSettings = Field(default=AisSettings(), description="Ships about, by AIS")
@@ -250,3 +259,11 @@ class ServiceSettings(Section):
         default=ProviderSettings(), description="Who hands soundings in as crowdsourced bathymetry"
     )
     alarms: AlarmSettings = Field(default=AlarmSettings(), description="Who is told of alarms, and by which way")
+
+    @field_validator("checklist")
+    @classmethod
+    def _asks_nothing_twice(cls, checklist: tuple[str, ...]) -> tuple[str, ...]:
+        twice = sorted({question for question in checklist if checklist.count(question) > 1})
+        if twice:
+            raise ValueError(f"{twice[0]!r} is asked twice: leave one of them out")
+        return checklist

@@ -1,5 +1,6 @@
 """Missions: describing, listing, moving through their states, and their vehicles."""
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -10,7 +11,7 @@ from app.api.bodies.json_route import JsonRoute
 from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.peer_lists import from_peers
-from app.api.schemas import API, ActionRequest, EndRequest, MissionId, NoteRequest, VehicleName
+from app.api.schemas import API, ActionRequest, EndRequest, MissionId, NoteRequest, StartRequest, VehicleName
 from app.api.state import Service, State
 from app.missions.errors import MissionNotFoundError
 from app.missions.operations import history
@@ -213,13 +214,20 @@ def _add_action(action: Action) -> None:
         note = body.note if body is not None else ""
         return await service.act(mission, action, actor=operator.name, note=note)
 
+    async def start(
+        service: Service, operator: Operator, mission: Mission, body: StartRequest | None = None
+    ) -> ActionView:
+        asked = body or StartRequest()
+        return await service.start(mission, asked.confirmed, actor=operator.name, note=asked.note)
+
     async def end(service: Service, operator: Operator, mission: Mission, body: EndRequest | None = None) -> ActionView:
         asked = body or EndRequest()
         return await service.act(mission, action, actor=operator.name, note=asked.note, return_home=asked.return_home)
 
+    endpoints: dict[Action, Callable[..., Any]] = {Action.START: start, Action.ABORT: end, Action.FINISH: end}
     router.add_api_route(
         f"/{{mission_id}}/{action}",
-        end if action in (Action.ABORT, Action.FINISH) else act,
+        endpoints.get(action, act),
         methods=["POST"],
         operation_id=f"{action}Mission",
         summary=summary,
@@ -240,7 +248,8 @@ for _action in Action:
 )
 async def check_mission(reader: Reader, service: Service, mission: Mission) -> PreflightView:
     """Return the checklist: links, the doctor's findings, batteries, places, depths, area, tide, longest duration."""
-    return preflight(mission, await service.at_sea(), service.doctor().vehicles)
+    found = preflight(mission, await service.at_sea(), service.doctor().vehicles)
+    return found.model_copy(update={"questions": list(service.settings.checklist)})
 
 
 @router.get(

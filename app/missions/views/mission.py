@@ -337,6 +337,10 @@ class PreflightView(View):
 
     ready: bool = Field(description="False while any line is a problem: a start would be refused or fail")
     checks: list[CheckView]
+    questions: list[str] = Field(
+        default_factory=list,
+        description="What somebody has to have looked at, from the setting checklist: see `confirmed` of a start",
+    )
 
 
 class StopView(View):

@@ -1357,6 +1357,8 @@ class PreflightView(Model):
     ready: bool
     """False while any line is a problem: a start would be refused or fail"""
     checks: list[CheckView]
+    questions: list[str]
+    """What somebody has to have looked at, from the setting checklist: see `confirmed` of a start"""
 
 
 class Problem(Model):
@@ -1946,6 +1948,17 @@ class SoundingView(Model):
     state: SoundingState
     reason: str
     """Why it is not used, or who restored it"""
+
+
+class StartRequest(Model):
+    """What an operator adds when a mission is started."""
+
+    note: str = ""
+    """Kept in the mission's log beside the action"""
+    confirmed: list[str] | None = None
+    """Which of the checklist's `questions` the operator has looked at. The mission's log keeps them, and those that
+    nobody confirmed
+    """
 
 
 class StateDefinition(Model):

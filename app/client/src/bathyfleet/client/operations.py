@@ -72,7 +72,7 @@ class Operations(ABC):
     def start_mission(
         self,
         mission_id: str,
-        body: models.ActionRequest | Mapping[str, Any] | None = None,
+        body: models.StartRequest | Mapping[str, Any] | None = None,
     ) -> models.ActionView:
         """Start a mission: ``POST /missions/{mission_id}/start``."""
         return self._call(Call[models.ActionView](
@@ -1561,7 +1561,7 @@ class AsyncOperations(ABC):
     async def start_mission(
         self,
         mission_id: str,
-        body: models.ActionRequest | Mapping[str, Any] | None = None,
+        body: models.StartRequest | Mapping[str, Any] | None = None,
     ) -> models.ActionView:
         """Start a mission: ``POST /missions/{mission_id}/start``."""
         return await self._call(Call[models.ActionView](

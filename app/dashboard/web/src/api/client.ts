@@ -244,6 +244,9 @@ export const api = {
   create: (mission: NewMission) => post<MissionView>("/missions", mission, STORED),
   /** Replaces what a mission is to do that has not started. */
   describe: (id: string, mission: NewMission) => put<MissionView>(missionPath(id), mission),
+  /** `confirmed`: which questions of its checklist somebody has looked at. */
+  start: (id: string, confirmed: readonly string[]) =>
+    post<ActionView>(`${missionPath(id)}/start`, { confirmed }),
   /** `home`: whether vehicles go home before the mission ends; undefined: as the service does it. */
   act: (id: string, action: MissionAction, home?: boolean) =>
     post<ActionView>(`${missionPath(id)}/${action}`, home === undefined ? undefined : { return: home }),

@@ -4920,6 +4920,11 @@ export interface components {
             ready: boolean;
             /** Checks */
             checks: components["schemas"]["CheckView"][];
+            /**
+             * Questions
+             * @description What somebody has to have looked at, from the setting checklist: see `confirmed` of a start
+             */
+            questions: string[];
         };
         /**
          * Problem
@@ -6259,6 +6264,26 @@ export interface components {
              * @description Why it is not used, or who restored it
              */
             reason: string;
+        };
+        /**
+         * StartRequest
+         * @description What an operator adds when a mission is started.
+         * @example {
+         *       "note": "Ferry passes at 14:10"
+         *     }
+         */
+        StartRequest: {
+            /**
+             * Note
+             * @description Kept in the mission's log beside the action
+             * @default
+             */
+            note: string;
+            /**
+             * Confirmed
+             * @description Which of the checklist's `questions` the operator has looked at. The mission's log keeps them, and those that nobody confirmed
+             */
+            confirmed?: string[];
         };
         /**
          * StateDefinition
@@ -8458,7 +8483,7 @@ export interface operations {
         };
         requestBody?: {
             content: {
-                "application/json": components["schemas"]["ActionRequest"] | null;
+                "application/json": components["schemas"]["StartRequest"] | null;
             };
         };
         responses: {

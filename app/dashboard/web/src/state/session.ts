@@ -334,15 +334,23 @@ export const actionWords = (action: MissionAction): string => say(ACTION_KEYS[ac
  * service's answer, or null when it was refused.
  */
 export async function act(action: MissionAction, home?: boolean): Promise<ActionView | null> {
+  return acting(action, (id) => api.act(id, action, home));
+}
+
+/** Starts the selected mission; `confirmed` are the questions of its checklist that somebody has looked at. */
+export async function start(confirmed: readonly string[]): Promise<ActionView | null> {
+  return acting("start", (id) => api.start(id, confirmed));
+}
+
+async function acting(
+  action: MissionAction,
+  ask: (id: string) => Promise<ActionView>,
+): Promise<ActionView | null> {
   const id = selectedId.value;
   if (!id) return null;
   busyWith.value = action;
   try {
-    return await send(
-      actionWords(action),
-      api.act(id, action, home),
-      action === "abort" || action === "finish",
-    );
+    return await send(actionWords(action), ask(id), action === "abort" || action === "finish");
   } finally {
     busyWith.value = null;
   }

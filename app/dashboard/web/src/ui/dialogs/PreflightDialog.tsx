@@ -6,7 +6,7 @@ import SPEC from "../../api/mission.json";
 import type { CheckStatus, PreflightView } from "../../api/types";
 import { floorDepthFault } from "../../state/form/missionFields";
 import { pointed } from "../../state/format";
-import { act, actionWords, busyWith, refusal, said } from "../../state/session";
+import { actionWords, busyWith, refusal, said, start } from "../../state/session";
 import { floorDepth, mission, preflightOpen, selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Forecast } from "../forecast/Forecast";
@@ -27,6 +27,7 @@ const AGAIN_MS = 3000;
 export function PreflightDialog() {
   const found = useSignal<PreflightView | null>(null);
   const fault = useSignal("");
+  const confirmed = useSignal<readonly string[]>([]);
   const open = preflightOpen.value;
 
   useEffect(() => {
@@ -51,16 +52,19 @@ export function PreflightDialog() {
       stopped = true;
       clearInterval(timer);
       found.value = null;
+      confirmed.value = [];
     };
   }, [open]);
 
   const depth_m = pointed(floorDepth.value);
   const wrongDepth = floorDepthFault(depth_m);
   const close = sets(preflightOpen, false);
-  const start = async () => {
-    if (await act("start")) close();
+  const begin = async () => {
+    if (await start(confirmed.value)) close();
   };
   const view = found.value;
+  const questions = view?.questions ?? [];
+  const unconfirmed = questions.filter((question) => !confirmed.value.includes(question)).length;
   const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
   const refused = refusal.value?.what === actionWords("start") ? refusal.value.error : null;
   const starting = (
@@ -68,15 +72,17 @@ export function PreflightDialog() {
       id="confirm-start"
       kind="command primary"
       commands
-      disabled={!view?.ready}
+      disabled={!view?.ready || unconfirmed > 0}
       busy={busyWith.value !== null}
-      onClick={() => void start()}
+      onClick={() => void begin()}
     >
       {busyWith.value === "start"
         ? say("preflight.starting")
         : problems > 0
           ? say("preflight.problemToSolveFirst", { problems })
-          : say("preflight.startMission")}
+          : unconfirmed > 0
+            ? say("preflight.toConfirmFirst", { unconfirmed })
+            : say("preflight.startMission")}
     </Button>
   );
   return (
@@ -107,6 +113,25 @@ export function PreflightDialog() {
           </li>
         ))}
       </ul>
+      {questions.length > 0 ? (
+        <fieldset class="questions">
+          <legend>{say("preflight.lookedAtByYou")}</legend>
+          {questions.map((question, index) => (
+            <label key={question}>
+              <input
+                type="checkbox"
+                data-testid={`question-${index}`}
+                checked={confirmed.value.includes(question)}
+                onChange={(event) => {
+                  const others = confirmed.value.filter((one) => one !== question);
+                  confirmed.value = event.currentTarget.checked ? [...others, question] : others;
+                }}
+              />{" "}
+              {question}
+            </label>
+          ))}
+        </fieldset>
+      ) : null}
       {open && selectedId.value && mission.value?.spec.kind !== "search" ? (
         <>
           <label class="field">
