@@ -75,4 +75,4 @@ async def test_without_questions_nothing_is_asked(client: httpx.AsyncClient) -> 
 @pytest.mark.parametrize("checklist", [["", "x"], ["two\nlines"], ["x" * 201], ["Hatches", "Hatches"], ["x"] * 41])
 def test_questions_can_be_read_and_are_asked_once(checklist: list[str]) -> None:
     with pytest.raises(ValidationError, match="checklist"):
-        Settings(checklist=checklist)  # type: ignore[arg-type]
+        Settings(checklist=checklist)

@@ -182,7 +182,7 @@ export const FRAME = {
   "preflight.warning": { en: "Warning", pt: "Aviso" },
   "preflight.problem": { en: "Problem", pt: "Problema" },
   "preflight.starting": { en: "Starting…", pt: "A iniciar…" },
-  "preflight.lookedAtByYou": { en: "Looked at by you", pt: "Verificado por si" },
+  "preflight.toBeConfirmed": { en: "To be confirmed by you", pt: "A confirmar por si" },
   "preflight.toConfirmFirst": { en: "{unconfirmed} to confirm first", pt: "{unconfirmed} por confirmar" },
   "preflight.problemToSolveFirst": {
     en: "{problems} {problems|problem|problems} to solve first",

@@ -115,7 +115,7 @@ export function PreflightDialog() {
       </ul>
       {questions.length > 0 ? (
         <fieldset class="questions">
-          <legend>{say("preflight.lookedAtByYou")}</legend>
+          <legend>{say("preflight.toBeConfirmed")}</legend>
           {questions.map((question, index) => (
             <label key={question}>
               <input
