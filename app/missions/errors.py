@@ -71,6 +71,10 @@ class SoundingNotFoundError(MissionError):
     """There is no such sounding in the mission."""
 
 
+class CastNotFoundError(MissionError):
+    """The mission has no sound speed cast of this name."""
+
+
 class PingsNotFoundError(MissionError):
     """The mission has no such file of pings."""
 

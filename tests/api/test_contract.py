@@ -34,8 +34,8 @@ from tests.support.api.rest import mission_spec, running_in_thread, soundings
 from tests.support.storage.databases import Databases
 
 # What the schema cannot say, the answer does: rings are closed, planners exist, max is above min, tables and files are
-# what they are called, profiles go down, times go on, steps were flown, lengths have one unit, there is such a site,
-# there is a reference grid to differ from, and such a mission to go on after.
+# what they are called, profiles go down, names of casts have a letter, times go on, steps were flown, lengths have one
+# unit, there is such a site, there is a reference grid to differ from, and such a mission to go on after.
 BEYOND_THE_SCHEMA = {
     "changeSite",
     "createMission",
@@ -61,6 +61,7 @@ BEYOND_THE_SCHEMA = {
     "previewPlan",
     "proposeZones",
     "setBudget",
+    "setCast",
     "setReference",
     "setSite",
     "setSystematicErrors",

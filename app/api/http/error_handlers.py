@@ -16,6 +16,7 @@ from app.api.http.problems import FieldProblem, Problem, ProblemError, instance_
 from app.api.http.route_parameters import query_names
 from app.missions.errors import (
     AlarmNotFoundError,
+    CastNotFoundError,
     ConflictError,
     FileTooLargeError,
     ImportNotFoundError,
@@ -45,6 +46,7 @@ SENT = "sent"
 
 KINDS: dict[type[MissionError], str] = {
     AlarmNotFoundError: "alarm-not-found",
+    CastNotFoundError: "cast-not-found",
     ConflictError: "conflict",
     FileTooLargeError: "body-too-large",
     ImportNotFoundError: "import-not-found",

@@ -26,6 +26,7 @@ TITLES: dict[str, tuple[int, str]] = {
     "import-not-found": (404, "There is no such import"),
     "alarm-not-found": (404, "There is no such alarm"),
     "feature-not-found": (404, "There is no such feature"),
+    "cast-not-found": (404, "The mission has no such sound speed cast"),
     "pings-not-found": (404, "There is no such file of pings"),
     "map-not-ready": (404, "There is no map yet"),
     "method-not-allowed": (405, "The method is not allowed here"),

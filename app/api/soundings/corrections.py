@@ -1,6 +1,8 @@
 """How soundings are corrected: tide, sound speed, systematic errors, and the drift of vehicles."""
 
-from fastapi import APIRouter
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
@@ -8,14 +10,16 @@ from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
 from app.api.schemas import API
 from app.api.state import Service
-from app.missions.operations.corrections import adjustment, recorrection
+from app.mapping.s44 import Order
+from app.missions.operations.corrections import adjustment, casts, recorrection
+from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.spec.systematic_errors import SystematicErrors
-from app.missions.spec.water import SoundSpeed
+from app.missions.spec.water import MOST_NAME, CastDescription, CastRules, SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
-from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection
+from app.missions.views.measurements.corrections import CastsView, CorrectionsView, TideCorrection
 from app.missions.views.measurements.systematic_errors import SystematicErrorsView
 
 router = APIRouter(
@@ -24,6 +28,9 @@ router = APIRouter(
     tags=["maps"],
     responses=problems("unauthenticated", "forbidden"),
 )
+
+S44Order = Annotated[Order, Query(description="Order of IHO S-44 that differences between casts are compared with")]
+CastName = Annotated[str, Path(min_length=1, max_length=MOST_NAME, description="Name of a sound speed cast")]
 
 _CHANGE = body_problems("mission-not-found")
 
@@ -47,7 +54,10 @@ async def set_tide(tide: TideCorrection, operator: Operator, mission: Mission) -
 
 @router.put("/sound-speed", operation_id="setSoundSpeed", summary="Correct the sound speed", responses=_CHANGE)
 async def set_sound_speed(sound_speed: SoundSpeed, operator: Operator, mission: Mission) -> CorrectionsView:
-    """Set the measured sound speed, at any time: every sounding is corrected anew from its raw range."""
+    """Set the measured sound speed, one cast or several, at any time, in place of all casts that there are.
+
+    Every sounding is corrected anew from its raw range.
+    """
     return await recorrection.set_sound_speed(mission, sound_speed, operator.name)
 
 
@@ -58,8 +68,55 @@ async def set_sound_speed(sound_speed: SoundSpeed, operator: Operator, mission: 
     responses=problems("mission-not-found", "invalid-request"),
 )
 async def delete_sound_speed(operator: Operator, mission: Mission) -> CorrectionsView:
-    """Correct no sound speed any more."""
+    """Correct no sound speed any more: all casts are removed."""
     return await recorrection.set_sound_speed(mission, None, operator.name)
+
+
+@router.get(
+    "/sound-speed/casts",
+    operation_id="getCasts",
+    summary="See what each cast corrects",
+    responses=problems("mission-not-found", "invalid-request", "pings-unreadable"),
+)
+async def get_casts(reader: Reader, mission: Mission, order: S44Order = Order.ORDER_1A) -> CastsView:
+    """Return the sound speed casts with how many soundings each corrects, and how far away it was taken.
+
+    `changes` tells by how much the depth of the outer beam differs from each cast to the next.
+    """
+    return await casts_view(mission, order)
+
+
+@router.put(
+    "/sound-speed/casts/{name}",
+    operation_id="setCast",
+    summary="Add or replace a sound speed cast",
+    responses=_CHANGE,
+)
+async def set_cast(name: CastName, cast: CastDescription, operator: Operator, mission: Mission) -> CorrectionsView:
+    """Add a sound speed cast, or replace the one of this name, at any time: every sounding is corrected anew."""
+    return await casts.set_cast(mission, name, cast, operator.name)
+
+
+@router.delete(
+    "/sound-speed/casts/{name}",
+    operation_id="deleteCast",
+    summary="Remove a sound speed cast",
+    responses=problems("mission-not-found", "cast-not-found", "invalid-request"),
+)
+async def delete_cast(name: CastName, operator: Operator, mission: Mission) -> CorrectionsView:
+    """Remove a sound speed cast; without the last one the sonars' own ranges are taken."""
+    return await casts.remove_cast(mission, name, operator.name)
+
+
+@router.put(
+    "/sound-speed/rule",
+    operation_id="setCastRule",
+    summary="Choose sound speed casts by a rule",
+    responses=_CHANGE | problems("conflict"),
+)
+async def set_cast_rule(rules: CastRules, operator: Operator, mission: Mission) -> CorrectionsView:
+    """Set which of several casts corrects a ping, at any time: every sounding is corrected anew."""
+    return await casts.set_cast_rule(mission, rules, operator.name)
 
 
 @router.get(

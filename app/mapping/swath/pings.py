@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.arrays import FloatArray, IntArray
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.water.sound_speed import SoundSpeedProfile
+from app.mapping.water.casts import Casts
 
 BeamArray = NDArray[np.float32]
 
@@ -111,11 +111,12 @@ def reach_m(pings: Pings) -> FloatArray:
     return np.where(met.any(axis=1, keepdims=True), np.column_stack(sides), np.nan)
 
 
-def placed(pings: Pings, frame: LocalFrame, profile: SoundSpeedProfile | None = None) -> Footprints:
+def placed(pings: Pings, frame: LocalFrame, casts: Casts | None = None) -> Footprints:
     """Return where the beams of pings met the bottom.
 
     A beam lies in the vehicle's plane of starboard and down; it is turned by roll, pitch and heading (Fossen 2011,
-    eq. 2.18). With a ``profile`` its way is followed through the water for the time that was measured.
+    eq. 2.18). With ``casts`` its way is followed, for the time that was measured, through the water of the cast that
+    their rule gives for its ping.
 
     Raises
     ------
@@ -135,9 +136,10 @@ def placed(pings: Pings, frame: LocalFrame, profile: SoundSpeedProfile | None = 
     forward, down = sin_pitch * upright, cos_pitch * upright
     to_east = sin_heading * forward + cos_heading * levelled
     to_north = cos_heading * forward - sin_heading * levelled
-    if profile is not None:
+    if casts is not None:
         across = np.hypot(to_east, to_north)
-        true_across, true_down = profile.trace(pings.depth_m[ping], across, np.maximum(down, 0.0))
+        cast = casts.chosen(pings.time_s, east, north)[ping]
+        true_across, true_down = casts.trace(cast, pings.depth_m[ping], across, np.maximum(down, 0.0))
         stretch = np.divide(true_across, across, out=np.ones_like(across), where=across > 0.0)
         to_east, to_north, down = to_east * stretch, to_north * stretch, np.where(down > 0.0, true_down, down)
     return Footprints(

@@ -34,6 +34,7 @@ from app.missions.maps.products import (
 )
 from app.missions.maps.snapshot import MapSnapshot, quality_of
 from app.missions.operations.corrections.adjustment import adjustment_view
+from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.crossovers import FoundCheck, check_of, crossovers_view
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.review import soundings_page
@@ -150,6 +151,7 @@ class Reports:
         views: dict[str, View | Sequence[View] | None] = {
             "mission": mission_view(live),
             "corrections": corrections_view(live),
+            "casts": await casts_view(live, order),
             "adjustment": adjustment_view(live),
             "pings": pings,
             "imports": await imports_of(live),

@@ -29,11 +29,11 @@ class Answers:
     Attributes
     ----------
     rest
-        What REST answers, by name: ``mission``, ``map``, ``quality``, ``corrections``, ``adjustment``, ``crosslines``,
-        ``pings``, ``imports`` and, where the mission has them, ``holidays``, ``uncertainty_budget`` and ``reference``.
-        ``period`` holds the times of the first and last sounding, ``rejected`` how many soundings each state has that
-        is not used, ``refusals`` why, and how many each (numbers in reasons are left out), ``files`` name, title, size
-        and SHA-256 of files.
+        What REST answers, by name: ``mission``, ``map``, ``quality``, ``corrections``, ``casts``, ``adjustment``,
+        ``crosslines``, ``pings``, ``imports`` and, where the mission has them, ``holidays``, ``uncertainty_budget`` and
+        ``reference``. ``period`` holds the times of the first and last sounding, ``rejected`` how many soundings each
+        state has that is not used, ``refusals`` why, and how many each (numbers in reasons are left out), ``files``
+        name, title, size and SHA-256 of files.
     tracks_m
         By vehicle its track, (n, 2) east and north.
     """

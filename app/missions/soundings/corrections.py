@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.pings import Footprints, Pings, placed
+from app.mapping.water.casts import CastPlaces, Casts
 from app.mapping.water.sound_speed import SoundSpeedProfile
 from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
@@ -18,7 +19,7 @@ from app.missions.fleet.interface import Position, SoundingReport
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.systematic_errors import InstrumentErrors, SystematicErrors
-from app.missions.spec.water import SoundSpeed, Tide
+from app.missions.spec.water import Cast, SoundSpeed, Tide
 from imc_bridge.printable import printable
 
 NO_LEVEL = "tide: "
@@ -66,7 +67,7 @@ class Corrections:
     tide
         A constant level; where there is a ``table`` its levels count instead.
     sound_speed
-        None: the sonars' own ranges are taken.
+        One cast, or several with the rule by which they are chosen; None: the sonars' own ranges are taken.
     adjustment
         By how much positions were off; None: they are taken as they came.
     systematic
@@ -87,7 +88,7 @@ class Corrections:
         self._tide = tide
         self.table = table
         self.adjustment = adjustment
-        self._profile = _profile(sound_speed)
+        self.casts = None if sound_speed is None else _casts(sound_speed, frame)
         self._sound_speed = sound_speed
         self._systematic = systematic or SystematicErrors()
         self._residual = np.array(self._systematic.water_level, dtype=float).reshape(-1, 2)
@@ -114,7 +115,7 @@ class Corrections:
         source = printable(tide.source).strip()
         sound = ""
         if self._sound_speed is not None:
-            sound = f"; sound speed: {printable(self._sound_speed.source).strip() or 'profile'}"
+            sound = f"; sound speed: {printable(self._sound_speed.statement).strip() or 'profile'}"
         if self.table is None and not tide.is_applied:
             statement = f"instantaneous water level (tide: {source}{sound})"
             return VerticalDatum(INSTANTANEOUS_WATER_LEVEL, statement)
@@ -169,7 +170,7 @@ class Corrections:
         """
         errors = self._errors_of(vehicle)
         try:
-            found = placed(self._steered(pings, errors), self._frame, self._profile)
+            found = placed(self._steered(pings, errors), self._frame, self.casts)
         except ValueError:
             return None
         if self.adjustment is not None:
@@ -208,7 +209,7 @@ class Corrections:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return how far each footprint moves, (n, 2) east and north, and the bottom's depth below the water level."""
         shift = np.zeros((len(reports), 2))
-        if self._profile is None:
+        if self.casts is None:
             return shift, raw_m
         sonar = np.array([report.vehicle_depth_m for report in reports])
         down = raw_m - sonar
@@ -221,7 +222,9 @@ class Corrections:
         across[seen] = np.hypot(*offsets[seen].T)
         beams = down > 0.0
         depth = raw_m.copy()
-        across_true, down_true = self._profile.trace(sonar[beams], across[beams], down[beams])
+        at = np.array([(np.nan, np.nan) if isinstance(place, str) else place for place in places])
+        cast = self.casts.chosen(np.array([report.time_s for report in reports]), *at.T)
+        across_true, down_true = self.casts.trace(cast[beams], sonar[beams], across[beams], down[beams])
         depth[beams] = sonar[beams] + down_true
         moved = beams & seen & (across > 0.0)
         stretch = across_true[moved[beams]] / across[moved] - 1.0
@@ -252,8 +255,24 @@ class Corrections:
         return list(zip(east.tolist(), north.tolist(), strict=True))
 
 
-def _profile(sound_speed: SoundSpeed | None) -> SoundSpeedProfile | None:
-    if sound_speed is None:
-        return None
-    depths, speeds = np.array(sound_speed.profile).T
-    return SoundSpeedProfile(depths, speeds, sound_speed.assumed_mps)
+def _casts(sound_speed: SoundSpeed, frame: LocalFrame) -> Casts:
+    """Return a mission's casts. Raises ValueError where one is nowhere near the frame."""
+    casts = sound_speed.casts
+    east, north = np.full(len(casts), np.nan), np.full(len(casts), np.nan)
+    for number, cast in enumerate(casts):
+        if cast.position is not None:
+            lon, lat = cast.position
+            east[number], north[number] = frame.to_local(lat, lon)
+    times = np.array([np.nan if cast.time is None else cast.time.timestamp() for cast in casts])
+    return Casts(
+        [profile_of(cast, sound_speed.assumed_mps) for cast in casts],
+        CastPlaces(times, east, north),
+        sound_speed.rule,
+        3600.0 * sound_speed.within_h,
+    )
+
+
+def profile_of(cast: Cast, assumed_mps: float) -> SoundSpeedProfile:
+    """Return a cast's profile, for sonars with this speed set in them."""
+    depths, speeds = np.array(cast.profile).T
+    return SoundSpeedProfile(depths, speeds, assumed_mps)

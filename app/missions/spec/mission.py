@@ -178,7 +178,8 @@ class MissionSpec(Model):
     )
     tide: Tide = Field(default_factory=Tide)
     sound_speed: SoundSpeed | None = Field(
-        default=None, description="Sound speed correction; null: the sonars' own ranges are taken"
+        default=None,
+        description="Sound speed correction by one cast or several; null: the sonars' own ranges are taken",
     )
     systematic_errors: SystematicErrors = Field(
         default_factory=SystematicErrors, description="What is always wrong with sonars and water levels"
@@ -327,6 +328,23 @@ class MissionSpec(Model):
             if Polygon(self.to_local(zone)).buffer(self.limits.keep_out_margin_m).contains(place):
                 words = f"{name} lies in keep_out.{index} or in its margin: give one that vehicles may go to"
                 raise FieldError(name, words)
+
+    @model_validator(mode="after")
+    def _casts_are_near(self) -> Self:
+        if self.sound_speed is not None:
+            self.check_casts(self.sound_speed, "sound_speed.")
+        return self
+
+    def check_casts(self, sound_speed: SoundSpeed, prefix: str = "") -> None:
+        """Refuse sound speed casts that were taken nowhere near the area. Raises FieldError."""
+        for number, cast in enumerate(sound_speed.casts):
+            if cast.position is not None and not self._is_near([cast.position]):
+                field = f"{prefix}further.{number - 1}.position" if number else f"{prefix}position"
+                raise FieldError(
+                    field,
+                    f"cast {cast.name!r} is at {list(cast.position)}, nowhere near the area: "
+                    f"{self._where_it_belongs(cast.position)}",
+                )
 
     @model_validator(mode="after")
     def _targets_can_be_told_apart(self) -> Self:

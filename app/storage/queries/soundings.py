@@ -91,6 +91,16 @@ def track_query(mission_id: str) -> Select[*tuple[Any, ...]]:
     return select(*columns).where(row.mission_id == mission_id, row.verdict == "accepted").order_by(row.id)
 
 
+def cast_query(mission_id: str) -> Select[*tuple[Any, ...]]:
+    """Return the query of what accepted soundings find their sound speed cast by.
+
+    Columns are the vehicle's time (s), latitude and longitude of the raw footprint (degrees).
+    """
+    row = SoundingRow
+    columns = (row.time_s, row.lat_deg, row.lon_deg)
+    return select(*columns).where(row.mission_id == mission_id, row.verdict == "accepted").order_by(row.id)
+
+
 async def ids_at(session: AsyncSession, mission_id: str, table: Sequence[NDArray[np.float64]]) -> list[list[int]]:
     """Return for every row (east, north, depth, ...) of a table the accepted soundings with these very values."""
     found: dict[tuple[float, float, float], list[int]] = {}

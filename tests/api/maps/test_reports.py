@@ -104,7 +104,9 @@ async def swath_survey(client: httpx.AsyncClient) -> str:
     tide = {"level_m": 0.75, "sd_m": 0.04, "source": "gauge of <Leixões>", "datum_epsg": 5715}
     assert (await client.put(f"{path}/tide", json=tide)).status_code == 200
     speed = {"profile": [[0.0, 1512.3], [20.0, 1506.1]], "source": "cast 7"}
-    assert (await client.put(f"{path}/sound-speed", json=speed)).status_code == 200
+    assert (await client.put(f"{path}/sound-speed", json=speed | {"time": START_S})).status_code == 200
+    later = {"profile": [[0.0, 1590.3], [20.0, 1586.1]], "time": START_S + 30_000.0, "position": [-8.7046, 41.1852]}
+    assert (await client.put(f"{path}/sound-speed/casts/cast 8", json=later)).status_code == 200
     return path
 
 
@@ -154,6 +156,7 @@ async def answers_of(client: httpx.AsyncClient, path: str) -> dict[str, Any]:
         "map": await get("/map"),
         "quality": await get("/quality"),
         "corrections": await get("/corrections"),
+        "casts": await get("/sound-speed/casts"),
         "adjustment": await get("/adjustment"),
         "crosslines": await get("/crosslines"),
         "holidays": await get("/holidays"),

@@ -7,7 +7,7 @@ from playwright.sync_api import FilePayload, expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
-from tests.support.dashboard.steps import by_id, picture, show
+from tests.support.dashboard.steps import by_id, picture, show, violations
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.specs import rectangle
 
@@ -91,3 +91,65 @@ def test_what_cannot_be_taken_is_told_and_changes_nothing(watched: Watched, serv
     by_id(page, "corrections-set-speed").click()
     expect(pane.get_by_role("alert")).to_contain_text("profile")
     assert service.get(corrections) == before
+
+
+def test_casts_are_added_from_files_changed_and_removed(watched: Watched, service: Service, surveyed: str) -> None:
+    page, corrections = watched.page, f"/missions/{surveyed}/corrections"
+    show(page, surveyed)
+    by_id(page, "toggle-corrections").click()
+    sound, listed, pane = by_id(page, "corrections-sound-speed"), by_id(page, "cast"), by_id(page, "corrections")
+    by_id(page, "corrections-assumed").fill("1490")
+    morning = "( SoundVelocity 1.0 0 202611202100 41.1853 -8.7042 -1 0 0 SVP P 0002 )\n0 1510\n30 1506\n"
+    by_id(page, "cast-file").set_input_files(files=[text_file("morning.asvp", morning)])
+    for field, value in (
+        ("name", "morning.asvp"),
+        ("time", "2026-11-20 21:00"),
+        ("lat", "41.1853"),
+        ("lon", "-8.7042"),
+    ):
+        expect(by_id(page, f"cast-{field}")).to_have_value(value)
+    by_id(page, "cast-add").click()
+    expect(listed).to_have_count(1)
+    expect(listed).to_contain_text(
+        "morning.asvp 20 Nov 2026, 21:00 UTC · 41.1853° N 8.7042° W · down to 30.0 m · corrects"
+    )
+    expect(by_id(page, "casts-far")).to_contain_text("are more than 4 h from their cast")
+    told = service.get(corrections)["sound_speed"]
+    assert (told["assumed_mps"], told["time"], told["position"]) == (1490.0, "2026-11-20T21:00:00Z", [-8.7042, 41.1853])
+
+    by_id(page, "cast-name").fill("noon")
+    by_id(page, "cast-time").fill("soon")
+    by_id(page, "cast-text").fill("0 1512\n30 1507")
+    by_id(page, "cast-add").click()
+    expect(pane.get_by_role("alert")).to_have_text("Type the time as 2026-11-30 11:00, UTC.")
+    by_id(page, "cast-time").fill("2026-11-21 02:00")
+    by_id(page, "cast-add").click()
+    expect(listed).to_have_count(2)
+    expect(sound).to_have_text("2 casts, nearest in time; 1490 m/s is set in the sonars")
+    count = service.get(corrections)["accepted"]
+    expect(listed.nth(0)).to_contain_text("corrects 0 soundings, 0 pings")
+    expect(listed.nth(1)).to_contain_text(f"corrects {count} soundings, 0 pings · at most 0.")
+    expect(by_id(page, "casts-far")).to_have_count(0)
+    picture(page, "casts")
+
+    by_id(page, "casts-rule").select_option("nearest_in_distance_within_time")
+    by_id(page, "casts-hours").fill("2,5")
+    by_id(page, "casts-set-rule").click()
+    expect(sound).to_contain_text("2 casts, nearest in distance within a time")
+    told = service.get(corrections)["sound_speed"]
+    assert (told["rule"], told["within_h"]) == ("nearest_in_distance_within_time", 2.5)
+
+    listed.nth(1).get_by_role("button", name="Change…").click()
+    expect(by_id(page, "cast-text")).to_have_value("0 1512\n30 1507")
+    by_id(page, "cast-text").fill("0 1600\n30 1598")
+    by_id(page, "cast-add").click()
+    expect(by_id(page, "casts-differ")).to_have_count(1)
+    expect(by_id(page, "casts-differ")).to_contain_text("From morning.asvp to noon")
+    assert [one["profile"][0][1] for one in service.get(corrections)["sound_speed"]["further"]] == [1600.0]
+
+    picture(page, "casts-that-differ")
+    # Figures that a vehicle has not renewed for a while are pale.
+    assert [one for one in violations(page) if "-rover" not in one] == []
+    listed.nth(0).get_by_role("button", name="Remove").click()
+    expect(listed).to_have_count(1)
+    assert service.get(corrections)["sound_speed"]["name"] == "noon"

@@ -21,6 +21,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.soundings.corrections import NO_LEVEL, Corrections
 from app.missions.soundings.gate import Gate
+from app.missions.spec.base import FieldError
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import SoundSpeed, Tide
@@ -110,12 +111,23 @@ async def _warn_of_imports(live: LiveMission, datum: VerticalDatum) -> None:
 
 
 async def set_sound_speed(live: LiveMission, sound_speed: SoundSpeed | None, actor: str) -> CorrectionsView:
-    """Change the sound speed profile; None: the sonars' own ranges are taken."""
+    """Change the casts altogether; None: the sonars' own ranges are taken. Raises InvalidRequestError."""
+    if sound_speed is not None:
+        check_casts(live, sound_speed)
     async with live.correcting:
-        await _correct_by(live, live.spec.model_copy(update={"sound_speed": sound_speed}))
-    words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.source or 'profile'}"
+        await correct_by(live, live.spec.model_copy(update={"sound_speed": sound_speed}))
+    words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.statement}"
     await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
     return corrections_view(live)
+
+
+def check_casts(live: LiveMission, sound_speed: SoundSpeed) -> None:
+    """Refuse casts that were taken nowhere near the mission's area. Raises InvalidRequestError."""
+    try:
+        live.spec.check_casts(sound_speed)
+    except FieldError as error:
+        words, _, advice = str(error).rpartition(": ")
+        raise InvalidRequestError(error.field, words, advice) from None
 
 
 async def set_systematic_errors(live: LiveMission, errors: SystematicErrors, actor: str) -> CorrectionsView:
@@ -126,13 +138,13 @@ async def set_systematic_errors(live: LiveMission, errors: SystematicErrors, act
             who = ", ".join(sorted(known)) or "none so far"
             raise InvalidRequestError("vehicles", f"{name!r} takes no part in the mission", f"these do: {who}")
     async with live.correcting:
-        await _correct_by(live, live.spec.model_copy(update={"systematic_errors": errors}))
+        await correct_by(live, live.spec.model_copy(update={"systematic_errors": errors}))
     words = "no systematic errors are taken out" if errors.is_empty else f"systematic errors: {_described(errors)}"
     await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
     return corrections_view(live)
 
 
-async def _correct_by(live: LiveMission, spec: MissionSpec) -> None:
+async def correct_by(live: LiveMission, spec: MissionSpec) -> None:
     """Correct soundings by what a changed description says, with tide table and adjustment as they are."""
 
     async def store(_session: AsyncSession) -> None:

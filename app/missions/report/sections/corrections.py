@@ -1,5 +1,6 @@
 """What soundings were corrected by, and what was taken in from elsewhere."""
 
+from app.mapping.water.casts import CastRule
 from app.missions.report.answers import Answers
 from app.missions.report.document import Block, Facts, Paragraph, Table, Text
 from app.missions.report.texts import NONE
@@ -44,6 +45,74 @@ def _is_unnamed(answers: Answers) -> bool:
     return tide.is_unnamed and (tide.is_applied or answers.at("corrections.tide_table") is not None)
 
 
+def has_several_casts(w: Writer) -> bool:
+    """Whether several sound speed casts correct what was sounded."""
+    return bool(w.answers.at("corrections.sound_speed") and w.answers.at("corrections.sound_speed.further"))
+
+
+def _sound_speed(w: Writer) -> list[tuple[str, Text]]:
+    """Return what ranges were corrected by."""
+    t, answers, speed = w.t, w.answers, "corrections.sound_speed"
+    if answers.at(speed) is None:
+        return [(t("fact_sound_speed"), t("sound_speed_none"))]
+    assumed = (t("fact_assumed"), w.number(f"{speed}.assumed_mps", 1, "m/s"))
+    if has_several_casts(w):
+        facts: list[tuple[str, Text]] = [
+            (t("fact_sound_speed"), t("casts_of", count=t.number(len(answers.at("casts.casts"))))),
+            (t("fact_cast_rule"), w.word("cast_rule", f"{speed}.rule")),
+        ]
+        if answers.at(f"{speed}.rule") == CastRule.NEAREST_IN_DISTANCE:
+            facts.append((t("fact_within_h"), w.number(f"{speed}.within_h", 1, "h")))
+        return [*facts, assumed]
+    profile = answers.at(f"{speed}.profile")
+    facts = [
+        (t("fact_sound_speed"), w.string(f"{speed}.source") if answers.at(f"{speed}.source") else t("profile")),
+        (t("fact_profile"), t("profile_of", count=t.number(len(profile)))),
+        (t("fact_profile_top"), w.number(f"{speed}.profile.0.1", 1, "m/s")),
+        (t("fact_profile_bottom"), w.number(f"{speed}.profile.{len(profile) - 1}.1", 1, "m/s")),
+        assumed,
+    ]
+    if answers.at(f"{speed}.time") is not None:
+        facts.insert(1, (t("fact_cast_time"), w.moment(f"{speed}.time")))
+    return facts
+
+
+def _casts(w: Writer) -> list[Block]:
+    """Return what each of several casts corrected, and by how much neighbours differ."""
+    t, casts = w.t, "casts.casts"
+    rows = []
+    for index, cast in enumerate(w.answers.at(casts)):
+        own = f"{casts}.{index}"
+        rows.append(
+            [
+                w.string(f"{own}.name"),
+                w.moment(f"{own}.time"),
+                w.number(f"{own}.position.1", 5) if cast["position"] else NONE,
+                w.number(f"{own}.position.0", 5) if cast["position"] else NONE,
+                w.number(f"{own}.profile.{len(cast['profile']) - 1}.0", 1, "m"),
+                w.number(f"{own}.soundings"),
+                w.number(f"{own}.pings"),
+                w.number(f"{own}.farthest_h", 1, "h"),
+            ]
+        )
+    names = ("cast", "taken_at", "cast_lat", "cast_lon", "cast_bottom", "cast_soundings", "cast_pings", "cast_farthest")
+    blocks: list[Block] = [
+        Table([t(f"column_{name}") for name in names], rows, numbers=(2, 3, 4, 5, 6, 7), caption=t("caption_casts"))
+    ]
+    if w.answers.at("casts.changes"):
+        rows = [
+            [
+                w.string(f"casts.changes.{index}.before"),
+                w.string(f"casts.changes.{index}.after"),
+                w.number(f"casts.changes.{index}.difference_m", 2, "m"),
+            ]
+            for index in range(len(w.answers.at("casts.changes")))
+        ]
+        columns = [t(f"column_{name}") for name in ("cast_before", "cast_after", "cast_difference")]
+        blocks.append(Table(columns, rows, numbers=(2,), caption=t("caption_cast_changes")))
+    return blocks
+
+
 def corrections(w: Writer) -> list[Block]:
     """Return water level, sound speed, systematic errors, the adjustment of tracks, and imports."""
     t, answers = w.t, w.answers
@@ -66,18 +135,7 @@ def corrections(w: Writer) -> list[Block]:
         (t("fact_datum"), w.string("corrections.vertical_datum")),
         (t("fact_datum_offset"), w.number(f"{tide}.datum_offset_m", 2, "m", signed=True)),
     ]
-    if answers.at("corrections.sound_speed") is None:
-        facts.append((t("fact_sound_speed"), t("sound_speed_none")))
-    else:
-        speed = "corrections.sound_speed"
-        profile = answers.at(f"{speed}.profile")
-        facts += [
-            (t("fact_sound_speed"), w.string(f"{speed}.source") if answers.at(f"{speed}.source") else t("profile")),
-            (t("fact_profile"), t("profile_of", count=t.number(len(profile)))),
-            (t("fact_profile_top"), w.number(f"{speed}.profile.0.1", 1, "m/s")),
-            (t("fact_profile_bottom"), w.number(f"{speed}.profile.{len(profile) - 1}.1", 1, "m/s")),
-            (t("fact_assumed"), w.number(f"{speed}.assumed_mps", 1, "m/s")),
-        ]
+    facts += _sound_speed(w)
     systematic = "corrections.systematic_errors"
     for name, errors in answers.at(f"{systematic}.vehicles").items():
         for key, digits, unit in (("depth_m", 3, "m"), ("roll_offset_deg", 2, "°"), ("sound_speed_mps", 1, "m/s")):
@@ -94,6 +152,8 @@ def corrections(w: Writer) -> list[Block]:
     adjusted = bool(answers.at("adjustment.applied"))
     facts += _adjustment(w) if adjusted else [(t("fact_adjustment"), t("adjustment_none"))]
     blocks: list[Block] = [Facts(facts), Paragraph(t("raw_stays"))]
+    if has_several_casts(w):
+        blocks += _casts(w)
     if adjusted:
         blocks.append(_offsets(w))
     imports = answers.at("imports")

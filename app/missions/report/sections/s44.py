@@ -38,6 +38,7 @@ def _not_said(w: Writer) -> list[Text]:
         said.append(t("cannot_tide"))
     if answers.at("corrections.sound_speed") is None:
         said.append(t("cannot_sound_speed"))
+    said += _casts_do_not_show(w)
     if answers.at("crosslines.statistics") is None:
         said.append(t("cannot_crossings"))
     elif answers.at("crosslines.at_crosslines") is None:
@@ -46,4 +47,22 @@ def _not_said(w: Writer) -> list[Text]:
     said += [t("cannot_adjusted" if adjusted else "cannot_positions"), t("cannot_calibration")]
     if answers.at("imports"):
         said.append(t("cannot_imports"))
+    return said
+
+
+def _casts_do_not_show(w: Writer) -> list[Text]:
+    """Return where sound speed casts are too few."""
+    t, answers = w.t, w.answers
+    said: list[Text] = []
+    far = answers.at("casts.far_soundings") + answers.at("casts.far_pings")
+    if far:
+        hours = t.number(answers.at("casts.far_h"))
+        said.append(t("cannot_casts_far", count=t.number(far), hours=hours))
+    large = [change for change in answers.at("casts.changes") if change["is_large"]]
+    if large:
+        most = max(change["difference_m"] for change in large)
+        limit = t.number(answers.at("casts.limit_m"), 2, "m")
+        count = t.number(len(large))
+        order = w.order(answers.at("casts.order"))
+        said.append(t("cannot_casts_differ", count=count, most=t.number(most, 2, "m"), limit=limit, order=order))
     return said

@@ -4,8 +4,11 @@ from datetime import datetime
 
 from pydantic import Field
 
+from app.mapping.s44 import Order
+from app.mapping.water.casts import CastRule
+from app.missions.spec.base import Latitude, Longitude
 from app.missions.spec.systematic_errors import SystematicErrors
-from app.missions.spec.water import SoundSpeed, Tide
+from app.missions.spec.water import ProfileDepth, ProfileSpeed, SoundSpeed, Tide
 from app.missions.views.base import View
 
 
@@ -45,3 +48,45 @@ class CorrectionsView(View):
     vertical_datum: str = Field(description="What corrected depths are counted from")
     accepted: int = Field(description="Soundings accepted under these corrections")
     rejected: int
+
+
+class CastView(View):
+    """A sound speed cast, and what it corrects."""
+
+    name: str
+    source: str
+    time: datetime | None
+    position: tuple[Longitude, Latitude] | None
+    profile: list[tuple[ProfileDepth, ProfileSpeed]]
+    soundings: int = Field(description="Accepted soundings of single beams that it corrects")
+    pings: int = Field(description="Accepted pings of swath sonars that it corrects")
+    first: datetime | None = Field(description="Time of the first of them; null: it corrects none")
+    last: datetime | None = Field(description="Time of the last of them")
+    farthest_h: float | None = Field(description="How far one of them is away from it in time at most, hours")
+
+
+class CastChangeView(View):
+    """By how much a depth differs between two casts that follow each other in time."""
+
+    before: str
+    after: str
+    difference_m: float = Field(description="Of the depth of the outer beam, from the one profile to the other")
+    is_large: bool = Field(description="Whether that is more than `limit_m` of the list")
+
+
+class CastsView(View):
+    """A mission's sound speed casts in the order of their times, and how well they fit what was sounded."""
+
+    assumed_mps: float = Field(description="Speed that is set in the sonars")
+    rule: CastRule
+    within_h: float
+    casts: list[CastView]
+    far_h: float = Field(description="Soundings farther away in time from their cast than this are counted, hours")
+    far_soundings: int = Field(description="Soundings of single beams that are farther away")
+    far_pings: int = Field(description="Pings of swath sonars that are farther away")
+    order: Order = Field(description="Order of IHO S-44 that differences between casts are compared with")
+    angle_deg: float = Field(description="Of the outer beam that they are compared for, from straight down")
+    sonar_m: float | None = Field(description="Depth that it is sent from")
+    depth_m: float | None = Field(description="The map's deepest cell, where it meets the bottom; null: no map yet")
+    limit_m: float | None = Field(description="Half the order's largest TVU at that depth")
+    changes: list[CastChangeView] = Field(description="From each cast to the next; empty: there is no map yet")

@@ -27,6 +27,9 @@ AlarmState: TypeAlias = Annotated[Literal["open", "acknowledged"], Open]
 BatteryState: TypeAlias = Annotated[Literal["ok", "low", "critical"], Open]
 """What a battery's level is worth."""
 
+CastRule: TypeAlias = Annotated[Literal["nearest_in_time", "nearest_in_distance_within_time"], Open]
+"""How the cast of a ping is chosen."""
+
 Cause: TypeAlias = Annotated[Literal["sound", "switched_off", "port_in_use", "no_interface", "no_vehicle", "not_heard", "no_announce", "no_service", "announces_ceased", "no_traffic", "unreachable", "blocked_port", "stale_port", "foreign_address", "wrong_version", "same_id_twice", "same_name_twice", "our_id_taken", "clock_off", "clock_rate", "silent", "radio_gaps", "restarted", "packets_dropped", "low_rate", "no_entities", "no_soundings", "soundings_refused", "no_way_home", "foreign_control", "not_ready", "send_errors", "bad_packets", "refused", "unknown_messages", "crowded"], Open]
 """What a finding is about; the first of a node's problems is the one to look at."""
 
@@ -341,6 +344,108 @@ class Budget(Model):
     """Kilometres of legs that each vehicle flies, however long its turns are"""
     steps: int | None = None
     """Legs that each vehicle flies"""
+
+
+class Cast(Model):
+    """One of a mission's sound speed casts."""
+
+    profile: list[tuple[float, float]]
+    """Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere"""
+    source: str = ""
+    """Where the profile comes from, kept with the product"""
+    time: datetime | None = None
+    """When the cast was taken, UTC where no offset is given; null: not known, which only one that is alone may be"""
+    position: tuple[float, float] | None = None
+    """Where, [longitude, latitude]; null: not known, which the rule nearest_in_distance_within_time does not allow
+    for several casts
+    """
+    name: str = ""
+    """Its name among the mission's casts, without '/'; default: made of the source"""
+
+
+class CastChangeView(Model):
+    """By how much a depth differs between two casts that follow each other in time."""
+
+    before: str
+    after: str
+    difference_m: float
+    """Of the depth of the outer beam, from the one profile to the other"""
+    is_large: bool
+    """Whether that is more than `limit_m` of the list"""
+
+
+class CastDescription(Model):
+    """One sound speed cast: the speeds that were measured on a way through the water, when and where."""
+
+    profile: list[tuple[float, float]]
+    """Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere"""
+    source: str = ""
+    """Where the profile comes from, kept with the product"""
+    time: datetime | None = None
+    """When the cast was taken, UTC where no offset is given; null: not known, which only one that is alone may be"""
+    position: tuple[float, float] | None = None
+    """Where, [longitude, latitude]; null: not known, which the rule nearest_in_distance_within_time does not allow
+    for several casts
+    """
+
+
+class CastRules(Model):
+    """Which of several casts corrects a ping."""
+
+    rule: CastRule = "nearest_in_time"
+    """Which of several casts corrects a ping: the one nearest in time, or, of those within within_h, the one nearest
+    to the vehicle (to the sounding, for single beams); where none is within that, the nearest in time
+    """
+    within_h: float = 4.0
+    """With rule nearest_in_distance_within_time: how far a cast may be away in time, hours"""
+
+
+class CastView(Model):
+    """A sound speed cast, and what it corrects."""
+
+    name: str
+    source: str
+    time: datetime | None
+    position: tuple[float, float] | None
+    profile: list[tuple[float, float]]
+    soundings: int
+    """Accepted soundings of single beams that it corrects"""
+    pings: int
+    """Accepted pings of swath sonars that it corrects"""
+    first: datetime | None
+    """Time of the first of them; null: it corrects none"""
+    last: datetime | None
+    """Time of the last of them"""
+    farthest_h: float | None
+    """How far one of them is away from it in time at most, hours"""
+
+
+class CastsView(Model):
+    """A mission's sound speed casts in the order of their times, and how well they fit what was sounded."""
+
+    assumed_mps: float
+    """Speed that is set in the sonars"""
+    rule: CastRule
+    within_h: float
+    casts: list[CastView]
+    far_h: float
+    """Soundings farther away in time from their cast than this are counted, hours"""
+    far_soundings: int
+    """Soundings of single beams that are farther away"""
+    far_pings: int
+    """Pings of swath sonars that are farther away"""
+    order: Order
+    """Order of IHO S-44 that differences between casts are compared with"""
+    angle_deg: float
+    """Of the outer beam that they are compared for, from straight down"""
+    sonar_m: float | None
+    """Depth that it is sent from"""
+    depth_m: float | None
+    """The map's deepest cell, where it meets the bottom; null: no map yet"""
+    limit_m: float | None
+    """Half the order's largest TVU at that depth"""
+    changes: list[CastChangeView]
+    """From each cast to the next; empty: there is no map yet"""
 
 
 class ChangesView(Model):
@@ -1047,7 +1152,7 @@ class MissionSpec(Model):
     """What makes soundings of swath sonars uncertain"""
     tide: Tide | None = None
     sound_speed: SoundSpeed | None = None
-    """Sound speed correction; null: the sonars' own ranges are taken"""
+    """Sound speed correction by one cast or several; null: the sonars' own ranges are taken"""
     systematic_errors: SystematicErrors | None = None
     """What is always wrong with sonars and water levels"""
     site: str | None = None
@@ -1859,14 +1964,34 @@ class SnapshotMessage(Model):
 
 
 class SoundSpeed(Model):
-    """Sound speed correction: every beam is followed through the profile for the time that its sonar measured."""
+    """Sound speed correction: every beam is followed through a cast's profile for the time that its sonar measured.
+    It is a cast itself; ``further`` ones make it several, of which ``rule`` gives each ping its own.
+    """
 
     profile: list[tuple[float, float]]
     """Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere"""
-    assumed_mps: float = 1500.0
-    """Speed that is set in the sonars, m/s"""
+    rule: CastRule = "nearest_in_time"
+    """Which of several casts corrects a ping: the one nearest in time, or, of those within within_h, the one nearest
+    to the vehicle (to the sounding, for single beams); where none is within that, the nearest in time
+    """
+    within_h: float = 4.0
+    """With rule nearest_in_distance_within_time: how far a cast may be away in time, hours"""
     source: str = ""
     """Where the profile comes from, kept with the product"""
+    time: datetime | None = None
+    """When the cast was taken, UTC where no offset is given; null: not known, which only one that is alone may be"""
+    position: tuple[float, float] | None = None
+    """Where, [longitude, latitude]; null: not known, which the rule nearest_in_distance_within_time does not allow
+    for several casts
+    """
+    name: str = ""
+    """Its name among the mission's casts, without '/'; default: made of the source"""
+    assumed_mps: float = 1500.0
+    """Speed that is set in the sonars, m/s"""
+    further: list[Cast] | None = None
+    """Further casts; then each needs its own time and name and, with rule nearest_in_distance_within_time, a
+    position
+    """
 
 
 class SoundingErrors(Model):

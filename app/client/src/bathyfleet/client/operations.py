@@ -489,6 +489,52 @@ class Operations(ABC):
             models.CorrectionsView,
         ))
 
+    def get_casts(self, mission_id: str, *, order: models.Order | None = None) -> models.CastsView:
+        """See what each cast corrects: ``GET /missions/{mission_id}/sound-speed/casts``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that differences between casts are compared with
+        """
+        return self._call(Call[models.CastsView](
+            "GET",
+            f"/missions/{part(mission_id)}/sound-speed/casts",
+            models.CastsView,
+            query={"order": order},
+        ))
+
+    def set_cast(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.CastDescription | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Add or replace a sound speed cast: ``PUT /missions/{mission_id}/sound-speed/casts/{name}``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/sound-speed/casts/{part(name)}",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    def delete_cast(self, mission_id: str, name: str) -> models.CorrectionsView:
+        """Remove a sound speed cast: ``DELETE /missions/{mission_id}/sound-speed/casts/{name}``."""
+        return self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/sound-speed/casts/{part(name)}",
+            models.CorrectionsView,
+        ))
+
+    def set_cast_rule(self, mission_id: str, body: models.CastRules | Mapping[str, Any]) -> models.CorrectionsView:
+        """Choose sound speed casts by a rule: ``PUT /missions/{mission_id}/sound-speed/rule``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/sound-speed/rule",
+            models.CorrectionsView,
+            body=body,
+        ))
+
     def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
         """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
         return self._call(Call[models.SystematicErrorsView](
@@ -1989,6 +2035,56 @@ class AsyncOperations(ABC):
             "DELETE",
             f"/missions/{part(mission_id)}/sound-speed",
             models.CorrectionsView,
+        ))
+
+    async def get_casts(self, mission_id: str, *, order: models.Order | None = None) -> models.CastsView:
+        """See what each cast corrects: ``GET /missions/{mission_id}/sound-speed/casts``.
+
+        Parameters
+        ----------
+        order : models.Order, default 1a
+            Order of IHO S-44 that differences between casts are compared with
+        """
+        return await self._call(Call[models.CastsView](
+            "GET",
+            f"/missions/{part(mission_id)}/sound-speed/casts",
+            models.CastsView,
+            query={"order": order},
+        ))
+
+    async def set_cast(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.CastDescription | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Add or replace a sound speed cast: ``PUT /missions/{mission_id}/sound-speed/casts/{name}``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/sound-speed/casts/{part(name)}",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    async def delete_cast(self, mission_id: str, name: str) -> models.CorrectionsView:
+        """Remove a sound speed cast: ``DELETE /missions/{mission_id}/sound-speed/casts/{name}``."""
+        return await self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/sound-speed/casts/{part(name)}",
+            models.CorrectionsView,
+        ))
+
+    async def set_cast_rule(
+        self,
+        mission_id: str,
+        body: models.CastRules | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Choose sound speed casts by a rule: ``PUT /missions/{mission_id}/sound-speed/rule``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/sound-speed/rule",
+            models.CorrectionsView,
+            body=body,
         ))
 
     async def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:

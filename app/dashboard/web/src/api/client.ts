@@ -6,6 +6,9 @@ import type {
   AlarmReport,
   AlarmView,
   Budget,
+  CastDescription,
+  CastRules,
+  CastsView,
   ChangesView,
   CorrectionsView,
   CrossoversView,
@@ -191,6 +194,9 @@ function post<T>(path: string, body?: unknown, patience = ORDERED): Promise<T> {
   );
 }
 
+const castPath = (id: string, name: string) =>
+  `${missionPath(id)}/sound-speed/casts/${encodeURIComponent(name)}`;
+
 const put = <T>(path: string, body: unknown): Promise<T> =>
   request<T>(
     path,
@@ -305,10 +311,17 @@ export const api = {
   corrections: (id: string) => request<CorrectionsView>(`${missionPath(id)}/corrections`),
   setTide: (id: string, tide: Partial<TideCorrection>) =>
     put<CorrectionsView>(`${missionPath(id)}/tide`, tide),
-  setSoundSpeed: (id: string, speed: SoundSpeed) =>
+  setSoundSpeed: (id: string, speed: Partial<SoundSpeed>) =>
     put<CorrectionsView>(`${missionPath(id)}/sound-speed`, speed),
   deleteSoundSpeed: (id: string) =>
     request<CorrectionsView>(`${missionPath(id)}/sound-speed`, { method: "DELETE" }),
+  casts: (id: string) => request<CastsView>(`${missionPath(id)}/sound-speed/casts`),
+  setCast: (id: string, name: string, cast: CastDescription) =>
+    put<CorrectionsView>(castPath(id, name), cast),
+  deleteCast: (id: string, name: string) =>
+    request<CorrectionsView>(castPath(id, name), { method: "DELETE" }),
+  setCastRule: (id: string, rules: CastRules) =>
+    put<CorrectionsView>(`${missionPath(id)}/sound-speed/rule`, rules),
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),

@@ -737,15 +737,83 @@ export interface paths {
         get?: never;
         /**
          * Correct the sound speed
-         * @description Set the measured sound speed, at any time: every sounding is corrected anew from its raw range.
+         * @description Set the measured sound speed, one cast or several, at any time, in place of all casts that there are.
+         *
+         *     Every sounding is corrected anew from its raw range.
          */
         put: operations["setSoundSpeed"];
         post?: never;
         /**
          * Take the sonars' own ranges
-         * @description Correct no sound speed any more.
+         * @description Correct no sound speed any more: all casts are removed.
          */
         delete: operations["deleteSoundSpeed"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/sound-speed/casts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what each cast corrects
+         * @description Return the sound speed casts with how many soundings each corrects, and how far away it was taken.
+         *
+         *     `changes` tells by how much the depth of the outer beam differs from each cast to the next.
+         */
+        get: operations["getCasts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/sound-speed/casts/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Add or replace a sound speed cast
+         * @description Add a sound speed cast, or replace the one of this name, at any time: every sounding is corrected anew.
+         */
+        put: operations["setCast"];
+        post?: never;
+        /**
+         * Remove a sound speed cast
+         * @description Remove a sound speed cast; without the last one the sonars' own ranges are taken.
+         */
+        delete: operations["deleteCast"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/sound-speed/rule": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Choose sound speed casts by a rule
+         * @description Set which of several casts corrects a ping, at any time: every sounding is corrected anew.
+         */
+        put: operations["setCastRule"];
+        post?: never;
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -2468,6 +2536,254 @@ export interface components {
             steps?: number | null;
         };
         /**
+         * Cast
+         * @description One of a mission's sound speed casts.
+         */
+        Cast: {
+            /**
+             * Profile
+             * @description Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere
+             * @example [
+             *       [
+             *         0,
+             *         1512.3
+             *       ],
+             *       [
+             *         5,
+             *         1509.8
+             *       ],
+             *       [
+             *         20,
+             *         1506.1
+             *       ]
+             *     ]
+             */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Source
+             * @description Where the profile comes from, kept with the product
+             * @default
+             */
+            source: string;
+            /**
+             * Time
+             * @description When the cast was taken, UTC where no offset is given; null: not known, which only one that is alone may be
+             */
+            time?: string | null;
+            /**
+             * Position
+             * @description Where, [longitude, latitude]; null: not known, which the rule nearest_in_distance_within_time does not allow for several casts
+             */
+            position?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Name
+             * @description Its name among the mission's casts, without '/'; default: made of the source
+             * @default
+             */
+            name: string;
+        };
+        /**
+         * CastChangeView
+         * @description By how much a depth differs between two casts that follow each other in time.
+         */
+        CastChangeView: {
+            /** Before */
+            before: string;
+            /** After */
+            after: string;
+            /**
+             * Difference M
+             * @description Of the depth of the outer beam, from the one profile to the other
+             */
+            difference_m: number;
+            /**
+             * Is Large
+             * @description Whether that is more than `limit_m` of the list
+             */
+            is_large: boolean;
+        };
+        /**
+         * CastDescription
+         * @description One sound speed cast: the speeds that were measured on a way through the water, when and where.
+         */
+        CastDescription: {
+            /**
+             * Profile
+             * @description Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere
+             * @example [
+             *       [
+             *         0,
+             *         1512.3
+             *       ],
+             *       [
+             *         5,
+             *         1509.8
+             *       ],
+             *       [
+             *         20,
+             *         1506.1
+             *       ]
+             *     ]
+             */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Source
+             * @description Where the profile comes from, kept with the product
+             * @default
+             */
+            source: string;
+            /**
+             * Time
+             * @description When the cast was taken, UTC where no offset is given; null: not known, which only one that is alone may be
+             */
+            time?: string | null;
+            /**
+             * Position
+             * @description Where, [longitude, latitude]; null: not known, which the rule nearest_in_distance_within_time does not allow for several casts
+             */
+            position?: [
+                number,
+                number
+            ] | null;
+        };
+        /**
+         * CastRule
+         * @description How the cast of a ping is chosen.
+         * @enum {string}
+         */
+        CastRule: "nearest_in_time" | "nearest_in_distance_within_time";
+        /**
+         * CastRules
+         * @description Which of several casts corrects a ping.
+         */
+        CastRules: {
+            /**
+             * @description Which of several casts corrects a ping: the one nearest in time, or, of those within within_h, the one nearest to the vehicle (to the sounding, for single beams); where none is within that, the nearest in time
+             * @default nearest_in_time
+             */
+            rule: components["schemas"]["CastRule"];
+            /**
+             * Within H
+             * @description With rule nearest_in_distance_within_time: how far a cast may be away in time, hours
+             * @default 4
+             */
+            within_h: number;
+        };
+        /**
+         * CastView
+         * @description A sound speed cast, and what it corrects.
+         */
+        CastView: {
+            /** Name */
+            name: string;
+            /** Source */
+            source: string;
+            /** Time */
+            time: string | null;
+            /** Position */
+            position: [
+                number,
+                number
+            ] | null;
+            /** Profile */
+            profile: [
+                number,
+                number
+            ][];
+            /**
+             * Soundings
+             * @description Accepted soundings of single beams that it corrects
+             */
+            soundings: number;
+            /**
+             * Pings
+             * @description Accepted pings of swath sonars that it corrects
+             */
+            pings: number;
+            /**
+             * First
+             * @description Time of the first of them; null: it corrects none
+             */
+            first: string | null;
+            /**
+             * Last
+             * @description Time of the last of them
+             */
+            last: string | null;
+            /**
+             * Farthest H
+             * @description How far one of them is away from it in time at most, hours
+             */
+            farthest_h: number | null;
+        };
+        /**
+         * CastsView
+         * @description A mission's sound speed casts in the order of their times, and how well they fit what was sounded.
+         */
+        CastsView: {
+            /**
+             * Assumed Mps
+             * @description Speed that is set in the sonars
+             */
+            assumed_mps: number;
+            rule: components["schemas"]["CastRule"];
+            /** Within H */
+            within_h: number;
+            /** Casts */
+            casts: components["schemas"]["CastView"][];
+            /**
+             * Far H
+             * @description Soundings farther away in time from their cast than this are counted, hours
+             */
+            far_h: number;
+            /**
+             * Far Soundings
+             * @description Soundings of single beams that are farther away
+             */
+            far_soundings: number;
+            /**
+             * Far Pings
+             * @description Pings of swath sonars that are farther away
+             */
+            far_pings: number;
+            /** @description Order of IHO S-44 that differences between casts are compared with */
+            order: components["schemas"]["Order"];
+            /**
+             * Angle Deg
+             * @description Of the outer beam that they are compared for, from straight down
+             */
+            angle_deg: number;
+            /**
+             * Sonar M
+             * @description Depth that it is sent from
+             */
+            sonar_m: number | null;
+            /**
+             * Depth M
+             * @description The map's deepest cell, where it meets the bottom; null: no map yet
+             */
+            depth_m: number | null;
+            /**
+             * Limit M
+             * @description Half the order's largest TVU at that depth
+             */
+            limit_m: number | null;
+            /**
+             * Changes
+             * @description From each cast to the next; empty: there is no map yet
+             */
+            changes: components["schemas"]["CastChangeView"][];
+        };
+        /**
          * Cause
          * @description What a finding is about; the first of a node's problems is the one to look at.
          * @enum {string}
@@ -4000,7 +4316,7 @@ export interface components {
             /** @description What makes soundings of swath sonars uncertain */
             uncertainty?: components["schemas"]["SoundingErrors"];
             tide?: components["schemas"]["Tide"];
-            /** @description Sound speed correction; null: the sonars' own ranges are taken */
+            /** @description Sound speed correction by one cast or several; null: the sonars' own ranges are taken */
             sound_speed?: components["schemas"]["SoundSpeed"] | null;
             /** @description What is always wrong with sonars and water levels */
             systematic_errors?: components["schemas"]["SystematicErrors"];
@@ -4214,7 +4530,7 @@ export interface components {
                 /** @description What makes soundings of swath sonars uncertain */
                 uncertainty?: components["schemas"]["SoundingErrors"];
                 tide?: components["schemas"]["Tide"];
-                /** @description Sound speed correction; null: the sonars' own ranges are taken */
+                /** @description Sound speed correction by one cast or several; null: the sonars' own ranges are taken */
                 sound_speed?: components["schemas"]["SoundSpeed"] | null;
                 /** @description What is always wrong with sonars and water levels */
                 systematic_errors?: components["schemas"]["SystematicErrors"];
@@ -6041,15 +6357,22 @@ export interface components {
         };
         /**
          * SoundSpeed
-         * @description Sound speed correction: every beam is followed through the profile for the time that its sonar measured.
+         * @description Sound speed correction: every beam is followed through a cast's profile for the time that its sonar measured.
+         *
+         *     It is a cast itself; ``further`` ones make it several, of which ``rule`` gives each ping its own.
          */
         SoundSpeed: {
             /**
-             * Assumed Mps
-             * @description Speed that is set in the sonars, m/s
-             * @default 1500
+             * @description Which of several casts corrects a ping: the one nearest in time, or, of those within within_h, the one nearest to the vehicle (to the sounding, for single beams); where none is within that, the nearest in time
+             * @default nearest_in_time
              */
-            assumed_mps: number;
+            rule: components["schemas"]["CastRule"];
+            /**
+             * Within H
+             * @description With rule nearest_in_distance_within_time: how far a cast may be away in time, hours
+             * @default 4
+             */
+            within_h: number;
             /**
              * Profile
              * @description Measured speeds as [depth in m, speed in m/s], from top to bottom; one pair: the same everywhere
@@ -6078,6 +6401,36 @@ export interface components {
              * @default
              */
             source: string;
+            /**
+             * Time
+             * @description When the cast was taken, UTC where no offset is given; null: not known, which only one that is alone may be
+             */
+            time?: string | null;
+            /**
+             * Position
+             * @description Where, [longitude, latitude]; null: not known, which the rule nearest_in_distance_within_time does not allow for several casts
+             */
+            position?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Name
+             * @description Its name among the mission's casts, without '/'; default: made of the source
+             * @default
+             */
+            name: string;
+            /**
+             * Assumed Mps
+             * @description Speed that is set in the sonars, m/s
+             * @default 1500
+             */
+            assumed_mps: number;
+            /**
+             * Further
+             * @description Further casts; then each needs its own time and name and, with rule nearest_in_distance_within_time, a position
+             */
+            further?: components["schemas"]["Cast"][];
         };
         /**
          * SoundingErrors
@@ -11923,6 +12276,401 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getCasts: {
+        parameters: {
+            query?: {
+                /** @description Order of IHO S-44 that differences between casts are compared with */
+                order?: components["schemas"]["Order"];
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CastsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setCast: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of a sound speed cast */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CastDescription"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteCast: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of a sound speed cast */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; the mission has no such sound speed cast */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setCastRule: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CastRules"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

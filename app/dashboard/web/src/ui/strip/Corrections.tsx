@@ -1,18 +1,18 @@
 import "./Corrections.css";
-import { type Signal, useSignal, useSignalEffect } from "@preact/signals";
+import { useSignal, useSignalEffect } from "@preact/signals";
 import { api } from "../../api/client";
 import SPEC from "../../api/mission.json";
 import type { CorrectionsView } from "../../api/types";
 import { whyNotCommand } from "../../state/access";
-import { profileEnds, profileOf } from "../../state/analysis/soundSpeedProfile";
-import { count, dayAndTime, plain, pointed } from "../../state/format";
+import { type Cast, castsOf } from "../../state/analysis/soundSpeedCast";
+import { profileEnds } from "../../state/analysis/soundSpeedProfile";
+import { count, dayAndTime, plain } from "../../state/format";
 import { said } from "../../state/session";
 import { selectedId } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, FileButton, Trouble, Typed } from "../parts/Controls";
-
-/** Changes something, and shows the corrections that hold then. */
-type Change = (change: (id: string) => Promise<CorrectionsView>) => Promise<void>;
+import { Casts, RULES } from "./Casts";
+import { type Change, numberOf, type PartProps } from "./correctionParts";
 
 /** How soundings are corrected for tide and sound speed, and how that is changed, also when all was flown long ago. */
 export function Corrections() {
@@ -61,19 +61,6 @@ export function Corrections() {
     </div>
   );
 }
-
-interface PartProps {
-  found: CorrectionsView;
-  busy: Signal<boolean>;
-  change: Change;
-  fault: Signal<string>;
-}
-
-/** A number as it is typed; null where it is none. */
-const numberOf = (text: Signal<string>): number | null => {
-  const typed = pointed(text.peek()).trim();
-  return typed !== "" && Number.isFinite(Number(typed)) ? Number(typed) : null;
-};
 
 function WaterLevel({ found, busy, change, fault }: PartProps) {
   const { tide, tide_table: table } = found;
@@ -149,74 +136,89 @@ function WaterLevel({ found, busy, change, fault }: PartProps) {
 /** "low – high", or the one that both are. */
 const between = (ends: readonly [number, number]): string => [...new Set(ends.map(plain))].join(" – ");
 
-const SET_IN_SONARS_MPS = 1500;
-
 function SoundSpeed({ found, busy, change, fault }: PartProps) {
   const speed = found.sound_speed;
-  const assumed = useSignal(plain(speed?.assumed_mps ?? SET_IN_SONARS_MPS));
+  const assumed = useSignal(plain(speed?.assumed_mps ?? SPEC["sound_speed.assumed_mps"].default));
   const everywhere = useSignal("");
   const ends = speed ? profileEnds(speed.profile) : null;
-  const apply = (profile: [number, number][], source: string) => {
+  const apply = (cast: Partial<Cast>, source: string) => {
     const assumed_mps = numberOf(assumed);
+    const { profile = [] } = cast;
     if (assumed_mps === null || profile.length === 0) {
       fault.value = say(assumed_mps === null ? "corrections.typeNumbers" : "corrections.noProfile");
       return;
     }
-    void change((id) => api.setSoundSpeed(id, { assumed_mps, profile, source }));
+    void change((id) => api.setSoundSpeed(id, { ...cast, assumed_mps, profile, source }));
   };
   const one = () => {
     const mps = numberOf(everywhere);
     if (mps === null) fault.value = say("corrections.typeNumbers");
-    else apply([[0, mps]], say("draft.statedByTheOperator"));
+    else apply({ profile: [[0, mps]] }, say("draft.statedByTheOperator"));
   };
+  // Of a file of several sections the one with most depths, as of any other.
+  const longest = (text: string): Partial<Cast> =>
+    castsOf(text).reduce<Partial<Cast>>(
+      (most, cast) => (cast.profile.length > (most.profile?.length ?? 0) ? cast : most),
+      {},
+    );
+  const isSeveral = !!speed?.further.length;
   return (
-    <section aria-label={say("corrections.soundSpeed")}>
-      <h3>{say("corrections.soundSpeed")}</h3>
-      <p data-testid="corrections-sound-speed">
-        {speed && ends
-          ? say("corrections.profile", {
-              depths: between(ends.depths),
-              speeds: between(ends.speeds),
-              count: count(speed.profile.length),
-              assumed: plain(speed.assumed_mps),
-              source: speed.source,
-            })
-          : say("corrections.ownRanges")}
-      </p>
-      <div class="fields">
-        <label class="field">
-          {say("corrections.setInTheSonars")}
-          <Typed text={assumed} id="corrections-assumed" />
-        </label>
-        <label class="field">
-          {say("corrections.sameEverywhere")}
-          <Typed text={everywhere} id="corrections-speed" />
-        </label>
-      </div>
-      <p class="row">
-        <Button id="corrections-set-speed" commands busy={busy.value} onClick={one}>
-          {say("corrections.applySpeed")}
-        </Button>
-        {whyNotCommand.value ? null : (
-          <FileButton
-            accept=".asvp,.vel,.svp,.csv,.txt,.tsv"
-            id="corrections-profile-file"
-            onText={(name, text) => apply(profileOf(text), name)}
-          >
-            {say("corrections.profileFile")}
-          </FileButton>
-        )}
-        {speed ? (
-          <Button
-            id="corrections-remove-speed"
-            commands
-            busy={busy.value}
-            onClick={() => void change(api.deleteSoundSpeed)}
-          >
-            {say("corrections.remove")}
+    <>
+      <section aria-label={say("corrections.soundSpeed")}>
+        <h3>{say("corrections.soundSpeed")}</h3>
+        <p data-testid="corrections-sound-speed">
+          {isSeveral
+            ? say("corrections.severalCasts", {
+                count: count(1 + speed.further.length),
+                rule: RULES[speed.rule](),
+                assumed: plain(speed.assumed_mps),
+              })
+            : speed && ends
+              ? say("corrections.profile", {
+                  depths: between(ends.depths),
+                  speeds: between(ends.speeds),
+                  count: count(speed.profile.length),
+                  assumed: plain(speed.assumed_mps),
+                  source: speed.source,
+                })
+              : say("corrections.ownRanges")}
+        </p>
+        <div class="fields">
+          <label class="field">
+            {say("corrections.setInTheSonars")}
+            <Typed text={assumed} id="corrections-assumed" />
+          </label>
+          <label class="field">
+            {say("corrections.sameEverywhere")}
+            <Typed text={everywhere} id="corrections-speed" />
+          </label>
+        </div>
+        <p class="row">
+          <Button id="corrections-set-speed" commands busy={busy.value} onClick={one}>
+            {say("corrections.applySpeed")}
           </Button>
-        ) : null}
-      </p>
-    </section>
+          {whyNotCommand.value ? null : (
+            <FileButton
+              accept=".asvp,.vel,.svp,.csv,.txt,.tsv"
+              id="corrections-profile-file"
+              onText={(name, text) => apply(longest(text), name)}
+            >
+              {say(isSeveral ? "corrections.profileFileInstead" : "corrections.profileFile")}
+            </FileButton>
+          )}
+          {speed ? (
+            <Button
+              id="corrections-remove-speed"
+              commands
+              busy={busy.value}
+              onClick={() => void change(api.deleteSoundSpeed)}
+            >
+              {say("corrections.remove")}
+            </Button>
+          ) : null}
+        </p>
+      </section>
+      <Casts found={found} busy={busy} change={change} fault={fault} assumed={assumed} />
+    </>
   );
 }
