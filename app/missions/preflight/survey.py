@@ -16,6 +16,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.preflight.doctor import doctor_checks
 from app.missions.preflight.neighbours import neighbour_checks
+from app.missions.preflight.positions import position_checks
 from app.missions.preflight.recovery import recovery_checks
 from app.missions.preflight.search import search_checks
 from app.missions.preflight.swath import swath_checks
@@ -45,6 +46,7 @@ def preflight(
         *_batteries(live),
         *recovery_checks(live),
         *_places(live),
+        *position_checks(live),
         *neighbour_checks(live, at_sea),
         *_depths(live),
         *_room(live),
