@@ -160,6 +160,11 @@ class Broker(_Section):
     user: str = Field(default="", description="Who logs in; empty: nobody does")
     password: SecretStr = Field(default=SecretStr(""), description="The user's password")
 
+    @property
+    def sends_password_openly(self) -> bool:
+        """Whether the password can be read on the network on its way to the broker."""
+        return bool(self.host and self.user) and not self.tls and self.host not in ("localhost", "127.0.0.1", "::1")
+
 
 class AlarmSettings(_Section):
     """How alarms leave the page."""

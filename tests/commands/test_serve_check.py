@@ -87,3 +87,20 @@ def test_certificates_that_are_not_valid_now_are_told(check: Check, authority: A
         f"warning: compute.tls_certificate {chain} is valid until 2021-01-01 00:00 UTC: renew it\n"
         "the settings can be used\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("broker", "is_told"),
+    [
+        ('host = "deck"\nuser = "fleet"\npassword = "salt"\ntls = false\n', True),
+        ('host = "deck"\nuser = "fleet"\npassword = "salt"\n', False),
+        ('host = "deck"\ntls = false\n', False),
+        ('host = "127.0.0.1"\nuser = "fleet"\npassword = "salt"\ntls = false\n', False),
+    ],
+    ids=["in the clear", "by TLS", "nobody logs in", "on this machine"],
+)
+def test_a_password_that_is_sent_in_the_clear_is_told(check: Check, broker: str, is_told: bool) -> None:
+    problems, said = check(f"[alarms.mqtt]\n{broker}")
+    assert problems == []
+    assert ("warning: alarms.mqtt.password is sent to deck unprotected" in said) is is_told
+    assert "salt" not in said

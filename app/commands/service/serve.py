@@ -58,6 +58,8 @@ def serve(
     logs.configure(settings.log_level, settings.log_format)
     for setting, variable in overridden().items():
         log.warning("an environment variable overrules the settings file", setting=setting, variable=variable)
+    for line in _open_passwords(settings):
+        log.warning(line)
     # Before the rest is loaded, which takes seconds: most starts that fail do so here.
     asyncio.run(prepare_database(settings.database_url, may_upgrade=settings.migrates_itself))
     # What is imported stays: looking for garbage in it takes a fifth of a start, and later keeps requests waiting.
@@ -84,5 +86,16 @@ def _check_files(settings: "Settings") -> None:
     problems = list(unusable_files(settings))
     if problems:
         raise SettingsError(problems)
-    for line in certificates_out_of_time(settings):
+    for line in (*certificates_out_of_time(settings), *_open_passwords(settings)):
         typer.echo(f"warning: {line}", err=True)
+
+
+def _open_passwords(settings: "Settings") -> list[str]:
+    """Return a line for each password that is sent unprotected."""
+    broker = settings.alarms.mqtt
+    if not broker.sends_password_openly:
+        return []
+    return [
+        f"alarms.mqtt.password is sent to {broker.host} unprotected, for everyone on that network to read: "
+        "set alarms.mqtt.tls to true, with the broker's port for TLS, often 8883"
+    ]
