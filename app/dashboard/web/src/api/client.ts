@@ -14,8 +14,11 @@ import type {
   FieldProblem,
   ForecastView,
   Holidays,
+  ImportOptions,
+  ImportView,
   LayerView,
   LngLat,
+  LogView,
   MissionAction,
   MissionSummary,
   MissionView,
@@ -30,6 +33,7 @@ import type {
   ProductView,
   ProfileView,
   QualityView,
+  ReferenceView,
   RulingsView,
   SearchGridView,
   SessionView,
@@ -49,6 +53,7 @@ import type {
   TrafficView,
   VehicleView,
 } from "./types";
+import { upload } from "./upload";
 
 const BASE = "/api/v1";
 const LOG_PAGE = 1000;
@@ -205,6 +210,18 @@ const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/$
 
 const sitePath = (id: string, part: string) => `/sites/${encodeURIComponent(id)}/${part}`;
 
+/** A file on its way: `onBytes` is told how much has gone. */
+export interface Sending {
+  file: File;
+  onBytes: (sent: number) => void;
+  gone: AbortSignal;
+}
+
+function send<T>(method: "POST" | "PUT", path: string, query: object, { file, onBytes, gone }: Sending) {
+  const said = Object.entries({ ...query, filename: file.name }).filter(([, value]) => value !== "");
+  return upload<T>(method, `${BASE}${path}?${new URLSearchParams(said)}`, file, onBytes, gone);
+}
+
 /** A mission that nobody has created, and how deep it is there; empty: not known. */
 export interface Described {
   mission: NewMission;
@@ -294,6 +311,18 @@ export const api = {
     put<CorrectionsView>(`${missionPath(id)}/sound-speed`, speed),
   deleteSoundSpeed: (id: string) =>
     request<CorrectionsView>(`${missionPath(id)}/sound-speed`, { method: "DELETE" }),
+  logs: (id: string) => poll<LogView[]>(`${missionPath(id)}/logs`),
+  /** `vehicle`: empty where the log says whose it is. */
+  sendLog: (id: string, vehicle: string, sending: Sending) =>
+    send<LogView>("POST", `${missionPath(id)}/logs`, { vehicle }, sending),
+  imports: (id: string) => request<ImportView[]>(`${missionPath(id)}/imports`),
+  sendImport: (id: string, options: ImportOptions, sending: Sending) =>
+    send<ImportView>("POST", `${missionPath(id)}/imports`, options, sending),
+  deleteImport: (id: string, one: string) => remove(`${missionPath(id)}/imports/${encodeURIComponent(one)}`),
+  reference: (id: string) => request<ReferenceView>(`${missionPath(id)}/reference`),
+  sendReference: (id: string, options: ImportOptions, sending: Sending) =>
+    send<ReferenceView>("PUT", `${missionPath(id)}/reference`, options, sending),
+  deleteReference: (id: string) => remove(`${missionPath(id)}/reference`),
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),

@@ -63,6 +63,14 @@ export type QualityView = Complete<Schemas["QualityView"]>;
 export type SystematicErrors = Complete<Schemas["SystematicErrors"]>;
 export type SystematicErrorView = Complete<Schemas["SystematicErrorView"]>;
 export type CorrectionsView = Complete<Schemas["CorrectionsView"]>;
+export type LogView = Complete<Schemas["LogView"]>;
+export type ImportView = Complete<Schemas["ImportView"]>;
+export type ReferenceView = Complete<Schemas["ReferenceView"]>;
+/** What a file of depths does not say by itself, as it is typed; empty: nothing is said. */
+export type ImportOptions = Record<
+  "crs" | "positive" | "sd_m" | "order" | "datum_offset_m" | "source",
+  string
+>;
 export type TideCorrection = Schemas["TideCorrection"];
 export type SoundSpeed = Schemas["SoundSpeed"];
 export type SystematicErrorsView = Complete<Schemas["SystematicErrorsView"]>;
