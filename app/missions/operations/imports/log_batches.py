@@ -153,6 +153,8 @@ class WantedLog:
     vehicle: str | None
     bridge: BridgeSettings
     near: Near
+    unconfined: bool = False
+    """Whether it is read even where the system has nothing to lock the reading process in with."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,14 @@ class RefusedLog:
     remedy: str
 
 
-LogItem = OpenedLog | LogBatch | LogFacts | RefusedLog
+@dataclass(frozen=True)
+class UnreadLog:
+    """That a log is not read since nothing locks the process in: why, by layer."""
+
+    confined: dict[str, str]
+
+
+LogItem = OpenedLog | LogBatch | LogFacts | RefusedLog | UnreadLog
 
 
 def read_log(content: LogContent, wanted: WantedLog) -> Iterator[LogItem]:

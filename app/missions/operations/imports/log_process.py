@@ -1,46 +1,53 @@
-"""Vehicles' logs that a service takes in are read by a process of their own: reading takes minutes of computing.
+"""Vehicles' logs that a service takes in are read by a process of their own, locked in: it takes minutes of computing.
 
 As a program: the argument is the number of an open file, the log. What is asked comes pickled on standard input; what
 was read goes pickled to standard output, each item behind its length.
 """
 
 import asyncio
+import io
 import os
 import pickle
 import signal
 import struct
 import sys
 from asyncio.subprocess import Process
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Collection, Iterable
 from contextlib import asynccontextmanager, suppress
-from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-import app
-from app.mapping.readers.confinement import ResourceLimits, limit
+from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.readers.confinement import ResourceLimits, confine, limit
+from app.mapping.readers.warm_up import data_folders
 from app.missions.errors import InvalidRequestError
+from app.missions.fleet.interface import BeamGeometry, PingReport, Position, SoundingReport, VehicleReport
 from app.missions.operations.imports.log_batches import (
     LogBatch,
     LogFacts,
     LogItem,
     OpenedLog,
     RefusedLog,
+    UnreadLog,
     WantedLog,
     read_log,
 )
+from app.missions.operations.imports.reader_process import not_confined, reader_environment
 from imc_bridge.logs import OpenLog
 
-ROOT = str(Path(app.__file__).resolve().parents[1])
-"""Where the process finds this program."""
-LIMITS = ResourceLimits(memory_bytes=4 * 2**30, cpu_s=1800, file_bytes=0)
+LIMITS = ResourceLimits(memory_bytes=4 * 2**30, cpu_s=1800, file_bytes=2**20)
 SIZE = struct.Struct("<Q")
 MAX_ITEM_BYTES = 2**28
 """A batch of pings is some megabytes."""
 SILENCE_S = 600.0
 """So long nothing may come of a file of which nothing can be used."""
 
-_ENVIRONMENT = ("LD_LIBRARY_PATH", "PROJ_DATA", "GDAL_DATA", "TZDIR")
-"""What the process gets of ours: where libraries and their tables lie, and nothing that is secret."""
+_ALLOWED = {
+    *((one.__module__, one.__name__) for one in (OpenedLog, LogBatch, LogFacts, RefusedLog, UnreadLog)),
+    *((one.__module__, one.__name__) for one in (SoundingReport, VehicleReport, PingReport, Position, BeamGeometry)),
+    ("numpy", "dtype"),
+    *((f"numpy.{core}.numeric", "_frombuffer") for core in ("core", "_core")),
+}
+"""What items are made of, by module and name."""
 
 
 class ReadingProcess:
@@ -76,8 +83,8 @@ async def reading(file: IO[bytes], wanted: WantedLog) -> AsyncIterator[ReadingPr
 
     Raises
     ------
-    InvalidRequestError
-        When the file is no log that can be used.
+    InvalidRequestError, ImportUnavailableError
+        When the file is no log that can be used; when nothing here keeps the process from other files.
     """
     process = await asyncio.create_subprocess_exec(
         sys.executable,
@@ -90,7 +97,7 @@ async def reading(file: IO[bytes], wanted: WantedLog) -> AsyncIterator[ReadingPr
         # What libraries write there may quote the file.
         stderr=asyncio.subprocess.DEVNULL,
         pass_fds=(file.fileno(),),
-        env=_environment(),
+        env=reader_environment(),
         cwd="/",
         # Its own session: a signal from a terminal to the service is not for it.
         start_new_session=True,
@@ -122,7 +129,9 @@ async def _read(process: Process) -> LogItem:
             content = await process.stdout.readexactly(size)
     except (asyncio.IncompleteReadError, TimeoutError):
         raise _broken_off() from None
-    item: LogItem = await asyncio.to_thread(pickle.loads, content)  # this program wrote it
+    item = await asyncio.to_thread(_item, content)
+    if isinstance(item, UnreadLog):
+        raise not_confined(item.confined)
     if isinstance(item, RefusedLog):
         raise InvalidRequestError(item.field, item.message, item.remedy)
     return item
@@ -136,28 +145,49 @@ def _broken_off() -> InvalidRequestError:
     )
 
 
-def _environment() -> dict[str, str]:
-    search = os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))
-    kept = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
-    return kept | {
-        "PYTHONPATH": search,
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "LANG": "C.UTF-8",
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-        "MKL_NUM_THREADS": "1",
-        "PROJ_NETWORK": "OFF",
-    }
+class _Items(pickle.Unpickler):
+    """Makes what the process says of our own classes and of arrays of numbers only: nobody vouches for it.
+
+    It has read what nobody vouches for.
+    """
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a class that an item may be made of. Raises UnpicklingError for any other."""
+        if (module, name) in _ALLOWED:
+            return super().find_class(module, name)
+        raise pickle.UnpicklingError(f"{module}.{name} is no part of a log")
+
+
+def _item(content: bytes) -> LogItem:
+    try:
+        item = _Items(io.BytesIO(content)).load()
+    except Exception:
+        # Whatever unpickling raises: it was told something that makes no sense.
+        raise _broken_off() from None
+    if not isinstance(item, LogItem):
+        raise _broken_off()
+    return item
+
+
+def _confined(descriptors: Collection[int], wanted: WantedLog) -> dict[str, str]:
+    """Lock this process in for good; returns why not, by layer, where it stays free and may not."""
+    # What loads files when it is first used is used before.
+    frame = LocalFrame(wanted.near.origin_lat_deg, wanted.near.origin_lon_deg)
+    frame.to_local(wanted.near.origin_lat_deg, wanted.near.origin_lon_deg)
+    held = confine(descriptors, data_folders())
+    return held if held["landlock"] and held["seccomp"] and not wanted.unconfined else {}
 
 
 def main() -> None:
-    """Read the log that the argument names, and say what is in it."""
+    """Read the log that the argument names, locked in, and say what is in it."""
     limit(LIMITS)
     wanted = pickle.load(sys.stdin.buffer)  # noqa: S301 - this program wrote it
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as out:
         # Whatever else is printed is no item.
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-        _write(out, read_log(OpenLog(int(sys.argv[1]), wanted.name), wanted))
+        log = int(sys.argv[1])
+        free = _confined([log, out.fileno()], wanted)
+        _write(out, [UnreadLog(free)] if free else read_log(OpenLog(log, wanted.name), wanted))
 
 
 def _write(out: IO[bytes], items: Iterable[LogItem]) -> None:

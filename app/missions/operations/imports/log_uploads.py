@@ -226,7 +226,8 @@ class LogUploads:
         def show(done: int, _total: int) -> None:
             job.read_bytes = done
 
-        async with reading(upload.file, WantedLog(job.file, job.vehicle, bridge, near(live))) as process:
+        wanted = WantedLog(job.file, job.vehicle, bridge, near(live), self._settings.unconfined_imports)
+        async with reading(upload.file, wanted) as process:
             job.vehicle = process.opened.vehicle
             head = LogHead(job.file, job.digest, job.vehicle, process.opened.size_bytes)
             work = LogImport(live, self._settings, head, _WhileOpen(process, live, self._get))

@@ -32,6 +32,7 @@ import type {
   Problem,
   ProductView,
   ProfileView,
+  ProposedZonesView,
   QualityView,
   ReferenceView,
   RulingsView,
@@ -323,6 +324,18 @@ export const api = {
   sendReference: (id: string, options: ImportOptions, sending: Sending) =>
     send<ReferenceView>("PUT", `${missionPath(id)}/reference`, options, sending),
   deleteReference: (id: string) => remove(`${missionPath(id)}/reference`),
+  /** What a chart shows to keep out of between these degrees. */
+  proposeZones: (
+    ends: Record<"west_deg" | "south_deg" | "east_deg" | "north_deg", string>,
+    { file, onBytes, gone }: Sending,
+  ) =>
+    upload<ProposedZonesView>(
+      "POST",
+      `${BASE}/chart-zones?${new URLSearchParams(ends)}`,
+      file,
+      onBytes,
+      gone,
+    ),
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),
