@@ -15,6 +15,7 @@ from app.missions.clock import now
 from app.missions.errors import InvalidRequestError
 from app.missions.fleet.interface import PingReport, SoundingReport, VehicleReport
 from app.missions.fleet.links.imc import bridge_settings
+from app.missions.large_batches import made_of
 from app.missions.live.journals.journal import position_row
 from app.missions.live.mission import LiveMission
 from app.missions.operations.imports.log_batches import LogBatch, LogBatches, LogFacts, Near, Report
@@ -219,7 +220,7 @@ class LogImport:
             known = await sounding_queries.answer_to(session, live.id, key)
             if known is not None:
                 # Read once more all the same: the gate judges jumps from one batch to the next.
-                self._gate.check(soundings)
+                await made_of(soundings, self._gate.check, soundings)
                 tally.add(known.answer, known=True)
                 return
             verdicts, committed = await live.journal.take(soundings, session, gate=self._gate)

@@ -29,8 +29,8 @@ export const PLANNING = {
   "area.drawCorners": { en: "Draw corners", pt: "Desenhar cantos" },
   "area.drawRectangle": { en: "Draw rectangle", pt: "Desenhar retângulo" },
   "area.zonesFromAChart": {
-    en: "Keep-out zones from a chart (ENC)…",
-    pt: "Zonas interditas de uma carta (ENC)…",
+    en: "Zones from a chart (ENC)…",
+    pt: "Zonas de uma carta (ENC)…",
   },
   "area.chartBeingRead": { en: "The chart is being read…", pt: "A carta está a ser lida…" },
   "area.zonesProposed": {
