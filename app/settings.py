@@ -131,7 +131,7 @@ class Settings(BaseSettings, ServiceSettings):
     output_dir: Path = Field(default=Path("output"), description="Folder for exported files")
     max_body_bytes: int = Field(default=8 * 2**20, ge=1024, le=2**30, description="Largest request body that is taken")
     max_import_bytes: int = Field(
-        default=64 * 2**20, ge=1024, le=2**30, description="Largest file of soundings or of a map that is taken"
+        default=128 * 2**20, ge=1024, le=2**30, description="Largest file of soundings, of a map or log that is taken"
     )
     max_bytes_in_flight: int = Field(
         default=256 * 2**20,

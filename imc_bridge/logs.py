@@ -7,13 +7,14 @@ what radio never carried while the vehicle was under water is here. The same int
 from __future__ import annotations
 
 import gzip
+import os
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Generator, Iterator
 from io import BufferedReader
-from pathlib import Path
-from typing import cast
+from pathlib import PurePath
+from typing import Literal, Protocol, cast
 
 import imcpy
 
@@ -58,6 +59,44 @@ class LogError(Exception):
         self.remedy = remedy
 
 
+class LogContent(Protocol):
+    """A file, which a :class:`pathlib.Path` is; it is opened several times, one after the other."""
+
+    @property
+    def name(self) -> str:
+        """Without its folder."""
+        ...
+
+    def stat(self) -> os.stat_result:
+        """Return what the system knows of it. Raises OSError."""
+        ...
+
+    def open(self, mode: Literal["rb"]) -> BufferedReader:
+        """Open it at its beginning. Raises OSError."""
+        ...
+
+
+class OpenLog:
+    """A file that is open already, under the name that it had elsewhere."""
+
+    def __init__(self, descriptor: int, name: str) -> None:
+        self.name = PurePath(name).name
+        self._descriptor = descriptor
+
+    def __str__(self) -> str:
+        return self.name
+
+    def stat(self) -> os.stat_result:
+        """Return what the system knows of it."""
+        return os.fstat(self._descriptor)
+
+    def open(self, _mode: Literal["rb"]) -> BufferedReader:
+        """Return it at its beginning; what was returned before is at another place then."""
+        file = os.fdopen(os.dup(self._descriptor), "rb")
+        file.seek(0)
+        return file
+
+
 class PacketFile:
     """The packets of an LSF file in their order; what is no packet is skipped and counted.
 
@@ -70,7 +109,7 @@ class PacketFile:
         Whether the file ends in the middle of a packet or of its compression, as after a power loss.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: LogContent) -> None:
         self.size_bytes = path.stat().st_size
         self.read_bytes = 0
         self.packets = 0
@@ -151,7 +190,7 @@ class VehicleLog:
     Parameters
     ----------
     path
-        ``.lsf`` or ``.lsf.gz``; what it is shows from its content.
+        ``.lsf`` or ``.lsf.gz``, a Path or a file that is open; what it is shows from its content.
     settings
         Geometry of the altimeter and the largest range.
     vehicle
@@ -165,7 +204,7 @@ class VehicleLog:
         When it cannot be read.
     """
 
-    def __init__(self, path: Path, settings: BridgeSettings, vehicle: str | None = None) -> None:
+    def __init__(self, path: LogContent, settings: BridgeSettings, vehicle: str | None = None) -> None:
         self.file = PacketFile(path)
         self.refused: Counter[str] = Counter()
         self.pings_refused: Counter[str] = Counter()
@@ -174,7 +213,9 @@ class VehicleLog:
         self._path = path
         self.imc_id, name, self._entities = self._identify()
         if vehicle is None and not name:
-            raise LogError(f"{path.name} does not tell its vehicle's name", "give it with --vehicle NAME")
+            raise LogError(
+                f"{path.name} does not tell its vehicle's name", "say whose it is: --vehicle NAME, by REST vehicle=NAME"
+            )
         self.vehicle = vehicle or name
 
     @property

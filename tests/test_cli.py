@@ -516,6 +516,15 @@ def test_a_mission_is_served_exported_and_found_again(
         for said in ("1 of 1 depths imported: 9.50", "1 of 1 depths imported, as before: 9.50"):
             imported = bathyfleet("import", mission["id"][:8], "old.csv", "--order", "1a", "--url", url)
             assert said in imported.stdout, imported.stderr
+        more = writer.write(tmp_path / "More.lsf.gz", writer.survey(30))
+        sent = bathyfleet("import-log", mission["id"][:8], str(more), "line.gsf", "--url", url)
+        assert sent.code == 1
+        assert sent.stdout == "More.lsf.gz: lauv-log-1, 10 soundings accepted, 0 rejected, 20 there before\n"
+        assert "line.gsf does not tell its vehicle's name" in sent.stderr
+        again = bathyfleet("import-log", mission["id"][:8], str(more), "--json", "--url", url)
+        assert [(view["soundings"], view["known"]) for view in json.loads(again.stdout)] == [(10, True)], again.stderr
+        lost = bathyfleet("import-log", mission["id"], "nowhere.lsf", "--url", url)
+        assert (lost.code, "nowhere.lsf cannot be read: No such file" in lost.stderr) == (1, True)
         wrong = bathyfleet("import", mission["id"], "old.csv", "--order", "9", "--url", url)
         assert (wrong.code, "order is '9'" in wrong.stderr) == (1, True)
         process.terminate()

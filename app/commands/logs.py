@@ -1,18 +1,27 @@
 """``bathyfleet import-log``: what vehicles wrote down themselves."""
 
 import json
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.command import Database, command_settings
+from app.commands.command import CommandError, Database, checked, command_settings
+from app.commands.data import Token, Url
+from app.commands.running_service import RunningService
 from app.commands.stored_missions import meant_mission, with_missions
 
 if TYPE_CHECKING:
     from app.missions.service import MissionService
     from app.missions.views.measurements.soundings import LogImportView
+
+ASK_EVERY_S = 0.5
+"""How often a service is asked how far reading a log is."""
+
+Show = Callable[[int, int], None]
+"""Told how many bytes of a file are done, and how many it has."""
 
 
 def import_logs(
@@ -28,36 +37,35 @@ def import_logs(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     database: Database = None,
+    url: Url = None,
+    token: Token = None,
 ) -> None:
     """Take the soundings of vehicles' own logs into a mission. Begun again after a crash, nothing is stored twice."""
-    settings = command_settings(database_url=database)
-    import getpass
-
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-    from app.missions.operations.imports.log_import import import_log
     from app.missions.views.measurements.soundings import LogImportView
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
-
     views: list[LogImportView] = []
 
-    async def run(service: "MissionService") -> None:
-        live = await meant_mission(service, mission)
-        actor = f"{getpass.getuser()} at the console"
-        for path in logs:
-            task = bar.add_task(path.name, total=None)
+    def shown(path: Path) -> Show:
+        task = bar.add_task(path.name, total=None)
 
-            def show(done: int, total: int, task: TaskID = task) -> None:
-                bar.update(task, completed=done, total=total)
+        def show(done: int, total: int, task: TaskID = task) -> None:
+            bar.update(task, completed=done, total=total)
 
-            views.append(await import_log(live, service.settings, path, vehicle=vehicle, actor=actor, progress=show))
+        return show
 
     try:
         with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-            with_missions(settings, run, changing="import-log", mission=mission)
+            if url is not None:
+                with RunningService(url, token) as service:
+                    for path in logs:
+                        views.append(_sent(service, mission, path, vehicle, shown(path)))  # noqa: PERF401 - one by one
+            else:
+                _stored(mission, logs, vehicle, database, views, shown)
     finally:
         # The result of one log is shown even when the next one cannot be read.
         if as_json:
@@ -66,6 +74,52 @@ def import_logs(
             from imc_bridge.printable import printable
 
             typer.echo("\n".join(printable(line) for view in views for line in _import_lines(view)), nl=bool(views))
+
+
+def _stored(
+    mission: str,
+    logs: list[Path],
+    vehicle: str | None,
+    database: Database,
+    views: "list[LogImportView]",
+    shown: Callable[[Path], Show],
+) -> None:
+    """Import logs into a mission of a database; ``views`` is filled with what came of each."""
+    import getpass
+
+    from app.missions.operations.imports.log_import import import_log
+
+    async def run(service: "MissionService") -> None:
+        live = await meant_mission(service, mission)
+        actor = f"{getpass.getuser()} at the console"
+        for path in logs:
+            progress = shown(path)
+            views.append(
+                await import_log(live, service.settings, path, vehicle=vehicle, actor=actor, progress=progress)
+            )
+
+    with_missions(command_settings(database_url=database), run, changing="import-log", mission=mission)
+
+
+def _sent(service: RunningService, mission: str, path: Path, vehicle: str | None, show: Show) -> "LogImportView":
+    """Send a log to a running service and wait until it is read. Raises CommandError."""
+    from app.missions.views.measurements.imports import LogOptions, LogState, LogView
+
+    options = checked(LogOptions, {"filename": path.name, "vehicle": vehicle})
+    try:
+        with path.open("rb") as content:
+            asked = options.model_dump(exclude_none=True)
+            log = LogView.model_validate(service.ask(mission, "POST", "logs", content=content, params=asked))
+    except OSError as error:
+        raise CommandError(f"log: {path} cannot be read: {error.strerror}", "give a file that can be") from None
+    while log.state in (LogState.WAITING, LogState.READING):
+        show(log.read_bytes or 0, log.size_bytes or 0)
+        time.sleep(ASK_EVERY_S)
+        log = LogView.model_validate(service.ask(mission, "GET", f"logs/{log.id}"))
+    if log.result is None:
+        raise CommandError(f"{log.file}: {log.problem}", log.remedy)
+    show(log.size_bytes or 0, log.size_bytes or 0)
+    return log.result
 
 
 def _import_lines(view: "LogImportView") -> Iterator[str]:

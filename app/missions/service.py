@@ -32,6 +32,7 @@ from app.missions.live.mission import LiveMission
 from app.missions.live.threads import make_threads
 from app.missions.operations.corrections.recorrection import check_level_is_known
 from app.missions.operations.imports.imports import Imports
+from app.missions.operations.imports.log_uploads import LogUploads
 from app.missions.operations.imports.reader_process import Reader
 from app.missions.operations.imports.uploads import Uploads
 from app.missions.operations.maps.map_pictures import MapPictures
@@ -151,6 +152,8 @@ class MissionService:
         """Files on their way in."""
         self.imports = Imports(Reader(unconfined=settings.unconfined_imports), self.maps)
         """Files that missions begin with or are compared with."""
+        self.logs = LogUploads(settings, self.get, self._registry.hold, self.maps)
+        """Vehicles' own logs that are sent."""
         self.reports = Reports(self.maps, settings.provider, self.compute)
         """Reports of surveys."""
         self.site_models = SiteModels(database, self.get, self.maps, lambda: self._started)
@@ -247,6 +250,7 @@ class MissionService:
         if self._removing is not None:
             self._removing.cancel()
             await asyncio.gather(self._removing, return_exceptions=True)
+        await self.logs.close()
         await self._processes.close()
         self.compute.end()
         await self.alarms.close()

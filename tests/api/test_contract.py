@@ -56,6 +56,7 @@ BEYOND_THE_SCHEMA = {
     "getLinesFile",
     "getTile",
     "getTileJson",
+    "importLog",
     "importSoundings",
     "listMissions",
     "previewPlan",

@@ -1,7 +1,7 @@
-"""Files from elsewhere: soundings and maps to begin with, and a grid to compare the map with."""
+"""Files from elsewhere: vehicles' own logs, soundings and maps to begin with, and a grid to compare the map with."""
 
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -18,6 +18,8 @@ from app.missions.operations.imports.uploads import Upload
 from app.missions.views.measurements.imports import (
     ImportOptions,
     ImportView,
+    LogOptions,
+    LogView,
     ProposedZonesView,
     ReferenceView,
     ZoneOptions,
@@ -131,6 +133,55 @@ async def list_imports(reader: Reader, mission: Mission) -> list[ImportView]:
 async def delete_import(import_id: ImportId, service: Service, operator: Operator, mission: Mission) -> None:
     """Leave the soundings of a file out of the map again."""
     await service.imports.delete(mission, import_id, operator.name)
+
+
+@router.post(
+    "/logs",
+    operation_id="importLog",
+    summary="Import a vehicle's own log",
+    status_code=202,
+    openapi_extra=_FILE,
+    responses=_SENT,
+)
+async def import_log(
+    options: Annotated[LogOptions, Query()], request: Request, state: State, operator: Operator, mission: Mission
+) -> LogView:
+    """Take what a vehicle recorded on board: a log of DUNE, or a multibeam's GSF or KMALL file.
+
+    It is answered when the file has arrived; reading it goes on, and `GET …/logs/{import_id}` tells how far it is.
+    Every record counts once, however often it comes: by radio, in another log, or in the same file again.
+    """
+    service = state.service
+    service.logs.check(mission, options)
+    try:
+        async with AsyncExitStack() as keeping:
+            incoming = service.uploads.receive(request.stream(), state.settings.max_import_bytes)
+            upload = await keeping.enter_async_context(incoming)
+            return service.logs.begin(await service.get(mission.id), upload, options, operator.name, keeping)
+    except ClientDisconnect:
+        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+
+
+@router.get(
+    "/logs",
+    operation_id="listLogs",
+    summary="List the logs that were imported",
+    responses=problems("mission-not-found", "invalid-request"),
+)
+async def list_logs(reader: Reader, service: Service, mission: Mission) -> list[LogView]:
+    """Return the vehicles' own logs, those from the command line as well, and those that are being read, oldest first.
+
+    Those of which nothing was new are listed until the service ends.
+    """
+    return await service.logs.all(mission)
+
+
+@router.get(
+    "/logs/{import_id}", operation_id="getLog", summary="See what came of a log, or how far it is", responses=_FOUND
+)
+async def get_log(import_id: ImportId, reader: Reader, service: Service, mission: Mission) -> LogView:
+    """Return the import of a log."""
+    return await service.logs.one(mission, import_id)
 
 
 @router.put(

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -80,6 +81,7 @@ class MissionRegistry:
         # Known to exist, whoever has them; another process may have deleted one meanwhile.
         self._seen: set[str] = set()
         self._looked_s: dict[str, float] = {}
+        self._held: Counter[str] = Counter()
         self._loading = asyncio.Lock()
 
     def share(
@@ -98,6 +100,15 @@ class MissionRegistry:
 
     def __iter__(self) -> Iterator[LiveMission]:
         return iter(list(self._live.values()))
+
+    @contextmanager
+    def hold(self, mission_id: str) -> Iterator[None]:
+        """Keep a mission in memory, from when it is taken up, though it has ended and nobody watches it."""
+        self._held[mission_id] += 1
+        try:
+            yield
+        finally:
+            self._held[mission_id] -= 1
 
     def left(self, mission_id: str) -> MissionSummary | None:
         """Return a mission as it was when it ended and left memory; None where it is in memory or never was."""
@@ -240,7 +251,10 @@ class MissionRegistry:
         idle = [
             m
             for m in self._live.values()
-            if m.header.state in ENDED and not m.broadcaster.watched and not self._maps.holds(m.id)
+            if m.header.state in ENDED
+            and not m.broadcaster.watched
+            and not self._maps.holds(m.id)
+            and not self._held[m.id]
         ]
         for live in idle[: max(0, len(idle) - ENDED_MISSIONS_IN_MEMORY + 1)]:
             summary = live.summary()

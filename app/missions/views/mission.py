@@ -268,6 +268,9 @@ class MissionView(MissionSummary):
         default=None, description="As its vehicles estimate it, and energy is counted with it; null: none tells of it"
     )
     targets: list[TargetView] = Field(default_factory=list, description="What is known of the moving targets")
+    has_reference: bool = Field(
+        default=False, description="Whether the map is compared with a grid, which `GET …/reference` describes"
+    )
 
     @computed_field  # type: ignore[prop-decorator]
     @property

@@ -26,6 +26,12 @@ async def events_of_levels(session: AsyncSession, mission_id: str, levels: Colle
     return (await session.scalars(query)).all()
 
 
+async def events_of_kind(session: AsyncSession, mission_id: str, kind: str) -> Sequence[EventRow]:
+    """Return the events of a kind, oldest first."""
+    query = select(EventRow).where(EventRow.mission_id == mission_id, EventRow.kind == kind).order_by(EventRow.id)
+    return (await session.scalars(query)).all()
+
+
 async def last_event_id(session: AsyncSession, mission_id: str, *, kind: str | None = None) -> int:
     """Return the id of the newest event, of this kind where one is given; 0 when there is none."""
     query = select(func.max(EventRow.id)).where(EventRow.mission_id == mission_id)

@@ -185,7 +185,7 @@ async def test_an_upload_that_breaks_off_leaves_nothing(
 def test_the_reading_process_learns_nothing_of_the_service(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BATHYFLEET_DATABASE_URL", "postgresql://a:secret@b/c")
     monkeypatch.setenv("PGPASSWORD", "secret")
-    given = reader_process._environment()
+    given = reader_process.reader_environment()
     assert "secret" not in " ".join(given.values())
     assert not [name for name in given if name.startswith(("BATHYFLEET", "PG", "HOME", "SSH"))]
 

@@ -269,6 +269,7 @@ async def test_a_reference_grid_tells_how_far_the_map_is_off(client: httpx.Async
     tag = (await client.get(f"{path}/map")).headers["etag"]
     answer = await client.put(f"{path}/reference", content=reference_tif(), params={"filename": "truth.tif"})
     assert answer.status_code == 200, answer.text
+    assert (await client.get(path)).json()["has_reference"] is True
     found = (await client.get(f"{path}/quality")).json()["difference"]
     assert found["bias_m"] == pytest.approx(-1.0, abs=0.1)
     assert found["rmse_m"] == pytest.approx(1.0, abs=0.1)
@@ -284,6 +285,7 @@ async def test_a_reference_grid_tells_how_far_the_map_is_off(client: httpx.Async
     assert overlay.status_code == 200
     assert (await client.delete(f"{path}/reference")).status_code == 204
     assert (await client.get(f"{path}/quality")).json()["difference"] is None
+    assert (await client.get(path)).json()["has_reference"] is False
 
 
 async def test_only_operators_import(make_settings: Any) -> None:

@@ -131,3 +131,16 @@ def test_a_watch_keeper_sees_what_another_commands(page: Page, service: Service,
         httpx.post(f"{path}/{action}", headers=operator, timeout=60).raise_for_status()
         expect(page.get_by_test_id("others")).to_have_text(words)
         expect(page.get_by_test_id("heard")).to_have_text(words)
+
+
+def test_who_may_only_look_sees_what_was_imported_and_nothing_that_imports(
+    watched: Watched, tokens: dict[str, str]
+) -> None:
+    page = watched.page
+    page.goto(f"/#/missions/{tokens['mission']}")
+    sign_in(page, tokens["viewer"])
+    page.get_by_test_id("toggle-imports").click()
+    pane = page.get_by_test_id("imports")
+    for words in ("No log was imported yet.", "The mission begins with nothing.", "The map is compared with nothing."):
+        expect(pane).to_contain_text(words)
+    expect(pane.locator("input, button")).to_have_count(0)

@@ -7,44 +7,76 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-import shapely
 from pydantic import TypeAdapter, ValidationError
-from shapely.geometry import Polygon
 
-from app.mapping.coordinates.distances import horizontal_distance_m
 from app.missions.clock import now
 from app.missions.errors import InvalidRequestError
-from app.missions.fleet.interface import PingReport, Position, SoundingReport, VehicleReport
-from app.missions.fleet.links.imc import bridge_settings, ping_report, sounding_report, vehicle_report
-from app.missions.live.journals.journal import TRACK_SPACING_M, position_row
+from app.missions.fleet.interface import PingReport, SoundingReport, VehicleReport
+from app.missions.fleet.links.imc import bridge_settings
+from app.missions.large_batches import made_of
+from app.missions.live.journals.journal import position_row
 from app.missions.live.mission import LiveMission
-from app.missions.live.watchers.vehicles import local_place
-from app.missions.operations.imports.multibeam_log import MultibeamLog, is_multibeam
+from app.missions.operations.imports.log_batches import LogBatch, LogBatches, LogFacts, Near, Report
+from app.missions.operations.imports.multibeam_log import is_multibeam
 from app.missions.settings import ServiceSettings
 from app.missions.spec.base import Name
 from app.missions.views.measurements.soundings import LogImportView, Verdict
 from app.missions.views.mission import Level
+from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.models import BatchRow
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries.soundings import LOG_KEY
-from imc_bridge import Sounding, StateReport, SwathPing
-from imc_bridge.logs import LogError, VehicleLog
 
-BATCH = 1000
-"""Soundings and positions of one transaction. Batches already written are known by their number: never change it."""
-PING_BATCH = 500
-"""Pings of one transaction, which have batches of their own; never change it either."""
 HASH_BLOCK_BYTES = 1 << 20
-"""Begin of the batches' keys; counts up when the same log gives other batches than before."""
 
 NAME: TypeAdapter[str] = TypeAdapter(Name)
 
-Report = SoundingReport | VehicleReport | PingReport
 Progress = Callable[[int, int], None]
 """Told how many bytes of the file are done, and how many it has."""
+
+
+@dataclass(frozen=True)
+class LogHead:
+    """What is known of a log before it is read.
+
+    Attributes
+    ----------
+    file
+        Its name.
+    digest
+        SHA-256 of the file, in hexadecimal digits.
+    """
+
+    file: str
+    digest: str
+    vehicle: str
+    size_bytes: int
+
+
+class LogSource(Protocol):
+    """Where the batches of a log come from."""
+
+    async def next(self) -> LogBatch | None:
+        """Return the next batch; None when there is none. Raises InvalidRequestError of a damaged log."""
+        ...
+
+    def facts(self) -> LogFacts:
+        """Return what the log turned out to be; after the last batch."""
+        ...
+
+
+class _ReadHere:
+    """Batches that threads of this process read."""
+
+    def __init__(self, batches: LogBatches) -> None:
+        self._batches: Iterator[LogBatch] = iter(batches)
+        self.facts = batches.facts
+
+    async def next(self) -> LogBatch | None:
+        return await asyncio.to_thread(next, self._batches, None)
 
 
 @dataclass
@@ -103,8 +135,28 @@ async def import_log(
     InvalidRequestError
         When the file is no log of a vehicle, or does not tell which one's.
     """
-    work = await asyncio.to_thread(LogImport, live, settings, path, vehicle)
-    return await work.run(actor=actor, progress=progress)
+    check_log(live, path.name, vehicle)
+    digest, batches = await asyncio.to_thread(_opened, live, settings, path, vehicle)
+    head = LogHead(path.name, digest, batches.vehicle, batches.size_bytes)
+    return await LogImport(live, settings, head, _ReadHere(batches)).run(actor=actor, progress=progress)
+
+
+def check_log(live: LiveMission, name: str, vehicle: str | None) -> None:
+    """Refuse what cannot be imported whatever is in the file. Raises InvalidRequestError."""
+    if vehicle is not None:
+        _check_name(vehicle)
+    if is_multibeam(name) and live.spec.sound_speed is not None:
+        raise InvalidRequestError(
+            "sound_speed",
+            f"{name} has depths with the sound speed applied, and the mission's profile would be applied again",
+            f"take that away first: DELETE /api/v1/missions/{live.id}/sound-speed",
+        )
+
+
+def near(live: LiveMission) -> Near:
+    """Return where a log's track and pings are of use to a mission."""
+    corners = [(float(east), float(north)) for east, north in live.area]
+    return Near(live.frame.origin_lat_deg, live.frame.origin_lon_deg, corners, live.margin_m)
 
 
 class LogImport:
@@ -116,45 +168,32 @@ class LogImport:
     Raises
     ------
     InvalidRequestError
-        When the file cannot be read or holds nothing that can be used.
+        When the log's vehicle has no name that can be used.
     """
 
-    def __init__(self, live: LiveMission, settings: ServiceSettings, path: Path, vehicle: str | None) -> None:
+    def __init__(self, live: LiveMission, settings: ServiceSettings, head: LogHead, source: LogSource) -> None:
         self._live = live
-        try:
-            self._digest = _digest(path)
-            self._log = _opened(live, settings, path, vehicle)
-        except LogError as error:
-            raise InvalidRequestError("log", str(error), error.remedy) from None
-        except OSError as error:
-            reason = error.strerror or type(error).__name__
-            raise InvalidRequestError("log", f"{path} cannot be read: {reason}", "give a file that can be") from None
-        try:
-            NAME.validate_python(self._log.vehicle)
-        except ValidationError:
-            raise InvalidRequestError(
-                "vehicle",
-                f"{self._log.vehicle!r} is no name of a vehicle",
-                "give one of letters, digits, '.', '_' and '-', at most 64, with --vehicle",
-            ) from None
-        self._path = path
-        self._key = f"{LOG_KEY}-{self._digest[:32]}-{settings.imc.altimeter}-{self._log.vehicle}"
+        self._head = head
+        self._source = source
+        _check_name(head.vehicle)
+        self._key = f"{LOG_KEY}-{head.digest[:32]}-{settings.imc.altimeter}-{head.vehicle}"
         # A gate of its own: the log may lie hours before or after what the vehicle sends now.
         self._gate = live.make_gate()
-        self._zone = Polygon(live.area).buffer(live.margin_m)
         self._tally = Tally()
 
-    async def run(self, *, actor: str, progress: Progress | None = None) -> LogImportView:
-        """Read the whole log; what is counted accepted is stored for good when this returns."""
-        batches = self._batches()
-        while batch := await asyncio.to_thread(next, batches, None):
-            pings = [report for report in batch if isinstance(report, PingReport)]
-            await (self._write_pings(pings) if pings else self._write(batch))
+    async def run(self, *, actor: str, progress: Progress | None = None, import_id: str = "") -> LogImportView:
+        """Read the whole log; what is counted accepted is stored for good when this returns.
+
+        Cancelled, it ends between two batches. ``import_id``: under which it is listed.
+        """
+        while (batch := await self._source.next()) is not None:
+            pings = [report for report in batch.reports if isinstance(report, PingReport)]
+            await to_the_end(self._write_pings(pings) if pings else self._write(batch.reports))
             if progress is not None:
-                progress(self._log.file.read_bytes, self._log.file.size_bytes)
+                progress(batch.read_bytes, self._head.size_bytes)
         if progress is not None:
-            progress(self._log.file.size_bytes, self._log.file.size_bytes)
-        view = self._view()
+            progress(self._head.size_bytes, self._head.size_bytes)
+        view = self._view(self._source.facts())
         if not self._tally.was_known:
             also = f" and {view.pings} pings" if view.pings else ""
             await self._live.journal.log(
@@ -162,38 +201,11 @@ class LogImport:
                 "import",
                 f"{view.soundings} soundings{also} from {view.file}, the log of {view.vehicle}",
                 actor=actor,
-                sha256=self._digest,
+                sha256=self._head.digest,
+                **({"import_id": import_id} if import_id else {}),
                 **view.model_dump(),
             )
         return view
-
-    def _batches(self) -> Iterator[list[Report]]:
-        batch: list[Report] = []
-        pings: list[Report] = []
-        for report in self._reports():
-            gathered, full = (pings, PING_BATCH) if isinstance(report, PingReport) else (batch, BATCH)
-            gathered.append(report)
-            if len(gathered) == full:
-                yield gathered.copy()
-                gathered.clear()
-        yield from (rest for rest in (batch, pings) if rest)
-
-    def _reports(self) -> Iterator[Report]:
-        """Yield every sounding, and the track near the area thinned like that of live telemetry."""
-        last: tuple[float, float] | None = None
-        for event in self._log.events():
-            if isinstance(event, Sounding):
-                yield sounding_report(event)
-            elif isinstance(event, SwathPing):
-                yield ping_report(event)
-            elif isinstance(event, StateReport):
-                end = (event.lat_deg, event.lon_deg)
-                if last is None or horizontal_distance_m(last, end) >= TRACK_SPACING_M:
-                    last = end
-                    report = vehicle_report(event)
-                    place = local_place(self._live.frame, report.position)
-                    if place is not None and shapely.contains_xy(self._zone, *place):
-                        yield report
 
     async def _write(self, batch: list[Report]) -> None:
         live, tally = self._live, self._tally
@@ -208,7 +220,7 @@ class LogImport:
             known = await sounding_queries.answer_to(session, live.id, key)
             if known is not None:
                 # Read once more all the same: the gate judges jumps from one batch to the next.
-                self._gate.check(soundings)
+                await made_of(soundings, self._gate.check, soundings)
                 tally.add(known.answer, known=True)
                 return
             verdicts, committed = await live.journal.take(soundings, session, gate=self._gate)
@@ -217,7 +229,9 @@ class LogImport:
                 "verdicts": Counter(str(item.verdict) for item in verdicts),
                 "reasons": Counter(_general(v.reason) for v in verdicts if v.verdict is Verdict.REJECTED),
             }
-            session.add(BatchRow(mission_id=live.id, key=key, digest=self._digest, answer=answer, created_at=now()))
+            session.add(
+                BatchRow(mission_id=live.id, key=key, digest=self._head.digest, answer=answer, created_at=now())
+            )
         committed()
         tally.add(answer, known=False)
 
@@ -237,15 +251,17 @@ class LogImport:
                 "pings": Counter(str(item.verdict) for item in verdicts),
                 "reasons": Counter(_general(v.reason) for v in verdicts if v.verdict is Verdict.REJECTED),
             }
-            session.add(BatchRow(mission_id=live.id, key=key, digest=self._digest, answer=answer, created_at=now()))
+            session.add(
+                BatchRow(mission_id=live.id, key=key, digest=self._head.digest, answer=answer, created_at=now())
+            )
         committed()
         tally.add_pings(answer, known=False)
 
-    def _view(self) -> LogImportView:
-        tally, file = self._tally, self._log.file
+    def _view(self, facts: LogFacts) -> LogImportView:
+        tally = self._tally
         return LogImportView(
-            file=self._path.name,
-            vehicle=self._log.vehicle,
+            file=self._head.file,
+            vehicle=self._head.vehicle,
             soundings=tally.verdicts[Verdict.ACCEPTED],
             rejected=tally.verdicts[Verdict.REJECTED],
             duplicate=tally.verdicts[Verdict.DUPLICATE],
@@ -253,35 +269,37 @@ class LogImport:
             pings_rejected=tally.pings[Verdict.REJECTED],
             pings_duplicate=tally.pings[Verdict.DUPLICATE],
             reasons=dict(tally.reasons),
-            refused=dict(self._log.refused),
+            refused=facts.refused,
             first_s=tally.first_s,
             last_s=tally.last_s,
-            packets=file.packets,
-            unreadable=self._log.faults,
-            skipped_bytes=file.skipped_bytes,
-            cut_off=file.cut_off,
-            notes=self._log.notes if isinstance(self._log, MultibeamLog) else [],
+            packets=facts.packets,
+            unreadable=facts.unreadable,
+            skipped_bytes=facts.skipped_bytes,
+            cut_off=facts.cut_off,
+            notes=facts.notes,
             known=tally.was_known and tally.known > 0,
         )
 
 
-def _opened(live: LiveMission, settings: ServiceSettings, path: Path, vehicle: str | None) -> VehicleLog | MultibeamLog:
-    """Return the log in a file. Raises LogError, InvalidRequestError and OSError where there is none."""
-    if not is_multibeam(path):
-        return VehicleLog(path, bridge_settings(settings.imc, settings.time_scale), vehicle)
-    if live.spec.sound_speed is not None:
+def _check_name(vehicle: str) -> None:
+    try:
+        NAME.validate_python(vehicle)
+    except ValidationError:
         raise InvalidRequestError(
-            "sound_speed",
-            f"{path.name} has depths with the sound speed applied, and the mission's profile would be applied again",
-            f"take that away first: DELETE /api/v1/missions/{live.id}/sound-speed",
-        )
-    zone = Polygon(live.area).buffer(live.margin_m)
+            "vehicle",
+            f"{vehicle!r} is no name of a vehicle",
+            "give one of letters, digits, '.', '_' and '-', at most 64: --vehicle NAME, by REST vehicle=NAME",
+        ) from None
 
-    def near(lat_deg: float, lon_deg: float) -> bool:
-        place = local_place(live.frame, Position(lat_deg, lon_deg, 0.0))
-        return place is not None and bool(shapely.contains_xy(zone, *place))
 
-    return MultibeamLog(path, vehicle, near)
+def _opened(live: LiveMission, settings: ServiceSettings, path: Path, vehicle: str | None) -> tuple[str, LogBatches]:
+    """Return the digest of a file and the log in it. Raises InvalidRequestError where there is none."""
+    try:
+        digest = _digest(path)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise InvalidRequestError("log", f"{path} cannot be read: {reason}", "give a file that can be") from None
+    return digest, LogBatches(path, vehicle, bridge_settings(settings.imc, settings.time_scale), near(live))
 
 
 def _digest(path: Path) -> str:

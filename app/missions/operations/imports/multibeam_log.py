@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from pathlib import PurePath
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from app.mapping.readers.multibeam.types import FilePing, MultibeamFile
 from app.mapping.readers.types import ReadError
 from app.missions.errors import InvalidRequestError
 from imc_bridge import StateReport, SwathPing
+from imc_bridge.logs import LogContent
 
 LEAST_MOVED_M = 0.01
 """Below this nothing is said of soundings that were moved."""
@@ -39,7 +40,7 @@ class MultibeamLog:
         When it cannot be read.
     """
 
-    def __init__(self, path: Path, vehicle: str | None, near: Callable[[float, float], bool]) -> None:
+    def __init__(self, path: LogContent, vehicle: str | None, near: Callable[[float, float], bool]) -> None:
         self.size_bytes = path.stat().st_size
         self.read_bytes = 0
         self.packets = 0
@@ -54,7 +55,9 @@ class MultibeamLog:
         self._found = 0
         if vehicle is None:
             raise InvalidRequestError(
-                "vehicle", f"{path.name} does not tell its vehicle's name", "give it with --vehicle NAME"
+                "vehicle",
+                f"{path.name} does not tell its vehicle's name",
+                "say whose it is: --vehicle NAME, by REST vehicle=NAME",
             )
         self.vehicle = vehicle
         self._check()
@@ -69,7 +72,7 @@ class MultibeamLog:
         self.refused.clear()
         self.packets = 0
         moved_m, last_s, repeated, levelled = 0.0, math.nan, 0, False
-        kind = self._path.suffix.lower()
+        kind = _ending(self._path.name)
         for ping in self._pings():
             self.packets = ping.number
             repeated = repeated + 1 if ping.time_s == last_s else 0
@@ -136,7 +139,7 @@ class MultibeamLog:
     def _pings(self) -> Iterator[FilePing]:
         try:
             with self._path.open("rb") as raw:
-                self._opened = open_multibeam(raw, self._path.suffix.lower())
+                self._opened = open_multibeam(raw, _ending(self._path.name))
                 for ping in self._opened.pings():
                     self.read_bytes, self._found = raw.tell(), ping.number
                     yield ping
@@ -144,6 +147,10 @@ class MultibeamLog:
             raise InvalidRequestError(error.field, str(error), error.remedy) from None
 
 
-def is_multibeam(path: Path) -> bool:
+def is_multibeam(name: str) -> bool:
     """Tell by its name whether a file is a multibeam's."""
-    return path.suffix.lower() in MULTIBEAM
+    return _ending(name) in MULTIBEAM
+
+
+def _ending(name: str) -> str:
+    return PurePath(name).suffix.lower()

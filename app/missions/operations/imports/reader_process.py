@@ -5,7 +5,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -206,17 +206,8 @@ class Reader:
         if answer is None:
             raise _broken_off()
         self._note(answer.confined)
-        if code == UNCONFINED and FORBIDDEN in answer.confined.values():
-            calls = " ".join(LOCKING_CALLS)
-            raise ImportUnavailableError(
-                "the service is forbidden to use Landlock and seccomp: nothing would keep a file from reading others",
-                f"allow it these system calls, in a unit of systemd by a line SystemCallFilter={calls}",
-            )
         if code == UNCONFINED:
-            raise ImportUnavailableError(
-                "this system has neither Landlock nor seccomp, so nothing would keep a file from reading others",
-                "use a kernel that has them, or set unconfined_imports",
-            )
+            raise not_confined(answer.confined)
         if code == UNUSABLE:
             raise InvalidRequestError(answer.field, answer.message, answer.remedy)
         return answer
@@ -227,6 +218,20 @@ class Reader:
         if lacking != self._lacking:
             self._lacking = lacking
             log.warning("files from elsewhere are read with less confinement than there could be", lacking=lacking)
+
+
+def not_confined(held: Mapping[str, str]) -> ImportUnavailableError:
+    """Return that no file is read by a process that nothing locks in; ``held``: why, by layer."""
+    if FORBIDDEN in held.values():
+        calls = " ".join(LOCKING_CALLS)
+        return ImportUnavailableError(
+            "the service is forbidden to use Landlock and seccomp: nothing would keep a file from reading others",
+            f"allow it these system calls, in a unit of systemd by a line SystemCallFilter={calls}",
+        )
+    return ImportUnavailableError(
+        "this system has neither Landlock nor seccomp, so nothing would keep a file from reading others",
+        "use a kernel that has them, or set unconfined_imports",
+    )
 
 
 def _broken_off() -> InvalidRequestError:
@@ -291,7 +296,7 @@ async def _run(file: IO[bytes], task: str, result: IO[bytes]) -> tuple[int, byte
         # What libraries write there may quote the file.
         stderr=asyncio.subprocess.DEVNULL,
         pass_fds=(result.fileno(),),
-        env=_environment(),
+        env=reader_environment(),
         # The service's own folder is not its business.
         cwd="/",
         # Its own session: a signal from a terminal to the service is not for it.
@@ -314,7 +319,8 @@ async def _run(file: IO[bytes], task: str, result: IO[bytes]) -> tuple[int, byte
             await process.wait()
 
 
-def _environment() -> dict[str, str]:
+def reader_environment() -> dict[str, str]:
+    """Return what a process that will be locked in is started with: this program, and one thread for each library."""
     search = os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH", "")]))
     kept = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
     return kept | {

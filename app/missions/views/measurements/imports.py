@@ -1,13 +1,15 @@
 """How soundings and grids from elsewhere are brought in, and what is answered about them."""
 
 from datetime import datetime
+from enum import StrEnum
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.mapping.s44 import Order
-from app.missions.spec.base import PolygonGeometry
+from app.missions.spec.base import Name, PolygonGeometry
 from app.missions.views.base import View
+from app.missions.views.measurements.soundings import LogImportView
 
 
 class ImportOptions(BaseModel):
@@ -47,6 +49,34 @@ class ImportOptions(BaseModel):
         description="Added to every depth to bring it to the mission's datum, 0 where that is the file's; has to be "
         "said where the file states another one",
     )
+
+
+class LogOptions(BaseModel):
+    """Which log is sent, and whose."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    filename: str = Field(
+        min_length=1,
+        max_length=200,
+        pattern=r"^[^/\\\x00-\x1f\x7f]+$",
+        description="Its name; .gsf and .kmall are files of a multibeam, everything else is read as a log of DUNE "
+        "(Data.lsf, Data.lsf.gz)",
+        examples=["Data.lsf.gz"],
+    )
+    vehicle: Name | None = Field(
+        default=None,
+        description="Name of the vehicle; default: the one that the log announces, which a multibeam's file does not",
+    )
+
+
+class LogState(StrEnum):
+    """How far the import of a log is."""
+
+    WAITING = "waiting"
+    READING = "reading"
+    DONE = "done"
+    FAILED = "failed"
 
 
 class ZoneOptions(BaseModel):
@@ -107,3 +137,20 @@ class ReferenceView(View):
     created_at: datetime
     cells: int = Field(description="Cells of the map's grid that it knows")
     notes: list[str]
+
+
+class LogView(View):
+    """A vehicle's own log: what came of it, or how far its import is."""
+
+    id: str
+    file: str = Field(description="Its name")
+    vehicle: str | None = Field(description="Whose it is; null: the log has not said so yet")
+    sha256: str = Field(description="Of the file")
+    state: LogState
+    created_at: datetime = Field(description="When it was sent; of one from the command line when it had been imported")
+    actor: str = Field(description="Who sent it")
+    read_bytes: int | None = Field(default=None, description="How far reading has come; null: it is long over")
+    size_bytes: int | None = Field(default=None, description="Of the file; null: it is not known any more")
+    result: LogImportView | None = Field(default=None, description="What came of it, when it is done")
+    problem: str = Field(default="", description="Why it failed; what was stored before stays, and is not stored twice")
+    remedy: str = Field(default="", description="What to do about it")

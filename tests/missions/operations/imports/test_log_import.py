@@ -13,7 +13,7 @@ import pytest
 
 from app.missions.errors import InvalidRequestError
 from app.missions.operations.history import events_after
-from app.missions.operations.imports import log_import
+from app.missions.operations.imports import log_batches
 from app.missions.operations.imports.log_import import import_log
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.service import MissionService
@@ -56,7 +56,7 @@ def log(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_import, "BATCH", 50)
+    monkeypatch.setattr(log_batches, "BATCH", 50)
 
 
 async def take(service: MissionService, mission_id: str, log: Path, **options: Any) -> LogImportView:
@@ -107,7 +107,7 @@ async def test_a_log_imported_again_changes_nothing(
 async def test_pings_of_a_log_count_once_and_are_on_the_map(
     service: MissionService, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_import, "PING_BATCH", 3)
+    monkeypatch.setattr(log_batches, "PING_BATCH", 3)
     times = [writer.START_S + 1.03 + 0.1 * k for k in range(10)]
     packets = [*writer.survey(20), *(writer.ping(at_s, 8.0) for at_s in times)]
     log = writer.write(tmp_path / "Data.lsf", packets)

@@ -10,7 +10,7 @@ import pytest
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.errors import InvalidRequestError
 from app.missions.operations.history import events_after
-from app.missions.operations.imports import log_import
+from app.missions.operations.imports import log_batches
 from app.missions.operations.imports.log_import import import_log
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.service import MissionService
@@ -54,7 +54,7 @@ def write(kind: str, path: Path, **more: Any) -> Path:
 async def test_pings_are_below_the_surface_and_on_the_map_once(
     service: MissionService, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_import, "PING_BATCH", 5)
+    monkeypatch.setattr(log_batches, "PING_BATCH", 5)
     file = write(kind, tmp_path)
     mission = await service.create(make_spec(vehicles=[], cell_m=1.0))
     view = await take(service, mission.id, file)
@@ -109,7 +109,7 @@ async def test_pings_of_one_time_are_all_kept(service: MissionService, tmp_path:
 async def test_of_a_damaged_file_nothing_is_taken(
     service: MissionService, tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_import, "PING_BATCH", 2)
+    monkeypatch.setattr(log_batches, "PING_BATCH", 2)
     file = write(kind, tmp_path)
     file.write_bytes(file.read_bytes()[:-1])
     mission = await service.create(make_spec(vehicles=[]))

@@ -72,6 +72,9 @@ Level: TypeAlias = Annotated[Literal["info", "warning", "alarm"], Open]
 LinkState: TypeAlias = Annotated[Literal["unknown", "lost", "expected_offline", "heard", "ready", "engaged"], Open]
 """How well a vehicle can be reached, worst to best."""
 
+LogState: TypeAlias = Annotated[Literal["waiting", "reading", "done", "failed"], Open]
+"""How far the import of a log is."""
+
 MissionKind: TypeAlias = Annotated[Literal["survey", "search"], Open]
 """What a mission is for."""
 
@@ -1011,6 +1014,71 @@ class Liveness(Model):
     status: str = "ok"
 
 
+class LogImportView(Model):
+    """What came of a vehicle's log."""
+
+    file: str
+    vehicle: str
+    soundings: int
+    """Accepted, stored for good"""
+    rejected: int
+    """Kept but not used"""
+    duplicate: int
+    """There before, from live telemetry or another log"""
+    pings: int
+    """Pings of swath sonars that were accepted, stored for good"""
+    pings_rejected: int
+    """Pings that are kept but not used"""
+    pings_duplicate: int
+    """Pings that were there before"""
+    reasons: dict[str, int]
+    """Why soundings and pings were rejected, and how many each"""
+    refused: dict[str, int]
+    """Why ranges did not become soundings, and how many each"""
+    first_s: float | None
+    """Vehicle's clock at the first record, Unix seconds"""
+    last_s: float | None
+    """Vehicle's clock at the last record, Unix seconds"""
+    packets: int
+    unreadable: dict[str, int]
+    """Packets that could not be read, by reason"""
+    skipped_bytes: int
+    """Bytes that are no packet"""
+    cut_off: bool
+    """The file ends in the middle, as after a power loss; what came before is used"""
+    notes: list[str]
+    """What was assumed or done, in words"""
+    known: bool
+    """The whole log had been imported before; nothing was written"""
+
+
+class LogView(Model):
+    """A vehicle's own log: what came of it, or how far its import is."""
+
+    id: str
+    file: str
+    """Its name"""
+    vehicle: str | None
+    """Whose it is; null: the log has not said so yet"""
+    sha256: str
+    """Of the file"""
+    state: LogState
+    created_at: datetime
+    """When it was sent; of one from the command line when it had been imported"""
+    actor: str
+    """Who sent it"""
+    read_bytes: int | None
+    """How far reading has come; null: it is long over"""
+    size_bytes: int | None
+    """Of the file; null: it is not known any more"""
+    result: LogImportView | None
+    """What came of it, when it is done"""
+    problem: str
+    """Why it failed; what was stored before stays, and is not stored twice"""
+    remedy: str
+    """What to do about it"""
+
+
 class MapMessage(Model):
     """A new map can be fetched: ``GET /missions/{id}/map`` or its picture."""
 
@@ -1213,6 +1281,8 @@ class MissionView(Model):
     """As its vehicles estimate it, and energy is counted with it; null: none tells of it"""
     targets: list[TargetView]
     """What is known of the moving targets"""
+    has_reference: bool
+    """Whether the map is compared with a grid, which `GET …/reference` describes"""
     allowed_actions: list[Action]
     """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
     efficiency_pct: float | None

@@ -648,6 +648,44 @@ class Operations(ABC):
         """Take an import back: ``DELETE /missions/{mission_id}/imports/{import_id}``."""
         return self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/imports/{part(import_id)}", None))
 
+    def import_log(
+        self,
+        mission_id: str,
+        content: bytes,
+        *,
+        filename: str,
+        vehicle: str | None = None,
+    ) -> models.LogView:
+        """Import a vehicle's own log: ``POST /missions/{mission_id}/logs``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; .gsf and .kmall are files of a multibeam, everything else is read as a log of DUNE
+            (Data.lsf, Data.lsf.gz)
+        vehicle : str
+            Name of the vehicle; default: the one that the log announces, which a multibeam's file does not
+        """
+        return self._call(Call[models.LogView](
+            "POST",
+            f"/missions/{part(mission_id)}/logs",
+            models.LogView,
+            content=content,
+            query={"filename": filename, "vehicle": vehicle},
+        ))
+
+    def list_logs(self, mission_id: str) -> list[models.LogView]:
+        """List the logs that were imported: ``GET /missions/{mission_id}/logs``."""
+        return self._call(Call[list[models.LogView]]("GET", f"/missions/{part(mission_id)}/logs", list[models.LogView]))
+
+    def get_log(self, mission_id: str, import_id: str) -> models.LogView:
+        """See what came of a log, or how far it is: ``GET /missions/{mission_id}/logs/{import_id}``."""
+        return self._call(Call[models.LogView](
+            "GET",
+            f"/missions/{part(mission_id)}/logs/{part(import_id)}",
+            models.LogView,
+        ))
+
     def set_reference(
         self,
         mission_id: str,
@@ -2199,6 +2237,48 @@ class AsyncOperations(ABC):
     async def delete_import(self, mission_id: str, import_id: str) -> None:
         """Take an import back: ``DELETE /missions/{mission_id}/imports/{import_id}``."""
         return await self._call(Call[None]("DELETE", f"/missions/{part(mission_id)}/imports/{part(import_id)}", None))
+
+    async def import_log(
+        self,
+        mission_id: str,
+        content: bytes,
+        *,
+        filename: str,
+        vehicle: str | None = None,
+    ) -> models.LogView:
+        """Import a vehicle's own log: ``POST /missions/{mission_id}/logs``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; .gsf and .kmall are files of a multibeam, everything else is read as a log of DUNE
+            (Data.lsf, Data.lsf.gz)
+        vehicle : str
+            Name of the vehicle; default: the one that the log announces, which a multibeam's file does not
+        """
+        return await self._call(Call[models.LogView](
+            "POST",
+            f"/missions/{part(mission_id)}/logs",
+            models.LogView,
+            content=content,
+            query={"filename": filename, "vehicle": vehicle},
+        ))
+
+    async def list_logs(self, mission_id: str) -> list[models.LogView]:
+        """List the logs that were imported: ``GET /missions/{mission_id}/logs``."""
+        return await self._call(Call[list[models.LogView]](
+            "GET",
+            f"/missions/{part(mission_id)}/logs",
+            list[models.LogView],
+        ))
+
+    async def get_log(self, mission_id: str, import_id: str) -> models.LogView:
+        """See what came of a log, or how far it is: ``GET /missions/{mission_id}/logs/{import_id}``."""
+        return await self._call(Call[models.LogView](
+            "GET",
+            f"/missions/{part(mission_id)}/logs/{part(import_id)}",
+            models.LogView,
+        ))
 
     async def set_reference(
         self,

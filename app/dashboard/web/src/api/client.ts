@@ -17,8 +17,11 @@ import type {
   FieldProblem,
   ForecastView,
   Holidays,
+  ImportOptions,
+  ImportView,
   LayerView,
   LngLat,
+  LogView,
   MissionAction,
   MissionSummary,
   MissionView,
@@ -32,7 +35,9 @@ import type {
   Problem,
   ProductView,
   ProfileView,
+  ProposedZonesView,
   QualityView,
+  ReferenceView,
   RulingsView,
   SearchGridView,
   SessionView,
@@ -53,6 +58,7 @@ import type {
   TrafficView,
   VehicleView,
 } from "./types";
+import { upload } from "./upload";
 
 const BASE = "/api/v1";
 const LOG_PAGE = 1000;
@@ -223,6 +229,18 @@ export const NEWEST_TWO: Compared = { from: "", to: "" };
 const between = ({ from, to }: Compared): string =>
   from && to ? `?${new URLSearchParams({ from, to })}` : "";
 
+/** A file on its way: `onBytes` is told how much has gone. */
+export interface Sending {
+  file: File;
+  onBytes: (sent: number) => void;
+  gone: AbortSignal;
+}
+
+function send<T>(method: "POST" | "PUT", path: string, query: object, { file, onBytes, gone }: Sending) {
+  const said = Object.entries({ ...query, filename: file.name }).filter(([, value]) => value !== "");
+  return upload<T>(method, `${BASE}${path}?${new URLSearchParams(said)}`, file, onBytes, gone);
+}
+
 /** A mission that nobody has created, and how deep it is there; empty: not known. */
 export interface Described {
   mission: NewMission;
@@ -322,6 +340,30 @@ export const api = {
     request<CorrectionsView>(castPath(id, name), { method: "DELETE" }),
   setCastRule: (id: string, rules: CastRules) =>
     put<CorrectionsView>(`${missionPath(id)}/sound-speed/rule`, rules),
+  logs: (id: string) => poll<LogView[]>(`${missionPath(id)}/logs`),
+  /** `vehicle`: empty where the log says whose it is. */
+  sendLog: (id: string, vehicle: string, sending: Sending) =>
+    send<LogView>("POST", `${missionPath(id)}/logs`, { vehicle }, sending),
+  imports: (id: string) => request<ImportView[]>(`${missionPath(id)}/imports`),
+  sendImport: (id: string, options: ImportOptions, sending: Sending) =>
+    send<ImportView>("POST", `${missionPath(id)}/imports`, options, sending),
+  deleteImport: (id: string, one: string) => remove(`${missionPath(id)}/imports/${encodeURIComponent(one)}`),
+  reference: (id: string) => request<ReferenceView>(`${missionPath(id)}/reference`),
+  sendReference: (id: string, options: ImportOptions, sending: Sending) =>
+    send<ReferenceView>("PUT", `${missionPath(id)}/reference`, options, sending),
+  deleteReference: (id: string) => remove(`${missionPath(id)}/reference`),
+  /** What a chart shows to keep out of between these degrees. */
+  proposeZones: (
+    ends: Record<"west_deg" | "south_deg" | "east_deg" | "north_deg", string>,
+    { file, onBytes, gone }: Sending,
+  ) =>
+    upload<ProposedZonesView>(
+      "POST",
+      `${BASE}/chart-zones?${new URLSearchParams(ends)}`,
+      file,
+      onBytes,
+      gone,
+    ),
   mapTiles,
   site: (id: string) => request<SearchGridView>(`${missionPath(id)}/search`),
   crossovers: (id: string) => request<CrossoversView>(`${missionPath(id)}/crosslines`),

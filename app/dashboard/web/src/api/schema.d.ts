@@ -926,6 +926,55 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/logs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the logs that were imported
+         * @description Return the vehicles' own logs, those from the command line as well, and those that are being read, oldest first.
+         *
+         *     Those of which nothing was new are listed until the service ends.
+         */
+        get: operations["listLogs"];
+        put?: never;
+        /**
+         * Import a vehicle's own log
+         * @description Take what a vehicle recorded on board: a log of DUNE, or a multibeam's GSF or KMALL file.
+         *
+         *     It is answered when the file has arrived; reading it goes on, and `GET …/logs/{import_id}` tells how far it is.
+         *     Every record counts once, however often it comes: by radio, in another log, or in the same file again.
+         */
+        post: operations["importLog"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/logs/{import_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * See what came of a log, or how far it is
+         * @description Return the import of a log.
+         */
+        get: operations["getLog"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/reference": {
         parameters: {
             query?: never;
@@ -4015,6 +4064,168 @@ export interface components {
             status: string;
         };
         /**
+         * LogImportView
+         * @description What came of a vehicle's log.
+         */
+        LogImportView: {
+            /** File */
+            file: string;
+            /** Vehicle */
+            vehicle: string;
+            /**
+             * Soundings
+             * @description Accepted, stored for good
+             */
+            soundings: number;
+            /**
+             * Rejected
+             * @description Kept but not used
+             */
+            rejected: number;
+            /**
+             * Duplicate
+             * @description There before, from live telemetry or another log
+             */
+            duplicate: number;
+            /**
+             * Pings
+             * @description Pings of swath sonars that were accepted, stored for good
+             * @default 0
+             */
+            pings: number;
+            /**
+             * Pings Rejected
+             * @description Pings that are kept but not used
+             * @default 0
+             */
+            pings_rejected: number;
+            /**
+             * Pings Duplicate
+             * @description Pings that were there before
+             * @default 0
+             */
+            pings_duplicate: number;
+            /**
+             * Reasons
+             * @description Why soundings and pings were rejected, and how many each
+             */
+            reasons: {
+                [key: string]: number;
+            };
+            /**
+             * Refused
+             * @description Why ranges did not become soundings, and how many each
+             */
+            refused: {
+                [key: string]: number;
+            };
+            /**
+             * First S
+             * @description Vehicle's clock at the first record, Unix seconds
+             */
+            first_s: number | null;
+            /**
+             * Last S
+             * @description Vehicle's clock at the last record, Unix seconds
+             */
+            last_s: number | null;
+            /** Packets */
+            packets: number;
+            /**
+             * Unreadable
+             * @description Packets that could not be read, by reason
+             */
+            unreadable: {
+                [key: string]: number;
+            };
+            /**
+             * Skipped Bytes
+             * @description Bytes that are no packet
+             */
+            skipped_bytes: number;
+            /**
+             * Cut Off
+             * @description The file ends in the middle, as after a power loss; what came before is used
+             */
+            cut_off: boolean;
+            /**
+             * Notes
+             * @description What was assumed or done, in words
+             * @default []
+             */
+            notes: string[];
+            /**
+             * Known
+             * @description The whole log had been imported before; nothing was written
+             */
+            known: boolean;
+        };
+        /**
+         * LogState
+         * @description How far the import of a log is.
+         * @enum {string}
+         */
+        LogState: "waiting" | "reading" | "done" | "failed";
+        /**
+         * LogView
+         * @description A vehicle's own log: what came of it, or how far its import is.
+         */
+        LogView: {
+            /** Id */
+            id: string;
+            /**
+             * File
+             * @description Its name
+             */
+            file: string;
+            /**
+             * Vehicle
+             * @description Whose it is; null: the log has not said so yet
+             */
+            vehicle: string | null;
+            /**
+             * Sha256
+             * @description Of the file
+             */
+            sha256: string;
+            state: components["schemas"]["LogState"];
+            /**
+             * Created At
+             * Format: date-time
+             * @description When it was sent; of one from the command line when it had been imported
+             */
+            created_at: string;
+            /**
+             * Actor
+             * @description Who sent it
+             */
+            actor: string;
+            /**
+             * Read Bytes
+             * @description How far reading has come; null: it is long over
+             */
+            read_bytes: number | null;
+            /**
+             * Size Bytes
+             * @description Of the file; null: it is not known any more
+             */
+            size_bytes: number | null;
+            /** @description What came of it, when it is done */
+            result: components["schemas"]["LogImportView"] | null;
+            /**
+             * Problem
+             * @description Why it failed; what was stored before stays, and is not stored twice
+             * @default
+             */
+            problem: string;
+            /**
+             * Remedy
+             * @description What to do about it
+             * @default
+             */
+            remedy: string;
+        };
+        /**
          * MapMessage
          * @description A new map can be fetched: ``GET /missions/{id}/map`` or its picture.
          */
@@ -4579,6 +4790,12 @@ export interface components {
              * @description What is known of the moving targets
              */
             targets: components["schemas"]["TargetView"][];
+            /**
+             * Has Reference
+             * @description Whether the map is compared with a grid, which `GET …/reference` describes
+             * @default false
+             */
+            has_reference: boolean;
             /**
              * Allowed Actions
              * @description What may be asked of it in this state: ``POST /missions/{id}/start`` and so on.
@@ -13443,6 +13660,267 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listLogs: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogView"][];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    importLog: {
+        parameters: {
+            query: {
+                /** @description Its name; .gsf and .kmall are files of a multibeam, everything else is read as a log of DUNE (Data.lsf, Data.lsf.gz) */
+                filename: string;
+                /** @description Name of the vehicle; default: the one that the log announces, which a multibeam's file does not */
+                vehicle?: string;
+            };
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogView"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No file can be read now; too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    getLog: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The import's id */
+                import_id: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogView"];
+                };
             };
             /** @description An access token is needed */
             401: {

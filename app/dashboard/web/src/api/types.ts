@@ -64,6 +64,15 @@ export type QualityView = Complete<Schemas["QualityView"]>;
 export type SystematicErrors = Complete<Schemas["SystematicErrors"]>;
 export type SystematicErrorView = Complete<Schemas["SystematicErrorView"]>;
 export type CorrectionsView = Complete<Schemas["CorrectionsView"]>;
+export type LogView = Complete<Schemas["LogView"]>;
+export type ImportView = Complete<Schemas["ImportView"]>;
+export type ReferenceView = Complete<Schemas["ReferenceView"]>;
+export type ProposedZonesView = Complete<Schemas["ProposedZonesView"]>;
+/** What a file of depths does not say by itself, as it is typed; empty: nothing is said. */
+export type ImportOptions = Record<
+  "crs" | "positive" | "sd_m" | "order" | "datum_offset_m" | "source",
+  string
+>;
 export type TideCorrection = Schemas["TideCorrection"];
 export type CastsView = Complete<Schemas["CastsView"]>;
 export type CastView = Complete<Schemas["CastView"]>;

@@ -304,7 +304,15 @@ export const keysOpen = signal(false);
 /** Whether single keys are shortcuts; some people's aids type what they did not mean. */
 export const singleKeys = kept("single-keys", true);
 
-export type Tab = "log" | "files" | "charts" | "soundings" | "corrections" | "compare" | "profile";
+export type Tab =
+  | "log"
+  | "files"
+  | "charts"
+  | "soundings"
+  | "corrections"
+  | "imports"
+  | "compare"
+  | "profile";
 /** What is opened above the bottom strip. */
 export const tab = signal<Tab | null>(null);
 

@@ -4,10 +4,19 @@
  */
 
 import { FRAME } from "./frame";
+import { IMPORTS } from "./imports";
 import { MAP } from "./map";
 import { NAMES } from "./names";
 import { PLANNING } from "./planning";
 import { REVIEW } from "./review";
 import { WATCHING } from "./watching";
 
-export const CATALOGUE = { ...FRAME, ...MAP, ...NAMES, ...PLANNING, ...REVIEW, ...WATCHING } as const;
+export const CATALOGUE = {
+  ...FRAME,
+  ...IMPORTS,
+  ...MAP,
+  ...NAMES,
+  ...PLANNING,
+  ...REVIEW,
+  ...WATCHING,
+} as const;

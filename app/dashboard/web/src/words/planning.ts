@@ -28,6 +28,15 @@ export const PLANNING = {
   "area.area": { en: "Area", pt: "Área" },
   "area.drawCorners": { en: "Draw corners", pt: "Desenhar cantos" },
   "area.drawRectangle": { en: "Draw rectangle", pt: "Desenhar retângulo" },
+  "area.zonesFromAChart": {
+    en: "Zones from a chart (ENC)…",
+    pt: "Zonas de uma carta (ENC)…",
+  },
+  "area.chartBeingRead": { en: "The chart is being read…", pt: "A carta está a ser lida…" },
+  "area.zonesProposed": {
+    en: "{count} {count|zone|zones} on the chart, the nearest first. Those that you tick are kept out of.",
+    pt: "{count} {count|zona|zonas} na carta, as mais próximas primeiro. As que assinalar são interditas.",
+  },
   "area.fromAFile": { en: "From a file", pt: "De um ficheiro" },
   "area.clickCornerAfterCornerOnThe": {
     en: "Click corner after corner on the map; click the first one again to close. Escape ends drawing.",

@@ -18,6 +18,7 @@ import {
 } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, FileButton } from "../parts/Controls";
+import { ChartZones } from "./ChartZones";
 import { Fault, Text, useForm } from "./Fields";
 
 /** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
@@ -195,6 +196,7 @@ export function AreaFields() {
           </span>
         ))}
       </div>
+      <ChartZones />
       <Fault field="keepOut" />
     </fieldset>
   );

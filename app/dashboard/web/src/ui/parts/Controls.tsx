@@ -154,6 +154,8 @@ interface TypedProps {
   maxLength?: number;
   autocomplete?: string;
   invalid?: boolean;
+  /** Id of a list of what may be meant. */
+  list?: string;
 }
 
 /** A line of text, kept in a signal. */
@@ -174,6 +176,44 @@ export function Typed({ text, label, id, type = "text", invalid = false, ...rest
   );
 }
 
+interface FilesButtonProps {
+  /** Endings of the files that are offered; nothing: any. */
+  accept?: string;
+  id: string;
+  several?: boolean;
+  busy?: boolean;
+  onFiles: (files: File[]) => void;
+  children: ComponentChildren;
+}
+
+/** Chooses files; the same ones can be chosen again. */
+export function FilesButton({
+  accept,
+  id,
+  several = false,
+  busy = false,
+  onFiles,
+  children,
+}: FilesButtonProps) {
+  return (
+    <label class="command file" aria-disabled={busy || undefined}>
+      {children}
+      <input
+        type="file"
+        accept={accept}
+        multiple={several}
+        disabled={busy}
+        data-testid={id}
+        onChange={(event) => {
+          const files = [...(event.currentTarget.files ?? [])];
+          event.currentTarget.value = "";
+          if (files.length > 0) onFiles(files);
+        }}
+      />
+    </label>
+  );
+}
+
 interface FileButtonProps {
   accept: string;
   id: string;
@@ -181,25 +221,12 @@ interface FileButtonProps {
   children: ComponentChildren;
 }
 
-/** Reads a file; the same one can be chosen again. */
-export function FileButton({ accept, id, onText, children }: FileButtonProps) {
-  const read = async (file: File | undefined) => {
+/** Reads a file of text. */
+export function FileButton({ onText, ...rest }: FileButtonProps) {
+  const read = async ([file]: File[]) => {
     if (file) onText(file.name, await file.text());
   };
-  return (
-    <label class="command file">
-      {children}
-      <input
-        type="file"
-        accept={accept}
-        data-testid={id}
-        onChange={(event) => {
-          void read(event.currentTarget.files?.[0]);
-          event.currentTarget.value = "";
-        }}
-      />
-    </label>
-  );
+  return <FilesButton onFiles={(files) => void read(files)} {...rest} />;
 }
 
 /** What went wrong, beside what was tried; nothing when all is well. */

@@ -6,6 +6,7 @@ import { shownStep } from "../../state/past/replay";
 import { mission, replayStep, stripHeight, type Tab, tab, view } from "../../state/store";
 import { say } from "../../words/say";
 import { paneHeight } from "../chart/layout";
+import { Imports } from "../imports/Imports";
 import { Button } from "../parts/Controls";
 import { Grip } from "../parts/Grip";
 import { ProfilePane } from "../profile/ProfilePane";
@@ -57,6 +58,7 @@ export function BottomStrip() {
       {tab.value === "charts" ? <Charts /> : null}
       {tab.value === "soundings" ? <Review /> : null}
       {tab.value === "corrections" ? <Corrections /> : null}
+      {tab.value === "imports" ? <Imports /> : null}
       {tab.value === "compare" ? <Compare /> : null}
       {tab.value === "profile" ? <ProfilePane /> : null}
       <TimeSlider />
@@ -119,7 +121,10 @@ export function BottomStrip() {
             {say("bottomStrip.rejected", { it: p.rejected ? ` (${count(p.rejected)})` : "" })}
           </Toggle>
           {present.spec.kind === "survey" ? (
-            <Toggle name="corrections">{say("corrections.corrections")}</Toggle>
+            <>
+              <Toggle name="corrections">{say("corrections.corrections")}</Toggle>
+              <Toggle name="imports">{say("imports.imports")}</Toggle>
+            </>
           ) : null}
           <Toggle name="files">{say("bottomStrip.files")}</Toggle>
           <Toggle name="profile">{say("profile.profile")}</Toggle>
