@@ -1,6 +1,8 @@
 """Describing missions again and otherwise: what is kept and what is lost, in Chromium against the real service."""
 
+import io
 import json
+import zipfile
 
 import pytest
 from playwright.sync_api import FilePayload, Page, Route, expect
@@ -42,10 +44,47 @@ def area_file(*rings: list[list[float]], name: str = "quay.geojson") -> FilePayl
     return FilePayload(name=name, mimeType="application/json", buffer=json.dumps(content).encode())
 
 
+def kmz(ring: list[list[float]]) -> FilePayload:
+    places = " ".join(f"{lon},{lat},0" for lon, lat in ring)
+    polygon = (
+        f"<Polygon><outerBoundaryIs><LinearRing><coordinates>{places}</coordinates></LinearRing></outerBoundaryIs>"
+    )
+    document = f"<kml xmlns='http://www.opengis.net/kml/2.2'><Placemark>{polygon}</Polygon></Placemark></kml>"
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("doc.kml", document)
+    return FilePayload(name="quay.kmz", mimeType="application/vnd.google-earth.kmz", buffer=archive.getvalue())
+
+
+def gpx(ring: list[list[float]], kind: str) -> FilePayload:
+    """A route (``rte``) or a track (``trk``), as chart plotters write an outline."""
+    point, begin, end = ("rtept", "", "") if kind == "rte" else ("trkpt", "<trkseg>", "</trkseg>")
+    points = "".join(f"<{point} lat='{lat}' lon='{lon}'/>" for lon, lat in ring)
+    document = f"<gpx xmlns='http://www.topografix.com/GPX/1/1'><{kind}>{begin}{points}{end}</{kind}></gpx>"
+    return FilePayload(name="quay.gpx", mimeType="application/gpx+xml", buffer=document.encode())
+
+
 def begin(page: Page) -> None:
     page.goto("/")
     expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
     by_id(page, "new-mission").click()
+
+
+def test_areas_come_as_google_earth_and_chart_plotters_write_them(page: Page, service: Service) -> None:
+    begin(page)
+    files = (kmz(RING), gpx(RING[:-1], "rte"), gpx(RING, "trk"))
+    for number, file in enumerate(files):
+        by_id(page, "area-file").set_input_files(file)
+        expect(by_id(page, "area-note")).to_contain_text(f"{file['name']}: area of 4 corners")
+        if number == 0:
+            by_id(page, "area-file").set_input_files(area_file(ZONE, name="between.geojson"))
+            expect(by_id(page, "area-note")).to_contain_text("between.geojson: area of 3 corners")
+    by_id(page, "field-name").fill("Quay by plotter")
+    by_id(page, "create-mission").click()
+    expect(by_id(page, "mission-form")).to_be_hidden()
+    (made,) = [one for one in service.get("/missions") if one["name"] == "Quay by plotter"]
+    [ring] = service.get(f"/missions/{made['id']}")["spec"]["area"]["coordinates"]
+    assert sorted(map(tuple, ring[:-1])) == sorted(map(tuple, RING[:-1]))
 
 
 def test_a_zone_that_was_removed_stays_away_and_none_comes_twice(page: Page) -> None:

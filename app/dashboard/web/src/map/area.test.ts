@@ -58,7 +58,7 @@ describe("an area from a file", () => {
     expect(() => areasIn("p.json", JSON.stringify({ type: "Point", coordinates: [1, 2] }))).toThrow(
       "no polygon",
     );
-    expect(() => areasIn("p.json", "depth 1 2 3")).toThrow("neither GeoJSON nor KML");
+    expect(() => areasIn("p.json", "depth 1 2 3")).toThrow("neither GeoJSON nor KML nor GPX");
   });
 });
 

@@ -1,6 +1,6 @@
 /** Areas as files bring them and operators draw them: read, checked, and measured. Pure but for the XML reader. */
 
-import { kml } from "@tmcw/togeojson";
+import { gpx, kml } from "@tmcw/togeojson";
 import type { LngLat, PolygonGeometry } from "../api/types";
 import { fixed } from "../state/format";
 import { say } from "../words/say";
@@ -92,11 +92,11 @@ export interface FoundAreas {
 }
 
 /**
- * The polygons of a GeoJSON or KML file: the largest is the area, those that reach into it or are called keep-out are
+ * The polygons of a GeoJSON, KML or GPX file: the largest is the area, those that reach into it or are called keep-out are
  * zones, those that lie apart are other areas.
  */
 export function areasIn(name: string, text: string): FoundAreas {
-  const json = /\.kml$/i.test(name) || text.trimStart().startsWith("<") ? fromKml(text) : parsed(text);
+  const json = /\.(kml|gpx)$/i.test(name) || text.trimStart().startsWith("<") ? fromXml(text) : parsed(text);
   const polygons = polygonsOf(json).filter(({ ring }) => ring.length > 0);
   inDegrees(
     name,
@@ -150,10 +150,24 @@ function parsed(text: string): unknown {
   }
 }
 
-function fromKml(text: string): unknown {
+/** What a KML or GPX file holds. Routes and tracks of chart plotters are outlines, closed or not. */
+function fromXml(text: string): unknown {
   const document = new DOMParser().parseFromString(text, "text/xml");
   if (document.querySelector("parsererror")) throw new Error(say("area.theKmlFileCannotBeRead"));
-  return kml(document);
+  return document.documentElement.localName === "gpx" ? closed(gpx(document)) : kml(document);
+}
+
+/** Lines of three places and more with their first place once more at their ends. */
+function closed(found: ReturnType<typeof gpx>): unknown {
+  const features = found.features.map((feature) => {
+    const { geometry } = feature;
+    if (geometry?.type !== "LineString" || geometry.coordinates.length < 3) return feature;
+    const [first] = geometry.coordinates;
+    const last = geometry.coordinates.at(-1);
+    if (first?.[0] === last?.[0] && first?.[1] === last?.[1]) return feature;
+    return { ...feature, geometry: { ...geometry, coordinates: [...geometry.coordinates, first] } };
+  });
+  return { ...found, features };
 }
 
 interface Found {

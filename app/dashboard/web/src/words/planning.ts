@@ -119,12 +119,20 @@ export const PLANNING = {
     pt: "{name}: área de {ring} cantos{zones}{apart}",
   },
   "area.theFileIsNeitherGeojsonNor": {
-    en: "The file is neither GeoJSON nor KML",
-    pt: "O ficheiro não é GeoJSON nem KML",
+    en: "The file is neither GeoJSON nor KML nor GPX",
+    pt: "O ficheiro não é GeoJSON nem KML nem GPX",
+  },
+  "area.theArchiveCannotBeRead": {
+    en: "{name} cannot be unpacked: it is damaged or cut off",
+    pt: "{name} não pode ser descomprimido: está danificado ou cortado",
+  },
+  "area.noDocumentInTheArchive": {
+    en: "{name} holds no KML document",
+    pt: "{name} não contém nenhum documento KML",
   },
   "area.theKmlFileCannotBeRead": {
-    en: "The KML file cannot be read: its XML is broken",
-    pt: "O ficheiro KML não pode ser lido: o XML está danificado",
+    en: "The file cannot be read: its XML is broken",
+    pt: "O ficheiro não pode ser lido: o XML está danificado",
   },
   "area.aCornerOfTheFileHas": {
     en: "A corner of the file has no numbers",

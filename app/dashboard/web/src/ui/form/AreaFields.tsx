@@ -3,6 +3,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { LngLat } from "../../api/types";
 import { areasIn, sizeOf } from "../../map/area";
+import { AREA_FILES, areaText } from "../../map/areaText";
 import { withAreas } from "../../state/form/blocks";
 import { centred, cornersOf } from "../../state/form/draft";
 import { asTyped, withRings } from "../../state/form/places";
@@ -17,7 +18,7 @@ import {
   mapCentre,
 } from "../../state/store";
 import { say } from "../../words/say";
-import { Button, FileButton } from "../parts/Controls";
+import { Button, FilesButton } from "../parts/Controls";
 import { ChartZones } from "./ChartZones";
 import { Fault, Text, useForm } from "./Fields";
 
@@ -62,9 +63,10 @@ export function AreaFields() {
     others.value = [];
     set({ source: "drawn", ring });
   };
-  const read = (name: string, text: string) => {
+  const read = async ([file]: File[]) => {
+    if (!file) return;
     try {
-      const found = areasIn(name, text);
+      const found = areasIn(file.name, await areaText(file));
       set(({ keepOut }) => {
         const zones = withRings(keepOut, found.keepOut);
         const stay = zones.length - found.keepOut.length;
@@ -94,9 +96,9 @@ export function AreaFields() {
         >
           {say("area.drawRectangle")}
         </Button>
-        <FileButton accept=".geojson,.json,.kml" id="area-file" onText={read}>
+        <FilesButton accept={AREA_FILES} id="area-file" onFiles={(files) => void read(files)}>
           {say("area.fromAFile")}
-        </FileButton>
+        </FilesButton>
       </div>
       {drawing.value ? (
         <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>

@@ -1,20 +1,22 @@
 import { useSignal } from "@preact/signals";
 import { areasIn } from "../../map/area";
+import { AREA_FILES, areaText } from "../../map/areaText";
 import { withRings } from "../../state/form/places";
 import { say } from "../../words/say";
-import { Button, FileButton, Hint } from "../parts/Controls";
+import { Button, FilesButton, Hint } from "../parts/Controls";
 import { Fault, Part, PlaceField, useForm } from "./Fields";
 
 /** What a search looks for, where its vehicles enter, how long they have, and what is known to stand there. */
 export function SearchFields() {
   const { draft, set } = useForm();
   const note = useSignal("");
-  const read = (name: string, text: string) => {
+  const read = async ([file]: File[]) => {
+    if (!file) return;
     try {
-      const { area, keepOut, others } = areasIn(name, text);
+      const { area, keepOut, others } = areasIn(file.name, await areaText(file));
       const obstacles = [area, ...keepOut, ...others];
       set((now) => ({ obstacles: withRings(now.obstacles, obstacles) }));
-      note.value = say("search.obstacle", { name, obstacles: obstacles.length });
+      note.value = say("search.obstacle", { name: file.name, obstacles: obstacles.length });
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
     }
@@ -28,9 +30,9 @@ export function SearchFields() {
         <Part of="search" />
         <Part of="quality" />
       </div>
-      <FileButton accept=".geojson,.json,.kml" id="obstacles-file" onText={read}>
+      <FilesButton accept={AREA_FILES} id="obstacles-file" onFiles={(files) => void read(files)}>
         {say("search.knownObstaclesFromAFile")}
-      </FileButton>
+      </FilesButton>
       {draft.obstacles.length > 0 ? (
         <span class="zone">
           {say("search.known", { obstacles: draft.obstacles.length })}
