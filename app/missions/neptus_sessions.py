@@ -1,7 +1,7 @@
 """Sessions of Neptus' ConvCAO panel as missions: begun by its CONNECT, started by its START, fed by its steps."""
 
 import socket
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from statistics import median
 from typing import Protocol
 
@@ -50,7 +50,10 @@ class Missions(Protocol):
         """Return one."""
 
     async def act(self, live: LiveMission, action: Action, *, actor: str, note: str) -> ActionView:
-        """Start, finish or abort one."""
+        """Finish or abort one."""
+
+    async def start(self, live: LiveMission, confirmed: Sequence[str], *, actor: str, note: str) -> ActionView:
+        """Start one, of whose checklist some questions were confirmed."""
 
 
 class NeptusSessions:
@@ -142,7 +145,7 @@ class NeptusSessions:
                 raise SessionRefusedError(f"the session's mission is {state}: press STOP, then RENEW for another one")
             self.link.locate(data, host)
             if state is MissionState.READY:
-                await self._service.act(mission, Action.START, actor=user, note="START in the panel")
+                await self._service.start(mission, (), actor=user, note="START in the panel")
         except MissionError as error:
             raise SessionRefusedError(f"{error}; {error.remedy}") from error
         await self._warn_of_border(data)

@@ -422,6 +422,8 @@ class MissionService:
     async def start(self, live: LiveMission, confirmed: Sequence[str], *, actor: str, note: str = "") -> ActionView:
         """Start a mission, and keep in its log which questions of the checklist ``actor`` confirmed, and which not.
 
+        Consoles that ask none start with it, too: the log says that nobody confirmed them.
+
         Raises InvalidRequestError for what is no question, else as :meth:`act`.
         """
         questions = self.settings.checklist

@@ -1,5 +1,6 @@
 """How soundings are corrected: tide, sound speed, systematic errors, and the drift of vehicles."""
 
+from contextlib import suppress
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Query
@@ -11,6 +12,7 @@ from app.api.mission import Mission
 from app.api.schemas import API
 from app.api.state import Service
 from app.mapping.s44 import Order
+from app.missions.errors import MapNotReadyError
 from app.missions.operations.corrections import adjustment, casts, recorrection
 from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.recorrection import corrections_view
@@ -78,11 +80,14 @@ async def delete_sound_speed(operator: Operator, mission: Mission) -> Correction
     summary="See what each cast corrects",
     responses=problems("mission-not-found", "invalid-request", "pings-unreadable"),
 )
-async def get_casts(reader: Reader, mission: Mission, order: S44Order = Order.ORDER_1A) -> CastsView:
+async def get_casts(service: Service, reader: Reader, mission: Mission, order: S44Order = Order.ORDER_1A) -> CastsView:
     """Return the sound speed casts with how many soundings each corrects, and how far away it was taken.
 
     `changes` tells by how much the depth of the outer beam differs from each cast to the next.
     """
+    # Neighbours are compared down to the map's deepest cell; a service that has just begun has no map in memory yet.
+    with suppress(MapNotReadyError):
+        await newest_map(mission, service.maps, patient=False)
     return await casts_view(mission, order)
 
 

@@ -65,7 +65,8 @@ class Casts:
         self.profiles = tuple(profiles)
         self.places, self.rule, self.within_s = places, rule, within_s
         # Casts with the same profile are traced together: a cast that equals another one changes nothing at all.
-        self._like = np.array([_first_like(self.profiles, profile) for profile in self.profiles])
+        first: dict[tuple[float, bytes, bytes], int] = {}
+        self._like = np.array([first.setdefault(_content(one), number) for number, one in enumerate(self.profiles)])
 
     def __len__(self) -> int:
         return len(self.profiles)
@@ -113,15 +114,11 @@ class Casts:
         return across, down
 
 
-def _first_like(profiles: Sequence[SoundSpeedProfile], profile: SoundSpeedProfile) -> int:
-    """Return the number of the first profile that equals one of them."""
-    return next(
-        number
-        for number, other in enumerate(profiles)
-        if other.assumed_mps == profile.assumed_mps
-        and np.array_equal(other.depths_m, profile.depths_m)
-        and np.array_equal(other.speeds_mps, profile.speeds_mps)
-    )
+def _content(profile: SoundSpeedProfile) -> tuple[float, bytes, bytes]:
+    """Return what profiles that are the same have in common."""
+    # Zero is added so that it has one sign only.
+    depths, speeds = (np.asarray(values, dtype=float) + 0.0 for values in (profile.depths_m, profile.speeds_mps))
+    return float(profile.assumed_mps), depths.tobytes(), speeds.tobytes()
 
 
 def depth_difference_m(

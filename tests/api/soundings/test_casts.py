@@ -190,6 +190,21 @@ async def test_soundings_far_from_their_cast_and_casts_far_apart_are_told(client
     assert "Next cast" in report
 
 
+async def test_casts_far_apart_are_told_also_by_a_service_that_has_just_begun(
+    make_settings: Callable[..., Settings],
+) -> None:
+    settings = make_settings()
+    async with running(settings) as server, make_client(server) as client:
+        answer = await client.post("/missions", json=mission_spec(vehicles=VEHICLES))
+        path = f"/missions/{answer.json()['id']}"
+        await post(client, path, hourly(4))
+        await put(client, f"{path}/sound-speed/casts/a", cast(1500, 0))
+        await put(client, f"{path}/sound-speed/casts/b", cast(1600, 3))
+    async with running(settings) as server, make_client(server) as client:
+        told = (await client.get(f"{path}/sound-speed/casts")).json()
+        assert [(one["before"], one["after"], one["is_large"]) for one in told["changes"]] == [("a", "b", True)]
+
+
 async def test_what_cannot_be_changes_nothing_and_says_which_field(client: httpx.AsyncClient, path: str) -> None:
     absent = await client.delete(f"{path}/sound-speed/casts/none")
     assert (absent.status_code, absent.json()["type"]) == (404, "urn:bathyfleet:problem:cast-not-found")

@@ -47,3 +47,21 @@ def test_a_mission_starts_once_every_question_is_confirmed(browser: Browser, ask
     said = [one["message"] for one in log.json()]
     assert "local operator confirmed before the start: Hatches closed; Recovery boat ready" in said
     context.close()
+
+
+def test_what_was_confirmed_for_one_mission_is_not_for_the_next(browser: Browser, asking: Service) -> None:
+    first, second = asking.create(name="Quay"), asking.create(name="Pier")
+    context = browser.new_context(base_url=asking.url)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    show(page, second)
+    show(page, first)
+    by_id(page, "start").click()
+    page.get_by_label("Hatches closed").check()
+    page.get_by_label("Recovery boat ready").check()
+    expect(by_id(page, "confirm-start")).to_be_enabled()
+    page.evaluate(f"location.hash = '#/missions/{second}'")
+    expect(by_id(page, "preflight")).to_contain_text("Pier")
+    expect(page.get_by_label("Hatches closed")).not_to_be_checked()
+    expect(by_id(page, "confirm-start")).to_be_disabled()
+    context.close()

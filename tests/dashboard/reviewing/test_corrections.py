@@ -99,11 +99,11 @@ def test_casts_are_added_from_files_changed_and_removed(watched: Watched, servic
     by_id(page, "toggle-corrections").click()
     sound, listed, pane = by_id(page, "corrections-sound-speed"), by_id(page, "cast"), by_id(page, "corrections")
     by_id(page, "corrections-assumed").fill("1490")
-    morning = "( SoundVelocity 1.0 0 202611202100 41.1853 -8.7042 -1 0 0 SVP P 0002 )\n0 1510\n30 1506\n"
+    morning = "( SoundVelocity 1.0 0 20261120210030 41.1853 -8.7042 -1 0 0 SVP P 0002 )\n0 1510\n30 1506\n"
     by_id(page, "cast-file").set_input_files(files=[text_file("morning.asvp", morning)])
     for field, value in (
         ("name", "morning.asvp"),
-        ("time", "2026-11-20 21:00"),
+        ("time", "2026-11-20 21:00:30"),
         ("lat", "41.1853"),
         ("lon", "-8.7042"),
     ):
@@ -115,7 +115,15 @@ def test_casts_are_added_from_files_changed_and_removed(watched: Watched, servic
     )
     expect(by_id(page, "casts-far")).to_contain_text("are more than 4 h from their cast")
     told = service.get(corrections)["sound_speed"]
-    assert (told["assumed_mps"], told["time"], told["position"]) == (1490.0, "2026-11-20T21:00:00Z", [-8.7042, 41.1853])
+    assert (told["assumed_mps"], told["time"], told["position"]) == (1490.0, "2026-11-20T21:00:30Z", [-8.7042, 41.1853])
+    assert told["source"] == "morning.asvp"
+    listed.nth(0).get_by_role("button", name="Change…").click()
+    expect(by_id(page, "cast-time")).to_have_value("2026-11-20 21:00:30")
+    by_id(page, "cast-file").set_input_files(files=[text_file("again.asvp", morning)])
+    by_id(page, "cast-name").fill("morning.asvp")
+    with page.expect_response(lambda answer: answer.request.method == "PUT"):
+        by_id(page, "cast-add").click()
+    assert service.get(corrections)["sound_speed"]["source"] == "again.asvp", "the file that it was read from last"
 
     by_id(page, "cast-name").fill("noon")
     by_id(page, "cast-time").fill("soon")

@@ -19,6 +19,7 @@ import pytest
 from app.api.accounts.roles import Role
 from app.api.accounts.tokens import TokenStore
 from app.missions.fleet.links.neptus import GATHER_S, NeptusFleetLink, gateway_settings
+from app.missions.operations.history import events_after
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.settings import NeptusSettings
 from app.missions.spec.vehicle import VehicleKind
@@ -270,6 +271,16 @@ async def test_bad_uploads_move_no_vehicle_and_say_why(gateway: Gateway) -> None
     # And a good one goes on.
     await panel.fly()
     assert (await gateway.mission()).progress.step == 3
+
+
+async def test_a_start_in_the_panel_confirms_no_question_and_the_log_says_so(gateway: Gateway) -> None:
+    gateway.service.settings = gateway.service.settings.model_copy(update={"checklist": ("Hatches closed",)})
+    panel = panel_of(gateway)
+    await asyncio.to_thread(panel.connect)
+    await panel.fly()
+    mission = await gateway.service.get((await gateway.mission()).id)
+    said = [line.message for line in await events_after(mission) if "before the start" in line.message]
+    assert said == ["nobody confirmed before the start: Hatches closed"]
 
 
 async def test_the_same_step_uploaded_twice_is_one_step(gateway: Gateway) -> None:

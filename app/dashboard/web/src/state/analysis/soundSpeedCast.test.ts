@@ -40,6 +40,13 @@ it.each([
     null,
   ],
   ["a profile alone", BODY, null, null],
+  ["a day that no month has", `( SoundVelocity 1.0 0 202602311100 41.1 -8.7 -1 )\n${BODY}`, null, PLACE],
+  [
+    "a day that the year does not have",
+    `[SVP_VERSION_2]\nSection 2026-366 11:00:00 41.1 -8.7\n${BODY}`,
+    null,
+    PLACE,
+  ],
   ["a time that is none", `( SoundVelocity 1.0 0 202613991100 41.1 -8.7 -1 )\n${BODY}`, null, PLACE],
 ])("reads time and place of %s", (_, text, time, position) => {
   const [cast, ...others] = castsOf(text);
@@ -66,6 +73,7 @@ it("takes times for UTC unless they name a zone", () => {
   expect(timeOf("2026-11-30T11:00:00Z")).toBe(TIME);
   expect(timeOf("2026-11-30 09:30 -01:30")).toBe(TIME);
   expect(timeOf("11:00")).toBeNull();
+  expect(timeOf("2026-02-31 11:00")).toBeNull();
 });
 
 it("writes a profile as it is read", () => {

@@ -51,8 +51,9 @@ function headOf(text: string): Head {
   const section = SECTION.exec(text);
   if (section) {
     const [, year, day, hour, minute, second, lat = "", lon = ""] = section;
-    const at = Date.UTC(Number(year), 0, Number(day), Number(hour), Number(minute), Number(second));
-    return { time: moment(new Date(at).toISOString()), position: place(lat, lon) };
+    const at = new Date(Date.UTC(Number(year), 0, Number(day), Number(hour), Number(minute), Number(second)));
+    const isDay = at.getUTCFullYear() === Number(year);
+    return { time: isDay ? moment(at.toISOString()) : null, position: place(lat, lon) };
   }
   return labelled(text);
 }
@@ -92,8 +93,12 @@ export function timeOf(text: string): string | null {
   return moment(`${year}-${month}-${day}T${hour}:${minute}:${second}${offset}`);
 }
 
-const moment = (iso: string): string | null =>
-  Number.isNaN(Date.parse(iso)) ? null : new Date(iso).toISOString();
+/** The moment of an ISO 8601 time with its zone; null where there is no such day, which programs count on from. */
+function moment(iso: string): string | null {
+  const day = iso.slice(0, 10);
+  const isDay = !Number.isNaN(Date.parse(day)) && new Date(day).toISOString().startsWith(day);
+  return isDay && !Number.isNaN(Date.parse(iso)) ? new Date(iso).toISOString() : null;
+}
 
 /** Degrees with decimals or as 41:11:00N; null: neither. */
 function degreesOf(text: string): number | null {

@@ -29,13 +29,12 @@ export function PreflightDialog() {
   const fault = useSignal("");
   const confirmed = useSignal<readonly string[]>([]);
   const open = preflightOpen.value;
+  const id = selectedId.value;
 
   useEffect(() => {
-    if (!open) return;
+    if (!open || !id) return;
     let stopped = false;
     const look = async () => {
-      const id = selectedId.peek();
-      if (!id) return;
       try {
         const answer = await api.preflight(id);
         if (!stopped) {
@@ -43,7 +42,7 @@ export function PreflightDialog() {
           fault.value = "";
         }
       } catch (error) {
-        fault.value = said(error);
+        if (!stopped) fault.value = said(error);
       }
     };
     void look();
@@ -52,18 +51,21 @@ export function PreflightDialog() {
       stopped = true;
       clearInterval(timer);
       found.value = null;
+      fault.value = "";
+      // Another mission is looked at anew.
       confirmed.value = [];
     };
-  }, [open]);
+  }, [open, id]);
 
   const depth_m = pointed(floorDepth.value);
   const wrongDepth = floorDepthFault(depth_m);
   const close = sets(preflightOpen, false);
-  const begin = async () => {
-    if (await start(confirmed.value)) close();
-  };
   const view = found.value;
   const questions = view?.questions ?? [];
+  const begin = async () => {
+    // Questions may be others since they were ticked: the service may have begun anew.
+    if (await start(questions.filter((question) => confirmed.value.includes(question)))) close();
+  };
   const unconfirmed = questions.filter((question) => !confirmed.value.includes(question)).length;
   const problems = view?.checks.filter((c) => c.status === "problem").length ?? 0;
   const refused = refusal.value?.what === actionWords("start") ? refusal.value.error : null;

@@ -36,6 +36,8 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
     lat: useSignal(""),
     lon: useSignal(""),
     text: useSignal(""),
+    /** Where the text comes from; empty: it was typed. */
+    source: useSignal(""),
   };
   useEffect(() => {
     const id = selectedId.peek();
@@ -53,12 +55,13 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
       isNewest = false;
     };
   }, [found]);
-  const show = (cast: Cast, name: string) => {
+  const show = (cast: Cast, name: string, source: string) => {
     form.name.value = name;
-    form.time.value = cast.time ? cast.time.slice(0, 16).replace("T", " ") : "";
+    form.time.value = cast.time ? typedTime(cast.time) : "";
     form.lat.value = cast.position ? plain(cast.position[1]) : "";
     form.lon.value = cast.position ? plain(cast.position[0]) : "";
     form.text.value = written(cast.profile);
+    form.source.value = source;
   };
   const casts = list.value?.casts ?? [];
   return (
@@ -82,7 +85,10 @@ export function Casts({ found, busy, change, fault, assumed }: CastsProps) {
   );
 }
 
-type Shown = (cast: Cast, name: string) => void;
+type Shown = (cast: Cast, name: string, source: string) => void;
+
+/** A time, ISO 8601 in UTC, as it is typed: seconds where there are any. */
+const typedTime = (time: string): string => time.slice(0, 19).replace("T", " ").replace(/:00$/, "");
 
 interface ListProps extends Pick<CastsProps, "busy" | "change"> {
   casts: readonly CastView[];
@@ -100,7 +106,9 @@ function CastList({ casts, busy, change, show }: ListProps) {
           <span class="row">
             <Button
               id="cast-change"
-              onClick={() => show({ ...cast, profile: cast.profile as Cast["profile"] }, cast.name)}
+              onClick={() =>
+                show({ ...cast, profile: cast.profile as Cast["profile"] }, cast.name, cast.source)
+              }
             >
               {say("casts.change")}
             </Button>
@@ -201,7 +209,7 @@ function RuleOf({ list, busy, change, fault }: RuleProps) {
 }
 
 interface FormProps extends CastsProps {
-  form: Record<"name" | "time" | "lat" | "lon" | "text", Signal<string>>;
+  form: Record<"name" | "time" | "lat" | "lon" | "text" | "source", Signal<string>>;
   show: Shown;
 }
 
@@ -210,7 +218,7 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
     const [cast, ...others] = castsOf(text);
     fault.value = cast ? "" : say("corrections.noProfile");
     if (!cast) return;
-    show(cast, name);
+    show(cast, name, name);
     // Several sections stay as they are written, each with its own time and place.
     if (others.length) form.text.value = text;
   };
@@ -252,6 +260,7 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
           value={form.text.value}
           onInput={(event) => {
             form.text.value = event.currentTarget.value;
+            form.source.value = "";
           }}
         />
       </label>
@@ -269,7 +278,7 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
   );
 }
 
-type Named = Cast & { name: string };
+type Named = Cast & { name: string; source: string };
 
 /** What is typed, each cast with its name; words about what is wrong. Times and places that are typed count first. */
 function typedCasts(form: FormProps["form"]): Named[] | string {
@@ -278,38 +287,39 @@ function typedCasts(form: FormProps["form"]): Named[] | string {
   if (!first) return say("corrections.noProfile");
   const name = form.name.peek().trim().replaceAll("/", "-");
   if (name === "") return say("casts.typeName");
-  if (casts.length > 1) return casts.map((cast, i) => ({ ...cast, name: `${name} ${i + 1}` }));
+  const source = form.source.peek() || name;
+  if (casts.length > 1) return casts.map((cast, i) => ({ ...cast, name: `${name} ${i + 1}`, source }));
   const typed = form.time.peek().trim();
   const time = typed === "" ? first.time : timeOf(typed);
   if (typed !== "" && time === null) return say("casts.typeTime");
   const place = [form.lon, form.lat];
-  if (place.every((field) => field.peek().trim() === "")) return [{ ...first, name, time }];
+  if (place.every((field) => field.peek().trim() === "")) return [{ ...first, name, source, time }];
   const [lon, lat] = place.map(numberOf);
   if (lon == null || lat == null) return say("casts.typePlace");
-  return [{ ...first, name, time, position: [lon, lat] }];
+  return [{ ...first, name, source, time, position: [lon, lat] }];
 }
 
-/** Sends casts: one by itself, several, or the first of all with the speed that is set in the sonars, all at once. */
+/** Sends casts: one by itself; several, or the first with another speed set in the sonars, all at once. */
 function sent(
   id: string,
   { sound_speed }: CorrectionsView,
   casts: readonly Named[],
   assumed_mps: number,
 ): Promise<CorrectionsView> {
-  const known = sound_speed ? [sound_speed, ...sound_speed.further] : [];
-  const sourceOf = (name: string) => known.find((cast) => cast.name === name)?.source || name;
   const [one] = casts;
-  if (sound_speed && one && casts.length === 1) {
+  // One by itself leaves alone what somebody else adds at the same time.
+  if (one && casts.length === 1 && (sound_speed || assumed_mps === SPEC["sound_speed.assumed_mps"].default)) {
     const { name, ...described } = one;
-    return api.setCast(id, name, { ...described, source: sourceOf(name) });
+    return api.setCast(id, name, described);
   }
+  const known = sound_speed ? [sound_speed, ...sound_speed.further] : [];
   const kept = known.filter(({ name }) => !casts.some((cast) => cast.name === name));
-  const [first, ...further] = [...kept, ...casts].map(({ name, profile, time, position }) => ({
+  const [first, ...further] = [...kept, ...casts].map(({ name, profile, time, position, source }) => ({
     name,
     profile: [...profile],
     time,
     position,
-    source: sourceOf(name),
+    source,
   }));
   const { rule = "nearest_in_time", within_h = SPEC["sound_speed.within_h"].default } = sound_speed ?? {};
   return api.setSoundSpeed(id, { ...first, further, assumed_mps, rule, within_h });
