@@ -6,7 +6,12 @@ from pydantic import ValidationError
 
 from app.missions.errors import CastNotFoundError, ConflictError, InvalidRequestError
 from app.missions.live.mission import LiveMission
-from app.missions.operations.corrections.recorrection import check_casts, correct_by, corrections_view
+from app.missions.operations.corrections.recorrection import (
+    check_casts,
+    check_none_applied,
+    correct_by,
+    corrections_view,
+)
 from app.missions.soundings.corrections import ASSUMED_MPS
 from app.missions.spec.base import FieldError
 from app.missions.spec.water import Cast, CastDescription, CastRules, SoundSpeed
@@ -71,6 +76,7 @@ async def _correct_with(live: LiveMission, casts: Sequence[Cast], rules: CastRul
         except ValidationError as error:
             raise _refused(error) from None
         check_casts(live, sound_speed)
+        await check_none_applied(live)
     await correct_by(live, live.spec.model_copy(update={"sound_speed": sound_speed}))
 
 

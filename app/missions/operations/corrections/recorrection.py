@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sqlalchemy import select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 
+from app.mapping.readers.file_extensions import MULTIBEAM
 from app.mapping.water.tide_files import TideTableError, parse_tid
 from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import VerticalDatum
@@ -29,6 +30,7 @@ from app.missions.views.measurements.corrections import CorrectionsView, TideCor
 from app.missions.views.measurements.soundings import Ruling, Verdict
 from app.missions.views.mission import Level
 from app.storage.models import ImportRow, MissionRow, SoundingRow, TideTableRow
+from app.storage.queries import events as event_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import stored_maps
 
@@ -114,11 +116,31 @@ async def set_sound_speed(live: LiveMission, sound_speed: SoundSpeed | None, act
     """Change the casts altogether; None: the sonars' own ranges are taken. Raises InvalidRequestError."""
     if sound_speed is not None:
         check_casts(live, sound_speed)
+        await check_none_applied(live)
     async with live.correcting:
         await correct_by(live, live.spec.model_copy(update={"sound_speed": sound_speed}))
     words = "sound speed is not corrected" if sound_speed is None else f"sound speed: {sound_speed.statement}"
     await live.journal.log(Level.INFO, "corrections", f"{words}, set by {actor}", actor=actor)
     return corrections_view(live)
+
+
+async def check_none_applied(live: LiveMission) -> None:
+    """Refuse a first sound speed where a multibeam's own files were taken in, to which theirs is applied already.
+
+    Raises InvalidRequestError.
+    """
+    if live.spec.sound_speed is not None:
+        return
+    async with live.database.reading() as session:
+        rows = await event_queries.events_of_kind(session, live.id, "import")
+    files = sorted({row.data["file"] for row in rows if row.data.get("pings")})
+    files = [file for file in files if file.lower().endswith(MULTIBEAM)]
+    if files:
+        raise InvalidRequestError(
+            "profile",
+            f"pings from {', '.join(files)} have the sound speed applied, and it would be applied again",
+            "leave this mission without a sound speed: correct them in the multibeam's own processing",
+        )
 
 
 def check_casts(live: LiveMission, sound_speed: SoundSpeed) -> None:

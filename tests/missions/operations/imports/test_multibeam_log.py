@@ -9,13 +9,15 @@ import pytest
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.errors import InvalidRequestError
+from app.missions.operations.corrections.casts import set_cast
+from app.missions.operations.corrections.recorrection import corrections_view, set_sound_speed
 from app.missions.operations.history import events_after
 from app.missions.operations.imports import log_batches
 from app.missions.operations.imports.log_import import import_log
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
-from app.missions.spec.water import SoundSpeed
+from app.missions.spec.water import CastDescription, SoundSpeed
 from app.missions.views.measurements.soundings import LogImportView
 from app.storage.database import Database
 from tests.support.mapping.multibeam import floor, line, write_gsf, write_kmall
@@ -146,3 +148,12 @@ async def test_a_name_is_needed_and_no_profile_may_be_applied_again(service: Mis
     other = await service.create(make_spec(vehicles=[], sound_speed=profile.model_dump()))
     with pytest.raises(InvalidRequestError, match="profile would be applied again"):
         await take(service, other.id, file)
+    await take(service, mission.id, file)
+    live = await service.get(mission.id)
+    before = corrections_view(live)
+    with pytest.raises(InvalidRequestError, match=r"line\.kmall have the sound speed applied"):
+        await set_sound_speed(live, profile, "Ana")
+    with pytest.raises(InvalidRequestError, match=r"line\.kmall have the sound speed applied"):
+        await set_cast(live, "noon", CastDescription(profile=profile.profile), "Ana")
+    assert corrections_view(live) == before
+    await set_sound_speed(live, None, "Ana")
