@@ -243,6 +243,14 @@ async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRo
     return next(iter(await answers_to(session, mission_id, {key})), None)
 
 
+async def first_log_keys(session: AsyncSession, mission_id: str, digest: str) -> Sequence[str]:
+    """Return the keys of the first batches of a file that was taken in as vehicles' logs; ``digest``: its SHA-256."""
+    query = select(BatchRow.key).where(
+        BatchRow.mission_id == mission_id, BatchRow.digest == digest, BatchRow.key.like(f"{LOG_KEY}-%-0")
+    )
+    return (await session.scalars(query)).all()
+
+
 async def answers_to(session: AsyncSession, mission_id: str, keys: Collection[str]) -> Sequence[BatchRow]:
     """Return the answers once given to idempotency keys; waits for a transaction that is about to answer."""
     if session.get_bind().dialect.name != "sqlite":  # it has one writer at a time

@@ -12,6 +12,7 @@ import pytest
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.operations.imports import log_process, log_uploads
 from app.missions.operations.imports.log_import import import_log
+from app.missions.running.final_maps import FinalMaps
 from app.missions.service import MissionService
 from app.settings import Settings
 from app.storage.database import Database
@@ -270,6 +271,48 @@ async def test_a_process_that_breaks_off_leaves_what_can_be_gone_on_with(
         assert log["problem"].startswith("the process that reads it broke off")
     log = await ended(client, path, await send(client, path, content))
     assert log["result"]["soundings"] == PINGS
+
+
+@pytest.mark.slow
+async def test_what_a_log_gave_before_its_reading_broke_off_is_on_the_map_of_a_mission_that_ended(
+    client: httpx.AsyncClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = mission_spec(area=rectangle(0, 0, 30, 1900))
+    path = f"/missions/{(await client.post('/missions', json=spec)).json()['id']}"
+    assert (await client.post(f"{path}/start")).status_code == 200
+    assert (await client.post(f"{path}/abort")).status_code == 200
+    content = writer.write(tmp_path / "Data.lsf", writer.survey(2000)).read_bytes()
+    read = log_process.ReadingProcess.next
+    given: list[Any] = []
+
+    async def one_only(process: log_process.ReadingProcess) -> Any:
+        if given:
+            raise log_process._broken_off()
+        given.append(await read(process))
+        return given[0]
+
+    monkeypatch.setattr(log_process.ReadingProcess, "next", one_only)
+    made: list[str] = []
+    take_up = FinalMaps.take_up
+    monkeypatch.setattr(FinalMaps, "take_up", lambda maps, live: (made.append(live.id), take_up(maps, live))[1])
+    log = await ended(client, path, await send(client, path, content, filename="Data.lsf"))
+    assert log["state"] == "failed"
+    stored = (await client.get(path)).json()["progress"]["soundings"]
+    assert stored > 100
+    assert made, "nobody has to ask for the map"
+    await mapped(client, path, stored)
+
+
+async def test_a_log_is_not_taken_as_two_vehicles(client: httpx.AsyncClient, path: str, content: bytes) -> None:
+    log = await ended(client, path, await send(client, path, content, vehicle="wrong"))
+    assert (log["vehicle"], log["result"]["soundings"]) == ("wrong", PINGS)
+    again = await ended(client, path, await send(client, path, content))
+    assert (again["state"], again["result"]) == ("failed", None)
+    assert again["problem"] == "the same file is in the mission as the log of wrong: its soundings would count twice"
+    assert again["remedy"]
+    assert (await client.get(path)).json()["progress"]["soundings"] == PINGS
+    same = await ended(client, path, await send(client, path, content, vehicle="wrong"))
+    assert same["result"]["known"]
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import { render } from "preact";
 import { findCharts } from "./state/device/baseMap";
 import { startSession } from "./state/session";
 import { isDark, theme } from "./state/store";
+import { askBeforeLeaving } from "./state/uploads";
 import { App } from "./ui/App";
 
 effect(() => {
@@ -14,5 +15,6 @@ effect(() => {
     value === "contrast" || value === "night" ? value : isDark.value ? "dark" : "light";
 });
 startSession();
+askBeforeLeaving();
 void findCharts();
 render(<App />, document.getElementById("app") as HTMLElement);

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from pydantic import TypeAdapter, ValidationError
 
 from app.missions.clock import now
-from app.missions.errors import InvalidRequestError
+from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.fleet.interface import PingReport, SoundingReport, VehicleReport
 from app.missions.fleet.links.imc import bridge_settings
 from app.missions.large_batches import made_of
@@ -132,8 +132,8 @@ async def import_log(
 
     Raises
     ------
-    InvalidRequestError
-        When the file is no log of a vehicle, or does not tell which one's.
+    InvalidRequestError, ConflictError
+        When the file is no log of a vehicle, or does not tell which one's; when it is there as another vehicle's.
     """
     check_log(live, path.name, vehicle)
     digest, batches = await asyncio.to_thread(_opened, live, settings, path, vehicle)
@@ -184,8 +184,10 @@ class LogImport:
     async def run(self, *, actor: str, progress: Progress | None = None, import_id: str = "") -> LogImportView:
         """Read the whole log; what is counted accepted is stored for good when this returns.
 
-        Cancelled, it ends between two batches. ``import_id``: under which it is listed.
+        Cancelled, it ends between two batches. ``import_id``: under which it is listed. Raises ConflictError where the
+        same file is there as another vehicle's.
         """
+        await self._refuse_another_name()
         while (batch := await self._source.next()) is not None:
             pings = [report for report in batch.reports if isinstance(report, PingReport)]
             await to_the_end(self._write_pings(pings) if pings else self._write(batch.reports))
@@ -206,6 +208,18 @@ class LogImport:
                 **view.model_dump(),
             )
         return view
+
+    async def _refuse_another_name(self) -> None:
+        """Take no file as two vehicles': soundings are known again by vehicle and time. Raises ConflictError."""
+        async with self._live.database.reading() as session:
+            keys = await sounding_queries.first_log_keys(session, self._live.id, self._head.digest)
+        others = {name for name in map(_vehicle_of, keys) if name != self._head.vehicle}
+        if others:
+            names = ", ".join(sorted(others))
+            raise ConflictError(
+                f"the same file is in the mission as the log of {names}: its soundings would count twice",
+                f"leave it at that, or give the name that it has there: --vehicle {names}, by REST vehicle={names}",
+            )
 
     async def _write(self, batch: list[Report]) -> None:
         live, tally = self._live, self._tally
@@ -279,6 +293,12 @@ class LogImport:
             notes=facts.notes,
             known=tally.was_known and tally.known > 0,
         )
+
+
+def _vehicle_of(key: str) -> str:
+    """Return whose log the key of a first batch is about; see ``LogImport._key``."""
+    _altimeter, _, rest = key.removeprefix(f"{LOG_KEY}-").partition("-")[2].partition("-")
+    return rest.removesuffix("-0").removesuffix("-pings")
 
 
 def _check_name(vehicle: str) -> None:

@@ -1,11 +1,10 @@
 """Vehicles' logs that a service takes in are read by a process of their own, locked in: it takes minutes of computing.
 
 As a program: the argument is the number of an open file, the log. What is asked comes pickled on standard input; what
-was read goes pickled to standard output, each item behind its length.
+was read goes to standard output, each item behind its length: see ``log_items``.
 """
 
 import asyncio
-import io
 import os
 import pickle
 import signal
@@ -14,13 +13,12 @@ import sys
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Collection, Iterable
 from contextlib import asynccontextmanager, suppress
-from typing import IO, Any
+from typing import IO
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.readers.confinement import ResourceLimits, confine, limit
 from app.mapping.readers.warm_up import data_folders
 from app.missions.errors import InvalidRequestError
-from app.missions.fleet.interface import BeamGeometry, PingReport, Position, SoundingReport, VehicleReport
 from app.missions.operations.imports.log_batches import (
     LogBatch,
     LogFacts,
@@ -31,23 +29,16 @@ from app.missions.operations.imports.log_batches import (
     WantedLog,
     read_log,
 )
+from app.missions.operations.imports.log_items import item_bytes, item_of
 from app.missions.operations.imports.reader_process import not_confined, reader_environment
 from imc_bridge.logs import OpenLog
 
 LIMITS = ResourceLimits(memory_bytes=4 * 2**30, cpu_s=1800, file_bytes=2**20)
 SIZE = struct.Struct("<Q")
-MAX_ITEM_BYTES = 2**28
+MAX_ITEM_BYTES = 2**26
 """A batch of pings is some megabytes."""
 SILENCE_S = 600.0
 """So long nothing may come of a file of which nothing can be used."""
-
-_ALLOWED = {
-    *((one.__module__, one.__name__) for one in (OpenedLog, LogBatch, LogFacts, RefusedLog, UnreadLog)),
-    *((one.__module__, one.__name__) for one in (SoundingReport, VehicleReport, PingReport, Position, BeamGeometry)),
-    ("numpy", "dtype"),
-    *((f"numpy.{core}.numeric", "_frombuffer") for core in ("core", "_core")),
-}
-"""What items are made of, by module and name."""
 
 
 class ReadingProcess:
@@ -66,7 +57,7 @@ class ReadingProcess:
         if isinstance(item, LogFacts):
             self._facts = item
             return None
-        if not isinstance(item, LogBatch):
+        if not isinstance(item, LogBatch) or any(one.vehicle != self.opened.vehicle for one in item.reports):
             raise _broken_off()
         return item
 
@@ -116,7 +107,10 @@ async def reading(file: IO[bytes], wanted: WantedLog) -> AsyncIterator[ReadingPr
         if process.returncode is None:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            await process.wait()
+        if process.stdout is not None:
+            # What nobody read any more would keep the pipe open.
+            await process.stdout.read()
+        await process.wait()
 
 
 async def _read(process: Process) -> LogItem:
@@ -145,28 +139,12 @@ def _broken_off() -> InvalidRequestError:
     )
 
 
-class _Items(pickle.Unpickler):
-    """Makes what the process says of our own classes and of arrays of numbers only: nobody vouches for it.
-
-    It has read what nobody vouches for.
-    """
-
-    def find_class(self, module: str, name: str) -> Any:
-        """Return a class that an item may be made of. Raises UnpicklingError for any other."""
-        if (module, name) in _ALLOWED:
-            return super().find_class(module, name)
-        raise pickle.UnpicklingError(f"{module}.{name} is no part of a log")
-
-
 def _item(content: bytes) -> LogItem:
     try:
-        item = _Items(io.BytesIO(content)).load()
-    except Exception:
-        # Whatever unpickling raises: it was told something that makes no sense.
+        return item_of(content)
+    except ValueError:
+        # It was told something that makes no sense.
         raise _broken_off() from None
-    if not isinstance(item, LogItem):
-        raise _broken_off()
-    return item
 
 
 def _confined(descriptors: Collection[int], wanted: WantedLog) -> dict[str, str]:
@@ -192,7 +170,7 @@ def main() -> None:
 
 def _write(out: IO[bytes], items: Iterable[LogItem]) -> None:
     for item in items:
-        content = pickle.dumps(item, pickle.HIGHEST_PROTOCOL)
+        content = item_bytes(item)
         out.write(SIZE.pack(len(content)))
         out.write(content)
         out.flush()

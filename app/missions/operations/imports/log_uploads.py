@@ -231,11 +231,21 @@ class LogUploads:
             job.vehicle = process.opened.vehicle
             head = LogHead(job.file, job.digest, job.vehicle, process.opened.size_bytes)
             work = LogImport(live, self._settings, head, _WhileOpen(process, live, self._get))
-            view = await work.run(actor=job.actor, progress=show, import_id=job.id)
-        if not live.running:
-            self._maps.take_up(live)
-        live.publish_summary()
-        return view
+            try:
+                return await work.run(actor=job.actor, progress=show, import_id=job.id)
+            finally:
+                # What was stored before reading broke off counts as well.
+                if await self._is_open(live):
+                    if not live.running:
+                        self._maps.take_up(live)
+                    live.publish_summary()
+
+    async def _is_open(self, live: LiveMission) -> bool:
+        """Tell whether a mission in memory is still the one that is stored, and the service goes on."""
+        try:
+            return not self._closing and await self._get(live.id) is live
+        except (MissionError, SQLAlchemyError, sqlite3.Error):
+            return False
 
     async def _fail(self, job: _Job, problem: str, remedy: str) -> None:
         """Note why a log was not imported, or not to its end, also in the mission's log."""

@@ -1,7 +1,17 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { api, type Sending, ServiceError } from "../api/client";
 import type { LogView } from "../api/types";
-import { dismiss, isNameless, sendFile, sendLogs, underWay, uploads, uploadsOf } from "./uploads";
+import {
+  dismiss,
+  isNameless,
+  queuedOf,
+  sendFile,
+  sendLogs,
+  underWay,
+  uploads,
+  uploadsOf,
+  wouldBeLost,
+} from "./uploads";
 
 // What signals of the page ask for when they are made, before anything is imported.
 vi.hoisted(() => {
@@ -65,9 +75,11 @@ it("logs are sent one after the other, each when the one before has been read", 
   const all = sendLogs("m", "wam-v", [file("1.kmall"), file("2.kmall")], () => order.push("look"));
   await vi.advanceTimersByTimeAsync(500);
   expect(order).toEqual(["1.kmall of wam-v", "look"]);
+  expect([queuedOf("m"), queuedOf("other"), wouldBeLost()]).toEqual([["2.kmall"], [], true]);
   await vi.advanceTimersByTimeAsync(1000);
   await all;
   expect(order).toEqual(["1.kmall of wam-v", "look", "2.kmall of wam-v", "look"]);
+  expect([queuedOf("m"), wouldBeLost()]).toEqual([[], false]);
 });
 
 it("where one is refused the others are not sent", async () => {
@@ -75,6 +87,19 @@ it("where one is refused the others are not sent", async () => {
   await sendLogs("m", "", [file("1.lsf"), file("2.lsf")], () => {});
   expect(sendLog).toHaveBeenCalledTimes(1);
   expect(uploads.value).toMatchObject([{ name: "1.lsf", fault: "too large" }]);
+  // Nothing that is only told would be lost, and another mission's file does not take it away.
+  expect([queuedOf("m"), wouldBeLost()]).toEqual([[], false]);
+  await sendFile("other", "log", file("2.lsf"), () => Promise.resolve("taken"));
+  expect(uploadsOf("m", "log")).toMatchObject([{ name: "1.lsf", fault: "too large" }]);
+});
+
+it("where nobody may ask any more how far a log is, the next one is sent, and its refusal told", async () => {
+  const refused = new ServiceError("sign in", 401);
+  const sendLog = vi.spyOn(api, "sendLog").mockResolvedValueOnce(log("1", "waiting"));
+  sendLog.mockRejectedValueOnce(refused);
+  vi.spyOn(api, "logs").mockRejectedValue(refused);
+  await sendLogs("m", "", [file("1.lsf"), file("2.lsf")], () => {});
+  expect(uploads.value).toMatchObject([{ name: "2.lsf", fault: "sign in" }]);
 });
 
 it("a multibeam's file does not say whose it is, and logs are under way until they are read", () => {

@@ -1,7 +1,7 @@
 /** Files that are on their way to the service: they go on while the pane that sent them is closed. */
 
 import { signal } from "@preact/signals";
-import { api, type Sending } from "../api/client";
+import { api, type Sending, ServiceError } from "../api/client";
 import type { LogView } from "../api/types";
 import { said } from "./session";
 
@@ -44,7 +44,9 @@ export async function sendFile<T>(
     uploads.value = uploads.peek().map((one) => (one.key === key ? { ...one, ...changed } : one));
   };
   // What was refused before is read by now.
-  const shown = uploads.peek().filter((one) => !(one.fault && one.purpose === purpose));
+  const shown = uploads
+    .peek()
+    .filter((one) => !(one.fault && one.mission === mission && one.purpose === purpose));
   const begun: Upload = {
     key,
     mission,
@@ -84,6 +86,24 @@ export const underWay = (logs: readonly LogView[]): boolean => logs.some(isUnder
 
 const LOOK_MS = 1000;
 
+/** Logs that are sent when those before them have been read, by mission; the page still has them. */
+const queued = signal<readonly { mission: string; name: string }[]>([]);
+
+/** Names of the logs of a mission that are not on their way yet. */
+export const queuedOf = (mission: string | null): readonly string[] =>
+  queued.value.filter((one) => one.mission === mission).map(({ name }) => name);
+
+/** Whether leaving the page would lose files that were chosen. */
+export const wouldBeLost = (): boolean =>
+  queued.peek().length > 0 || uploads.peek().some(({ fault }) => !fault);
+
+/** Has the browser ask before the page is left while files are on their way. */
+export function askBeforeLeaving(): void {
+  window.addEventListener("beforeunload", (event) => {
+    if (wouldBeLost()) event.preventDefault();
+  });
+}
+
 /** Sends logs one after the other, each when the service has read the one before; ends where one is stopped or refused. */
 export async function sendLogs(
   mission: string,
@@ -91,20 +111,32 @@ export async function sendLogs(
   files: readonly File[],
   onLog: () => void,
 ): Promise<void> {
-  for (const file of files) {
-    const sent = await sendFile(mission, "log", file, (sending) => api.sendLog(mission, vehicle, sending));
-    onLog();
-    if (sent === null) return;
-    if (file === files.at(-1)) return;
-    while (await isNotRead(mission, sent.id)) await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
+  let left = files.map(({ name }) => ({ mission, name }));
+  const keep = (now: typeof left) => {
+    const before = new Set(left);
+    queued.value = [...queued.peek().filter((one) => !before.has(one)), ...now];
+    left = now;
+  };
+  try {
+    for (const file of files) {
+      keep(left.slice(1));
+      const sent = await sendFile(mission, "log", file, (sending) => api.sendLog(mission, vehicle, sending));
+      onLog();
+      if (sent === null) return;
+      if (file === files.at(-1)) return;
+      while (await isNotRead(mission, sent.id)) await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
+    }
+  } finally {
+    keep([]);
   }
 }
 
-/** Whether the service is not yet done with a log; where it does not answer, too. */
+/** Whether the service is not yet done with a log; where it does not answer, too: it may again. */
 async function isNotRead(mission: string, id: string): Promise<boolean> {
   try {
     return (await api.logs(mission)).some((log) => log.id === id && isUnderWay(log));
-  } catch {
-    return true;
+  } catch (error) {
+    // Where nobody is signed in, or the mission is there no more, it will not be told.
+    return !(error instanceof ServiceError && [401, 403, 404].includes(error.status));
   }
 }

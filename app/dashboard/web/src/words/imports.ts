@@ -10,6 +10,7 @@ export const IMPORTS = {
   "imports.sending": { en: "{name}: sent so far", pt: "{name}: enviado até agora" },
   "imports.sent": { en: "{name}: {sent} of {size} sent", pt: "{name}: {sent} de {size} enviados" },
   "imports.beingRead": { en: "{name}: being taken in…", pt: "{name}: a ser recebido…" },
+  "imports.queued": { en: "To be sent next: {names}", pt: "A enviar a seguir: {names}" },
   "imports.nameTheVehicle": {
     en: "{name} does not tell its vehicle: name it first.",
     pt: "{name} não diz de que veículo é: indique-o primeiro.",

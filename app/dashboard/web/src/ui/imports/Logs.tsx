@@ -6,7 +6,7 @@ import { whyNotCommand } from "../../state/access";
 import { count, dayAndTime, percent } from "../../state/format";
 import { said } from "../../state/session";
 import { mission, selectedId } from "../../state/store";
-import { isNameless, sendLogs, underWay } from "../../state/uploads";
+import { isNameless, queuedOf, sendLogs, underWay } from "../../state/uploads";
 import { say } from "../../words/say";
 import { FilesButton, Trouble, Typed } from "../parts/Controls";
 import { Sendings } from "./Sendings";
@@ -86,6 +86,11 @@ export function Logs() {
       )}
       <Trouble words={missing.value || fault.value} />
       <Sendings purpose="log" />
+      {queuedOf(id).length > 0 ? (
+        <p role="status" data-testid="logs-queued">
+          {say("imports.queued", { names: queuedOf(id).join(", ") })}
+        </p>
+      ) : null}
       <ul data-testid="logs">
         {listed.map((log) => (
           <li key={log.id} data-state={log.state}>
