@@ -10,6 +10,7 @@ import httpx
 import pytest
 
 from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.live.mission import LiveMission
 from app.missions.operations.imports import log_process, log_uploads
 from app.missions.operations.imports.log_import import import_log
 from app.missions.running.final_maps import FinalMaps
@@ -294,7 +295,12 @@ async def test_what_a_log_gave_before_its_reading_broke_off_is_on_the_map_of_a_m
     monkeypatch.setattr(log_process.ReadingProcess, "next", one_only)
     made: list[str] = []
     take_up = FinalMaps.take_up
-    monkeypatch.setattr(FinalMaps, "take_up", lambda maps, live: (made.append(live.id), take_up(maps, live))[1])
+
+    def noted(maps: FinalMaps, live: LiveMission) -> None:
+        made.append(live.id)
+        take_up(maps, live)
+
+    monkeypatch.setattr(FinalMaps, "take_up", noted)
     log = await ended(client, path, await send(client, path, content, filename="Data.lsf"))
     assert log["state"] == "failed"
     stored = (await client.get(path)).json()["progress"]["soundings"]
