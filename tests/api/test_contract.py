@@ -60,6 +60,7 @@ BEYOND_THE_SCHEMA = {
     "listMissions",
     "previewPlan",
     "proposeZones",
+    "readDrawing",
     "setBudget",
     "setReference",
     "setSite",

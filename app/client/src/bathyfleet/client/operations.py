@@ -683,6 +683,25 @@ class Operations(ABC):
             query={"west_deg": west_deg, "south_deg": south_deg, "east_deg": east_deg, "north_deg": north_deg, "margin_m": margin_m},
         ))
 
+    def read_drawing(self, content: bytes, *, filename: str, crs: str | None = None) -> models.DrawingView:
+        """Read the lines and areas of a file: ``POST /drawings``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .geojson, .json, .kml, .kmz, .gpx, .dxf, .zip (a shapefile),
+            .csv or .txt (name and position in each row), or .lnw (Hypack)
+        crs : str
+            What positions are in where the file does not say: EPSG:32629, EPSG:4326 or WKT
+        """
+        return self._call(Call[models.DrawingView](
+            "POST",
+            "/drawings",
+            models.DrawingView,
+            content=content,
+            query={"filename": filename, "crs": crs},
+        ))
+
     def get_map(
         self,
         mission_id: str,
@@ -2171,6 +2190,25 @@ class AsyncOperations(ABC):
             models.ProposedZonesView,
             content=content,
             query={"west_deg": west_deg, "south_deg": south_deg, "east_deg": east_deg, "north_deg": north_deg, "margin_m": margin_m},
+        ))
+
+    async def read_drawing(self, content: bytes, *, filename: str, crs: str | None = None) -> models.DrawingView:
+        """Read the lines and areas of a file: ``POST /drawings``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .geojson, .json, .kml, .kmz, .gpx, .dxf, .zip (a shapefile),
+            .csv or .txt (name and position in each row), or .lnw (Hypack)
+        crs : str
+            What positions are in where the file does not say: EPSG:32629, EPSG:4326 or WKT
+        """
+        return await self._call(Call[models.DrawingView](
+            "POST",
+            "/drawings",
+            models.DrawingView,
+            content=content,
+            query={"filename": filename, "crs": crs},
         ))
 
     async def get_map(
