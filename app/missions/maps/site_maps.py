@@ -1,4 +1,4 @@
-"""A site's model and its changes as they leave the service: as JSON and as files."""
+"""A site's model and its changes, as JSON and as the layers of its files."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

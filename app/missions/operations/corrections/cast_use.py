@@ -24,7 +24,7 @@ from app.storage.queries import soundings as sounding_queries
 
 FAR_H = 4.0
 """NOAA's Office of Coast Survey asks for a cast at least every four hours of work with a multibeam (Hydrographic
-Surveys Specifications and Deliverables, section 5.2): a ping farther from its cast than that lacks one anyhow."""
+Surveys Specifications and Deliverables): a ping farther from its cast than that lacks one anyhow."""
 
 PART_OF_TVU = 0.5
 """Neighbouring casts differ much from this part of an order's largest TVU on. Where the water changes evenly from one
