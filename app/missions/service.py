@@ -59,6 +59,7 @@ from app.missions.spec.budget import Budget
 from app.missions.spec.mission import MissionSpec
 from app.missions.states import AT_SEA, ENDED, Action, MissionState
 from app.missions.succession import Succession
+from app.missions.task.survey_lines import line_remarks
 from app.missions.traffic.watch import Traffic
 from app.missions.views.doctor import DoctorView, Examine, doctor_view, switched_off
 from app.missions.views.mission import ActionView, Level, MissionSummary, MissionView, VehicleView
@@ -318,6 +319,8 @@ class MissionService:
             await self._registry.own(session, row.id)
         live = await self.get(row.id)
         await live.journal.log(Level.INFO, "state", f"created by {actor}", state=row.state, actor=actor)
+        for remark in line_remarks(spec):
+            await live.journal.log(Level.WARNING, "lines", remark)
         await self.sites.begin(live)
         return mission_view(live)
 

@@ -16,6 +16,8 @@ from app.missions.live.mission import LiveMission
 from app.missions.operations.imports.imports import imports_of, kind_of, reference_of
 from app.missions.operations.imports.uploads import Upload
 from app.missions.views.measurements.imports import (
+    DrawingOptions,
+    DrawingView,
     ImportOptions,
     ImportView,
     LogOptions,
@@ -108,6 +110,28 @@ async def propose_zones(
     try:
         async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
             return await state.service.imports.propose_zones(upload, options)
+    except ClientDisconnect:
+        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+
+
+@charts_router.post(
+    "/drawings",
+    operation_id="readDrawing",
+    summary="Read the lines and areas of a file",
+    openapi_extra=_FILE,
+    responses=problems("malformed-body", "body-too-large", "invalid-request", "import-unavailable"),
+)
+async def read_drawing(
+    options: Annotated[DrawingOptions, Query()], request: Request, state: State, operator: Operator
+) -> DrawingView:
+    """Return lines for a mission's `survey_lines` and polygons for its `area` and `keep_out`, as a file has them.
+
+    Line plans and areas from GIS, survey programs and drawings: GeoJSON, KML, GPX, DXF, shapefiles, tables, Hypack.
+    Nothing is stored and no mission changes.
+    """
+    try:
+        async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
+            return await state.service.imports.read_drawing(upload, options)
     except ClientDisconnect:
         raise ProblemError("malformed-body", "the connection ended before the file did") from None
 

@@ -225,23 +225,27 @@ def metres_left(team: Situation) -> FloatArray:
     return np.full(len(team.vehicles), steps * team.constraints.max_step_m)
 
 
+def free_region(constraints: Constraints, margin_m: float) -> BaseGeometry:
+    """Return the area without its keep-out zones, ``margin_m`` from borders and zones where that leaves anything."""
+    whole = Polygon(constraints.area)
+    inner = whole.buffer(-margin_m, join_style="mitre") if margin_m > 0 else whole
+    area: BaseGeometry = whole if inner.is_empty else inner
+    # Sharp corners throughout: a rounded one is a dozen vertices a few centimetres apart.
+    for zone in constraints.keep_out:
+        area = area.difference(Polygon(zone).buffer(2.0 * margin_m, join_style="mitre"))
+    return area
+
+
 class FreeSpace:
     """The area without its keep-out zones, and shortest ways through it."""
 
     def __init__(self, constraints: Constraints, margin_m: float) -> None:
         """Keep ``margin_m`` away from borders and zones, where that leaves anything."""
         self.margin_m = margin_m
-        whole = Polygon(constraints.area)
-        inner = whole.buffer(-margin_m, join_style="mitre") if margin_m > 0 else whole
-        # Sharp corners throughout: a rounded one is a dozen vertices a few centimetres apart.
-        zones = [Polygon(zone).buffer(2.0 * margin_m, join_style="mitre") for zone in constraints.keep_out]
-        area: BaseGeometry = whole if inner.is_empty else inner
-        for zone in zones:
-            area = area.difference(zone)
-        self.region: BaseGeometry = area
+        self.region = free_region(constraints, margin_m)
         self._loose: BaseGeometry = self.region.buffer(1e-6)
         shapely.prepare(self._loose)
-        self._open = not constraints.keep_out and bool(np.isclose(area.area, area.convex_hull.area))
+        self._open = not constraints.keep_out and bool(np.isclose(self.region.area, self.region.convex_hull.area))
         self._corners = np.zeros((0, 2)) if self._open else _corners(self.region)
         self._links = self._visibility(self._corners)
         # Between corners ways are found once: only their ends differ.

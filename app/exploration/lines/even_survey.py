@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.arrays import FloatArray
-from app.exploration.core.routes import FreeSpace, Turns, Vehicles, flown_m
+from app.exploration.core.routes import Turns, Vehicles
+from app.exploration.lines.dealing import LinePath, dealt, path_over, way_m
 from app.exploration.lines.lattice import Sweep, even_lines, most_lines
 
 MOST_ORDERS = 3
@@ -40,15 +41,6 @@ class EvenSurvey:
 
     routes: list[FloatArray]
     spacing_m: float
-
-
-@dataclass(frozen=True)
-class _Path:
-    """One way over all lines: vertices (m, 2), and the first and last vertex of every part that is dealt as a whole."""
-
-    vertices: FloatArray
-    first: list[int]
-    last: list[int]
 
 
 def even_survey(sweep: Sweep, vehicles: Vehicles, turns: Turns, pattern: Pattern) -> EvenSurvey | None:
@@ -123,7 +115,7 @@ def _ways(
     for upwards in (True, False):
         path = _path(sweep, lines_u, inset_m, pattern.parts, upwards=upwards)
         for order in orders:
-            way = _dealt(sweep.free, vehicles, turns, path, order)
+            way = dealt(sweep.free, vehicles, turns, path, order)
             if way is not None:
                 yield way
 
@@ -140,15 +132,7 @@ def orders_across(u: FloatArray) -> list[tuple[int, ...]]:
     return [rank, rank[::-1]]
 
 
-def way_m(vehicles: Vehicles, turns: Turns, i: int, route: FloatArray) -> float:
-    """Return how far vehicle ``i`` flies along a route (k, 2), turns included."""
-    return flown_m(vehicles.en_m[i, 0], vehicles.en_m[i, 1], float(vehicles.headings_rad[i]), route, turns)
-
-
-def _path(sweep: Sweep, lines_u: FloatArray, inset_m: float, parts: int, *, upwards: bool) -> _Path:
-    vertices: list[FloatArray] = []
-    first: list[int] = []
-    last: list[int] = []
+def _path(sweep: Sweep, lines_u: FloatArray, inset_m: float, parts: int, *, upwards: bool) -> LinePath:
     lines: list[FloatArray] = []
     for pieces in sweep.lines(lines_u, inset_m):
         if not pieces:
@@ -156,76 +140,4 @@ def _path(sweep: Sweep, lines_u: FloatArray, inset_m: float, parts: int, *, upwa
         stops = np.vstack(pieces)
         lines.append(stops if upwards else stops[::-1])
         upwards = not upwards
-    # All legs at once, those along lines and those between them.
-    legs = sweep.free.legs(np.vstack(lines)) if lines else []
-    at = 0
-    for line in lines:
-        stops = np.vstack([line[:1], *legs[at : at + len(line) - 1]])
-        if parts > 1:
-            stops = _subdivided(stops, parts)
-        if vertices:
-            vertices.extend(legs[at - 1])
-        else:
-            vertices.append(stops[0])
-        at += len(line)
-        begin, end = len(vertices) - 1, len(vertices) + len(stops) - 2
-        vertices.extend(stops[1:])
-        first.extend([begin] if parts == 1 else range(begin, end))
-        last.extend([end] if parts == 1 else range(begin + 1, end + 1))
-    return _Path(np.array(vertices).reshape(-1, 2), first, last)
-
-
-def _subdivided(stops: FloatArray, parts: int) -> FloatArray:
-    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(stops, axis=0).T))])
-    all_at = np.unique(np.concatenate([at, np.linspace(0.0, at[-1], parts + 1)]))
-    return np.column_stack([np.interp(all_at, at, stops[:, k]) for k in (0, 1)])
-
-
-def _dealt(
-    free: FreeSpace, vehicles: Vehicles, turns: Sequence[Turns], path: _Path, order: tuple[int, ...]
-) -> list[FloatArray] | None:
-    """Return the routes when the vehicles take parts of the path in this order; None when they cannot fly it all."""
-    routes: list[FloatArray] = [np.zeros((0, 2))] * len(order)
-    begin, end = 0, len(path.first)
-    for i in order:
-        best = 0, np.inf
-        approaches: dict[int, FloatArray] = {}
-
-        def approach(vertex: int) -> FloatArray:
-            if vertex not in approaches:  # noqa: B023 - called at once
-                way = free.connect(vehicles.en_m[i], path.vertices[vertex : vertex + 1])  # noqa: B023 - called at once
-                approaches[vertex] = way  # noqa: B023 - called at once
-            return approaches[vertex]  # noqa: B023 - called at once
-
-        for back in (False, True):
-
-            def route(k: int, back: bool = back) -> FloatArray:
-                first, last = path.first[begin], path.last[begin + k - 1]  # noqa: B023 - called at once
-                stops = path.vertices[first : last + 1]
-                return np.vstack([approach(last if back else first), (stops[::-1] if back else stops)[1:]])
-
-            low, high = 0, end - begin + 1
-            while high - low > 1:
-                middle = (low + high) // 2
-                low, high = (
-                    (middle, high)
-                    if way_m(vehicles, turns[i], i, route(middle)) <= vehicles.left_m[i]
-                    else (low, middle)
-                )
-            if low and (-low, way_m(vehicles, turns[i], i, route(low))) < (-best[0], best[1]):
-                best = low, way_m(vehicles, turns[i], i, route(low))
-                routes[i] = route(low)
-        begin += best[0]
-        if begin == end:
-            return [_without_straight(route) for route in routes]
-    return None
-
-
-def _without_straight(route: FloatArray) -> FloatArray:
-    """Return a route without the vertices at which it goes straight on."""
-    if len(route) < 3:
-        return route
-    before, after = np.diff(route[:-1], axis=0), np.diff(route[1:], axis=0)
-    cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
-    straight = (cross < 1e-9 * (1.0 + np.abs(before).sum(axis=1))) & ((before * after).sum(axis=1) > 0.0)
-    return np.asarray(route[np.concatenate([[True], ~straight, [True]])])
+    return path_over(sweep.free, lines, parts)

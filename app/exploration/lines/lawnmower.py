@@ -1,9 +1,10 @@
 """Even parallel lines: a strip for each vehicle, as usual practice has it, or shared out over the whole area.
 
-As close as the vehicles' budgets allow, or at the distance that is asked for.
+As close as the vehicles' budgets allow, or at the distance that is asked for. Or the lines of a plan that is given.
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -25,6 +26,7 @@ from app.exploration.core.routes import (
 )
 from app.exploration.lines.even_survey import Pattern, fullest_surveys
 from app.exploration.lines.flown_lines import after_line
+from app.exploration.lines.given_lines import GivenLine, LinePlan, given_survey
 from app.exploration.lines.ground import Ground
 from app.exploration.lines.handover import halves, hand_over
 from app.exploration.lines.lattice import Sweep, boustrophedon, direction_of_lines_rad, flown_length, route_length
@@ -190,11 +192,12 @@ class LawnmowerPlanner(PlannerBase):
 
     A vehicle that can still fly when it has flown its lines, as one whose battery lasts longer than was sure at first,
     gets more of them, across its strip; what is left then is flown as straight legs over ground that lines left out.
-    Where the distance of lines is asked for, it takes half of the longest rest instead, and is done when none is left.
+    Where the distance of lines is asked for, or lines are given, it takes half of the longest rest instead, and is done
+    when none is left.
     """
 
     name: ClassVar[str] = "lawnmower"
-    own_options: ClassVar[frozenset[str]] = frozenset({"line_spacing_m", "line_heading_deg"})
+    own_options: ClassVar[frozenset[str]] = frozenset({"line_spacing_m", "line_heading_deg", "keep_line_order"})
     plans_for_all = True
     flies_lines = True
     decides_apart = True
@@ -207,7 +210,24 @@ class LawnmowerPlanner(PlannerBase):
         self._dealt: list[FloatArray] = []
         """All ways that vehicles got, (k, 2) each."""
         self._left_out_m = 0.0
-        """Metres of lines at a distance that nobody can reach."""
+        """Metres of lines that were asked for and nobody can reach."""
+        self._given: LinePlan | None = None
+        self._out_of_reach: list[FloatArray] = []
+        """Parts of given lines that nobody can reach, (k, 2) each."""
+
+    def take_lines(self, lines: Sequence[GivenLine]) -> None:
+        """Fly these lines in place of own ones; before the first decision."""
+        self._given = LinePlan(lines)
+
+    @property
+    def _asked_for(self) -> bool:
+        """Whether lines were asked for, which are not as many as can be flown."""
+        return self._given is not None or self.options.line_spacing_m is not None
+
+    @property
+    def _both_ways(self) -> bool:
+        """Whether lines may be flown from their ends, and in the opposite order."""
+        return self._given is None or (self._given.both_ways and not self.options.keep_line_order)
 
     def put_back(self, vehicle: str, ends_m: FloatArray, resume_at_m: FloatArray | None) -> None:
         """See :meth:`app.exploration.planner.base.PlannerBase.put_back`."""
@@ -219,7 +239,9 @@ class LawnmowerPlanner(PlannerBase):
 
     def skip_line(self, vehicle: str, begin_m: FloatArray, here_m: FloatArray) -> bool:
         """See :meth:`app.exploration.planner.base.PlannerBase.skip_line`."""
-        rest = after_line(begin_m, here_m, self._routes.get(vehicle, np.zeros((0, 2))))
+        route = self._routes.get(vehicle, np.zeros((0, 2)))
+        after = after_line if self._given is None else self._given.after_line
+        rest = after(begin_m, here_m, route)
         if rest is None:
             return False
         self._routes[vehicle] = rest
@@ -238,24 +260,40 @@ class LawnmowerPlanner(PlannerBase):
 
     def lines_left_m(self) -> float:
         """See :meth:`app.exploration.planner.base.PlannerBase.lines_left_m`."""
+        if self._given is not None:
+            return sum(self.lines_left().values())
         if self.options.line_spacing_m is None:
             return 0.0
         rests = (route_length(route[0], route) for route in self._routes.values() if len(route))
         return self._left_out_m + sum(rests)
 
+    def lines_left(self) -> dict[str, float]:
+        """See :meth:`app.exploration.planner.base.PlannerBase.lines_left`."""
+        if self._given is None:
+            return {}
+        return self._given.metres_on([*self._out_of_reach, *self._routes.values()])
+
+    @property
+    def left_out(self) -> dict[str, float]:
+        """By name, how much of given lines nobody can reach."""
+        return {} if self._given is None else self._given.metres_on(self._out_of_reach)
+
     @property
     def left_out_m(self) -> float:
-        """How long the lines at a distance are that nobody can reach."""
+        """How long the lines are that were asked for and nobody can reach."""
         return self._left_out_m
 
     def _remember(self) -> dict[str, Any]:
-        own = {"routes": self._routes, "passes": self._passes, "dealt": self._dealt}
+        own: dict[str, Any] = {"routes": self._routes, "passes": self._passes, "dealt": self._dealt}
+        if self._out_of_reach:
+            own["out_of_reach"] = self._out_of_reach
         return own | ({"left_out_m": self._left_out_m} if self._left_out_m else {})
 
     def _recall(self, state: dict[str, Any]) -> None:
         self._routes = {k: np.array(v, dtype=np.float64).reshape(-1, 2) for k, v in state["routes"].items()}
         self._passes = {k: int(count) for k, count in state.get("passes", {}).items()}
         self._left_out_m = float(state.get("left_out_m", 0.0))
+        self._out_of_reach = [np.array(way, dtype=np.float64).reshape(-1, 2) for way in state.get("out_of_reach", ())]
         dealt = state.get("dealt", list(state["routes"].values()))
         self._dealt = [np.array(way, dtype=np.float64).reshape(-1, 2) for way in dealt]
 
@@ -288,12 +326,18 @@ class LawnmowerPlanner(PlannerBase):
         return Proposal(positions, 0.0, {"left_m": left_m}, done=done)
 
     def _lines_for(self, team: Situation, corner_m: float) -> list[FloatArray]:
-        """Return each vehicle's route, (k, 2), over lines at the distance asked for, or as close as can be flown."""
+        """Return each vehicle's route, (k, 2), over the lines asked for, or over lines as close as can be flown."""
         constraints, en, left_m = team.constraints, team.positions[:, :2], metres_left(team)
         radii_m, heading_deg = self._turn_radii_m(team), self.options.line_heading_deg
         spacing_m, vehicles = self.options.line_spacing_m, Vehicles(en, np.full(len(en), np.nan), left_m)
         direction_rad = direction_of_lines_rad(constraints.area, heading_deg)
         turns = [Turns(float(radius_m), corner_m) for radius_m in radii_m]
+        if self._given is not None:
+            in_order = self.options.keep_line_order
+            survey = given_survey(constraints, BORDER_MARGIN_M, self._given, vehicles, turns, in_order=in_order)
+            self._out_of_reach = survey.left_out
+            self._left_out_m = sum(route_length(way[0], way) for way in survey.left_out)
+            return survey.routes
         if spacing_m is None:
             return shared_lines(constraints, en, left_m, radii_m, corner_m, heading_deg)
         lines = spaced_lines(constraints, BORDER_MARGIN_M, direction_rad, spacing_m, vehicles, turns)
@@ -321,7 +365,7 @@ class LawnmowerPlanner(PlannerBase):
         for i, name in enumerate(team.vehicles):
             if not team.moves[i] or self._left(team, i) > 0.0:
                 continue
-            if self.options.line_spacing_m is not None:
+            if self._asked_for:
                 if not self._help_out(team, i):
                     done.add(name)
                 continue
@@ -347,7 +391,7 @@ class LawnmowerPlanner(PlannerBase):
         donor = team.vehicles[other]
         if len(self._routes[donor]) < LEAST_SHARED:
             return False
-        kept, given = halves(self._routes[donor], en[i])
+        kept, given = halves(self._routes[donor], en[i], both_ways=self._both_ways)
         if any(self._cut_off(team, i, stop) for stop in given):
             return False
         way_m = route_length(en[i], FreeSpace(team.constraints, BORDER_MARGIN_M).connect(en[i], given))
@@ -394,6 +438,8 @@ class LawnmowerPlanner(PlannerBase):
                 self._routes[name] = np.vstack([self._routes[name], stops_m])
                 return
         self._left_out_m += route_length(stops_m[0], stops_m)
+        if self._given is not None:
+            self._out_of_reach.append(stops_m)
 
     def _adopt(self, team: Situation) -> None:
         """Give every vehicle of the team a route."""
@@ -404,4 +450,4 @@ class LawnmowerPlanner(PlannerBase):
             self._routes = dict(zip(team.vehicles, routes, strict=True))
             self._dealt = [np.vstack([here, route]) for here, route in zip(en, routes, strict=True)]
             return
-        self._routes = hand_over(self._routes, team.vehicles, en)
+        self._routes = hand_over(self._routes, team.vehicles, en, both_ways=self._both_ways)

@@ -8,21 +8,15 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints
 from app.exploration.core.routes import FreeSpace, Turns, Vehicles
+from app.exploration.lines.dealing import PARTS, WHOLE_LINES, least_share
 from app.exploration.lines.even_survey import EvenSurvey, Pattern, survey_of
 from app.exploration.lines.lattice import MAX_LINES, Sweep, axes_of, even_lines, route_length
 from app.exploration.lines.parts import parts_of
 
 SPARE = 0.05
 """A line more is flown where the outer ones would lie farther than half a spacing, and this part of one, inside."""
-WHOLE_LINES = 4
-"""Vehicles with so many lines each, on average, fly whole ones; else they may share one, in eight parts."""
-PARTS = 8
 LEAST_LEFT = 0.01
 """Less of the area counts as nothing left out."""
-HALVINGS = 8
-"""How often the share of what vehicles can fly is halved in: to less than a hundredth."""
-MOST_SHARE = 2.0**16
-"""Lines are dealt to vehicles that can fly this part of them."""
 
 
 def line_count(area: FloatArray, direction_rad: float, spacing_m: float) -> int:
@@ -81,7 +75,7 @@ def spaced_lines(
     for part, members in parts_of(constraints, free, vehicles.en_m):
         sweep = Sweep(part, FreeSpace(part, margin_m), direction_rad)
         there = Vehicles(*(of_all[members] for of_all in vehicles))
-        survey = _least_share(sweep, there, [turns[i] for i in members], spacing_m)
+        survey = _fairest_survey(sweep, there, [turns[i] for i in members], spacing_m)
         if survey is None:
             continue
         left_m2 -= sweep.free.region.area
@@ -132,7 +126,7 @@ def with_crosslines(
     return found
 
 
-def _least_share(sweep: Sweep, vehicles: Vehicles, turns: list[Turns], spacing_m: float) -> EvenSurvey | None:
+def _fairest_survey(sweep: Sweep, vehicles: Vehicles, turns: list[Turns], spacing_m: float) -> EvenSurvey | None:
     """Return the lines dealt so that the largest share of its way that any vehicle needs is as small as may be."""
     area, direction_rad = sweep.constraints.area, sweep.direction_rad
     n = line_count(area, direction_rad, spacing_m)
@@ -144,19 +138,7 @@ def _least_share(sweep: Sweep, vehicles: Vehicles, turns: list[Turns], spacing_m
     def dealt(share: float) -> EvenSurvey | None:
         return survey_of(sweep, vehicles._replace(left_m=share * vehicles.left_m), turns, pattern, n)
 
-    share = 1.0
-    while (found := dealt(share)) is None:
-        share *= 2.0
-        if share > MOST_SHARE:
-            return None
-    while share > 1.0 / MOST_SHARE and (fewer := dealt(0.5 * share)) is not None:
-        found, share = fewer, 0.5 * share
-    low, high = 0.5 * share, share
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        fewer = dealt(middle)
-        found, low, high = (found, middle, high) if fewer is None else (fewer, low, middle)
-    return found
+    return least_share(dealt)
 
 
 def _width_m(area: FloatArray, direction_rad: float) -> float:

@@ -171,9 +171,13 @@ class PlannerBase(ABC):
     def lines_left_m(self) -> float:
         """Return how long those lines are that nobody has been given, or can reach.
 
-        Of lines at a distance that was asked for; 0 without such.
+        Of lines at a distance that was asked for, or of a plan that was given; 0 without such.
         """
         return 0.0
+
+    def lines_left(self) -> dict[str, float]:
+        """Return the same by the lines' names, where they have any."""
+        return {}
 
     def snapshot(self) -> bytes:
         """Return the planner's memory."""

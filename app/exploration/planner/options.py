@@ -72,6 +72,10 @@ class PlannerOptions(BaseModel):
         description="Course of the lines, clockwise from true north; by default that of the area's longer side, or "
         "what the planner finds better.",
     )
+    keep_line_order: bool = Field(
+        False,
+        description="With survey_lines: fly them in the order in which they are given, though another one is shorter.",
+    )
     rollouts: int = Field(300, ge=0, le=100_000, description="Changes to the team's plan that a rollout step tries.")
     tries: int = Field(0, ge=0, le=10_000, description="Real tries per step of OSARSES (only in simulation).")
     accuracy_sd_m: float = Field(

@@ -9,7 +9,8 @@ import numpy as np
 from app.arrays import FloatArray
 from app.exploration.core.constraints import Constraints, inside_area
 from app.exploration.core.routes import FreeSpace, Vehicles
-from app.exploration.lines.even_survey import Pattern, even_survey, orders_across, way_m
+from app.exploration.lines.dealing import way_m
+from app.exploration.lines.even_survey import Pattern, even_survey, orders_across
 from app.exploration.lines.lattice import Sweep, even_lines, longer_axis_rad, most_lines
 from app.exploration.lines.parts import parts_of
 from app.exploration.survey.value import Nodes, SurveyObjective, make_nodes, plan_value

@@ -2,12 +2,14 @@
 
 import csv
 import io
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
 
 from app.csv_cells import text_cell
 from app.mapping.coordinates.georeference import LocalFrame
+from app.mapping.quality.planned_lines import PlannedLine, planned_names
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order
 
@@ -31,17 +33,20 @@ COLUMNS = (
     "crossings",
     "mean_difference_m",
     "within_pct",
+    "planned_line",
 )
 
 
-def lines_csv(check: SurveyCheck, frame: LocalFrame, order: Order) -> bytes:
+def lines_csv(check: SurveyCheck, frame: LocalFrame, order: Order, planned: Sequence[PlannedLine] = ()) -> bytes:
     """Return a row for each line, by vehicle and in the order in which they were flown.
 
     ``kind`` is ``main`` or ``cross``. Of its crossings with other lines: how many there are, the mean of its depths
-    minus the others', and which share of them is within what ``order`` allows; empty without any.
+    minus the others', and which share of them is within what ``order`` allows; empty without any. ``planned_line`` is
+    the name of the line of a plan that it lies on.
     """
     lines, log, by_line = check.lines, check.log, check.by_line(order)
     begins, ends = frame.to_geographic(*log.begin_m.T), frame.to_geographic(*log.end_m.T)
+    names = planned_names(log.begin_m, log.end_m, planned)
     text = io.StringIO()
     text.write(f"# times: UTC by the vehicle's clock; within_pct: of {order.spoken} of IHO S-44\n")
     writer = csv.writer(text)
@@ -68,6 +73,7 @@ def lines_csv(check: SurveyCheck, frame: LocalFrame, order: Order) -> bytes:
                     if crossed is None
                     else (crossed.count, round(crossed.mean_m, 4), round(crossed.within_pct, 1))
                 ),
+                text_cell(names[k]),
             )
         )
     return text.getvalue().encode()

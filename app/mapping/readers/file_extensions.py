@@ -16,8 +16,28 @@ GSF, KMALL = ".gsf", ".kmall"
 MULTIBEAM = (GSF, KMALL)
 """Files of multibeam sonars."""
 
+TABLES = (".csv", ".txt")
+LNW, KMZ = ".lnw", ".kmz"
+SHAPES = (".zip",)
+XML_OF = {".kml": b"<kml", KMZ: b"<kml", ".gpx": b"<gpx"}
+"""With what files of these endings begin."""
+DRAWINGS = (".geojson", ".json", ".kml", KMZ, ".gpx", ".dxf", *SHAPES, *TABLES, LNW)
+"""Files with lines and areas."""
+
 PACKED = ".gz"
 ENDINGS = (*TEXT, *NETCDF, *DRIVERS, *ENC, *S102, *MULTIBEAM)
+
+
+def drawing_ending(filename: str) -> str:
+    """Return the ending of the name of a file with lines and areas. Raises ReadError for an unknown one."""
+    found = Path(filename.lower()).suffix
+    if found not in DRAWINGS:
+        raise ReadError(
+            "filename",
+            f"{filename[:80]!r} has no ending that is read",
+            f"one of {', '.join(DRAWINGS)}; .zip for a shapefile",
+        )
+    return found
 
 
 def ending(filename: str) -> str:

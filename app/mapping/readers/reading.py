@@ -20,13 +20,16 @@ def place_file(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str,
 
     Returns
     -------
-    ``shape``, ``notes`` and, of soundings, how many were ``found``; of zones to keep out of also ``zones``.
+    ``shape``, ``notes`` and, of soundings, how many were ``found``; of zones to keep out of also ``zones``, of lines
+    and areas ``drawings``.
 
     Raises
     ------
     ReadError
         When the file cannot be used.
     """
+    if task["what"] == "drawings":
+        return _drawings(file, task, out)
     place = MapExtent(LocalFrame(*task["origin"]), Grid(**task["grid"]), task["margin_m"], task.get("datum_epsg"))
     if task["what"] == "zones":
         return _zones(file, place, float(task["around_m"]), out)
@@ -54,6 +57,18 @@ def _zones(file: BinaryIO, place: MapExtent, around_m: float, out: BinaryIO) -> 
         _write(out, column)
     told = [{name: getattr(zone, name) for name in ("kind", "name", "depth_m", "position_m")} for zone in zones]
     return {"shape": (3, len(number)), "notes": notes, "found": len(zones), "zones": told}
+
+
+def _drawings(file: BinaryIO, task: dict[str, Any], out: BinaryIO) -> dict[str, Any]:
+    """Write the positions of lines and areas: which one, longitude and latitude, one column after the other."""
+    from app.mapping.readers.drawings import read_drawings  # GDAL's vector part is loaded for what it is for
+
+    found, notes = read_drawings(file.read(), task["kind"], task["crs"])
+    number = np.repeat(np.arange(len(found), dtype=np.float64), [len(one.places) for one in found])
+    for column in (number, *np.concatenate([one.places for one in found]).T):
+        _write(out, column)
+    told = [{"kind": one.kind, "name": one.name} for one in found]
+    return {"shape": (3, len(number)), "notes": notes, "found": len(found), "drawings": told}
 
 
 def _write(out: BinaryIO, values: FloatArray) -> None:

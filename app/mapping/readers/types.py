@@ -17,6 +17,9 @@ MAX_RASTER_CELLS = 30_000_000
 MAX_ZONES, MAX_CORNERS = 100, 20_000
 """Of what a chart shows to keep out of: as many zones as a mission takes."""
 
+MAX_DRAWINGS, MAX_DRAWN_CORNERS = 2100, 30_000
+"""Of a file with lines and areas: as many lines as a mission takes, and areas beside them."""
+
 LOCAL: Literal["local"] = "local"
 """Stands for the mission's own frame where a coordinate reference system is asked for."""
 

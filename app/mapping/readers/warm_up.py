@@ -2,7 +2,9 @@
 
 import contextlib
 import io
+import itertools
 import struct
+import zipfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from affine import Affine
 from netCDF4 import Dataset
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.readers.file_extensions import ENC, GSF, KMALL, NETCDF, PACKED, S102, TEXT
+from app.mapping.readers.file_extensions import ENC, GSF, KMALL, KMZ, LNW, NETCDF, PACKED, S102, SHAPES, TABLES, TEXT
 from app.mapping.readers.files import read_file
 from app.mapping.readers.georeferencing import place_reference, place_soundings
 from app.mapping.readers.s102 import INSTANCE, VALUES
@@ -43,6 +45,9 @@ def data_folders() -> list[Path]:
 
 def warm_up(task: dict[str, Any]) -> None:
     """Read small files of the kind that the task is about, good and bad ones, in every way that it may be used."""
+    if task["what"] == "drawings":
+        _warm_up_drawings(task["kind"])
+        return
     frame = LocalFrame(*task["origin"])
     kind = task["kind"].removesuffix(PACKED)
     if kind in TEXT:
@@ -75,6 +80,55 @@ def warm_up(task: dict[str, Any]) -> None:
     for content in (b"", b"x,y,z\na,b,c\n", b"\x89HDF\r\n\x1a\n", b"000263LE1 0900201   " + 40 * b"0"):
         with contextlib.suppress(ReadError):
             read_file(io.BytesIO(content), kind, place)
+
+
+def _warm_up_drawings(kind: str) -> None:
+    from app.mapping.readers.drawings import read_drawings
+
+    places = "1.0,2.0 1.1,2.0"
+    samples = {
+        ".kml": f"<kml><Placemark><LineString><coordinates>{places}</coordinates></LineString></Placemark></kml>",
+        ".gpx": '<gpx version="1.1"><rte><rtept lat="2" lon="1"/><rtept lat="2" lon="1.1"/></rte></gpx>',
+        ".dxf": "0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\n1\n20\n2\n11\n2\n21\n2\n0\nENDSEC\n0\nEOF\n",
+        ".csv": "name,x,y\n1,1,2\n1,2,2\n",
+        LNW: "LIN 2\nPTS 1 2\nPTS 2 2\nLNN 1\nEOL\n",
+        ".json": '{"type": "LineString", "coordinates": [[1, 2], [1.1, 2]]}',
+    }
+    sample = ".kml" if kind == KMZ else kind if kind in samples else ".csv" if kind in TABLES else ".json"
+    content = samples[sample].encode()
+    if kind == KMZ or kind in SHAPES:
+        content = _packed({"doc.kml": content} if kind == KMZ else _shapefile())
+    for one, crs in itertools.product((content, b"\xff", b""), ("EPSG:32629", "nowhere", None)):
+        with contextlib.suppress(ReadError):
+            read_drawings(one, kind, crs)
+
+
+def _packed(files: dict[str, bytes]) -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return packed.getvalue()
+
+
+def _shapefile() -> dict[str, bytes]:
+    """Return a shapefile of one line without a name."""
+    line = struct.pack("<i4diii4d", 3, 1.0, 2.0, 1.1, 2.0, 1, 2, 0, 1.0, 2.0, 1.1, 2.0)
+    record = struct.pack(">ii", 1, len(line) // 2) + line
+    bounds = struct.pack("<ii8d", 1000, 3, 1.0, 2.0, 1.1, 2.0, 0.0, 0.0, 0.0, 0.0)
+
+    def headed(content: bytes) -> bytes:
+        return struct.pack(">i20xi", 9994, (100 + len(content)) // 2) + bounds + content
+
+    index = struct.pack(">ii", 50, len(line) // 2)
+    system = pyproj.CRS.from_epsg(4326).to_wkt("WKT1_ESRI").encode()
+    fields = struct.pack("<4BiHH20x", 3, 126, 1, 1, 1, 65, 9) + b"NAME\0\0\0\0\0\0\0C" + bytes(4) + b"\x08" + bytes(15)
+    return {
+        "s.shp": headed(record),
+        "s.shx": headed(index),
+        "s.prj": system,
+        "s.dbf": fields + b"\r" + 9 * b" " + b"\x1a",
+    }
 
 
 def _text(frame: LocalFrame) -> bytes:

@@ -35,6 +35,7 @@ from app.missions.spec.budget import Budget
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
 from app.missions.task.constraints import INSET_M
+from app.missions.task.survey_lines import lengths_words
 from app.missions.task.way import LEAST_WAY_M, least_way_m, planned_way_m, way_m
 from app.missions.team import Member, WithdrawalCause
 from app.missions.views.mission import Level
@@ -184,11 +185,17 @@ class OwnLegs:
         return words + team.missed_words({m.name for m in left})
 
     def _with_lines(self, words: str) -> str:
-        """Return why nobody goes on, in words, and what that says of lines at a distance that was asked for."""
-        if self._spec.planner.options.line_spacing_m is None:
+        """Return why nobody goes on, in words, and what that says of lines that were asked for."""
+        if not self._spec.lines_asked_for:
             return words
-        left_m = self._decider.planner.planner.lines_left_m()
-        return f"{words}: {left_m / 1000.0:.2f} km of lines are not flown" if left_m > LEAST_TOLD_M else LINES_FLOWN
+        planner = self._decider.planner.planner
+        left_m, by_name = planner.lines_left_m(), planner.lines_left()
+        named = {name: one_m for name, one_m in by_name.items() if one_m > LEAST_TOLD_M}
+        if left_m <= LEAST_TOLD_M or (by_name and not named):
+            return LINES_FLOWN
+        return f"{words}: {left_m / 1000.0:.2f} km of lines are not flown" + (
+            f": {lengths_words(named)}" if named else ""
+        )
 
     async def _take_lines_back(self) -> bool:
         """Let the planner know which lines vehicles have left, and where: nothing of these is flown yet.
@@ -400,7 +407,7 @@ class OwnLegs:
             idle = not member.ahead and not member.ordered
             if member.name in done and idle and self._spec.ends_at_home(member.spec):
                 energy_m, left_m = self._range.beyond_m(member), member.way_left_m(self._spec)
-                if self._spec.planner.options.line_spacing_m is not None:
+                if self._spec.lines_asked_for:
                     why, cause = "no line is left for it", WithdrawalCause.PART_DONE
                 elif energy_m is not None and energy_m < left_m:
                     why, cause = "its energy lasts for its way home and for no further line", WithdrawalCause.CALLED

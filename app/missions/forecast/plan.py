@@ -6,8 +6,8 @@ area is dragged. Planners that adapt begin with it and leave it for what they fi
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -105,6 +105,14 @@ class PlannedWay:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """How long the lines that were asked for are that no vehicle can reach from where it begins; by name, if any."""
+
+    length_m: float = 0.0
+    by_name: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Plan:
     """The ways of a team, and whether they were found in the time allowed; else they end early."""
 
@@ -115,10 +123,9 @@ class Plan:
     depth_m: float
     """How deep the bottom is taken to be."""
     whole_survey: dict[str, WholeWay] | None = None
-    """What each vehicle does until nothing is left to ensonify, or all lines at the distance asked for are flown,
-    whatever its budget; None: that was not planned."""
-    left_out_m: float = 0.0
-    """How long the lines at the distance asked for are that no vehicle can reach from where it begins."""
+    """What each vehicle does until nothing is left to ensonify, or all lines asked for are flown, whatever its budget;
+    None: that was not planned."""
+    left_out: LeftOut = LeftOut()
 
 
 def plan(
@@ -168,7 +175,7 @@ def plan(
             )
         return found
 
-    all_of_it, left_out_m = None, 0.0
+    all_of_it, left_out = None, LeftOut()
     if spec.planner.name in COVERERS:
         routes, done = _swath_lines(spec, members, constraints, begin_m, depth_m, over)
         all_of_it = ways_whole(routes) if done else None
@@ -178,9 +185,9 @@ def plan(
             for i, (member, route) in enumerate(zip(members, routes, strict=True))
         )
     else:
-        routes, whole, left_out_m = _planned(spec, members, constraints, begin_m, depth_m, over)
-        if spec.planner.name == LawnmowerPlanner.name and spec.planner.options.line_spacing_m is not None:
-            all_of_it = None if left_out_m else ways_whole(routes)
+        routes, whole, left_out = _planned(spec, members, constraints, begin_m, depth_m, over)
+        if spec.planner.name == LawnmowerPlanner.name and spec.lines_asked_for:
+            all_of_it = None if left_out.length_m else ways_whole(routes)
     ways_in_m = np.where(
         [from_outside(start, inner, spec) for start in starts_m], np.hypot(*(begin_m - starts_m).T), 0.0
     )
@@ -193,7 +200,7 @@ def plan(
         )
         for i, (member, route) in enumerate(zip(members, routes, strict=True))
     ]
-    return Plan(ways, whole, own, depth_m, all_of_it, left_out_m)
+    return Plan(ways, whole, own, depth_m, all_of_it, left_out)
 
 
 def _planned(
@@ -203,10 +210,10 @@ def _planned(
     begin_m: FloatArray,
     depth_m: float,
     over: Callable[[], bool],
-) -> tuple[list[FloatArray], bool, float]:
+) -> tuple[list[FloatArray], bool, LeftOut]:
     """Ask the planner for its first step and what it plans after that, or fly it ahead where it plans no further.
 
-    Returns each vehicle's way, whether that is all, and how long the lines are that nobody can reach.
+    Returns each vehicle's way, whether that is all, and the lines that nobody can reach.
     """
     planner = make_planner(spec)
     builder = MapBuilder(spec.local_area(), forecast_cell_m(spec), spec.accuracy_m)
@@ -217,8 +224,10 @@ def _planned(
     if ahead:
         legs = {leg.vehicle: leg.target_m[None, :2] for leg in first.legs}
         none = np.zeros((0, 2))
-        left_out_m = planner.left_out_m if isinstance(planner, LawnmowerPlanner) else 0.0
-        return [np.vstack([legs.get(m.name, none), ahead.get(m.name, none)]) for m in members], True, left_out_m
+        left_out = LeftOut()
+        if isinstance(planner, LawnmowerPlanner):
+            left_out = LeftOut(planner.left_out_m, planner.left_out)
+        return [np.vstack([legs.get(m.name, none), ahead.get(m.name, none)]) for m in members], True, left_out
     side = forecast_cell_m(spec)
     grid, _ = make_grid(spec.local_area(), side)
     level = Terrain(np.full((grid.rows + 2, grid.cols + 2), depth_m), side, name="level")
@@ -227,8 +236,8 @@ def _planned(
         for i, place in enumerate(step.here_m):
             here[i].append(place)
         if over():
-            return [np.array(one).reshape(-1, 2) for one in here], False, 0.0
-    return [np.array(one).reshape(-1, 2) for one in here], True, 0.0
+            return [np.array(one).reshape(-1, 2) for one in here], False, LeftOut()
+    return [np.array(one).reshape(-1, 2) for one in here], True, LeftOut()
 
 
 def _swath_lines(

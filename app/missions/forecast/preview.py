@@ -22,6 +22,7 @@ from app.missions.forecast.whole_survey import WholeSurveyView, whole_view
 from app.missions.live.watchers.vehicles import near_report
 from app.missions.running.admission import check_spec
 from app.missions.spec.mission import MissionKind, MissionSpec
+from app.missions.task.survey_lines import lengths_words, line_remarks
 from app.missions.views.base import View
 
 NO_PLAN = "a search has no plan before it: where it goes depends on what stands there"
@@ -70,7 +71,7 @@ class PlanView(View):
     )
     whole: bool = Field(description="Whether this is all; else the ways end where the time for planning was up")
     whole_survey: WholeSurveyView | None = Field(
-        description="What it takes until nothing is left to ensonify, or all lines at the distance asked for are "
+        description="What it takes until nothing is left to ensonify, or all lines that were asked for are "
         "flown, whatever the budget; null: a survey of neither kind, or not all of it was planned in time"
     )
     assumptions: list[str] = Field(description="What was taken to be so, in words")
@@ -144,10 +145,12 @@ def _view(spec: MissionSpec, found: Plan, where: str, *, guessed: bool) -> PlanV
         )
     if not found.own:
         assumptions.append("Drawn as even lines: for so many vehicles and zones the planner lays its own at the start.")
-    if found.left_out_m:
+    assumptions += [f"{remark[:1].upper()}{remark[1:]}." for remark in line_remarks(spec)]
+    if found.left_out.length_m:
+        which = f" ({lengths_words(found.left_out.by_name)})" if found.left_out.by_name else ""
         assumptions.append(
-            f"{found.left_out_m / 1000.0:.2f} km of lines are left out: keep-out zones cut the area into parts, and no "
-            "vehicle that can fly them begins in one of these."
+            f"{found.left_out.length_m / 1000.0:.2f} km of lines are left out{which}: keep-out zones cut the area into "
+            "parts, and no vehicle that can fly them begins in one of these."
         )
     if not found.whole:
         assumptions.append(f"Only what could be planned in {BUDGET_S:g} s of the processor is drawn.")

@@ -551,10 +551,10 @@ class LiveMission:
         return (max(0.0, *legs) + max(committed, default=0)) * self.reports.leg_s
 
     def _lines_left_s(self) -> float:
-        """Return how long the team flies lines at a distance that was asked for, of its time; infinite without such."""
+        """Return how long the team flies lines that were asked for, of its time; infinite without such."""
         left_m = (self.header.terms or {}).get("left_m")
         going_on = self.team.going_on
-        if left_m is None or not going_on or self.spec.planner.options.line_spacing_m is None:
+        if left_m is None or not going_on or not self.spec.lines_asked_for:
             return math.inf
         ahead_m = np.array([member.way_ahead_m(self.frame) for member in going_on])
         speeds_mps = np.array([self.spec.speed_of(member.spec) for member in going_on])

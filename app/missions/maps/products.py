@@ -35,6 +35,7 @@ from app.mapping.products.s102 import SurveyFacts, file_name, s102
 from app.mapping.products.text import map_xyz
 from app.mapping.products.tracks import Track, tracks_geojson, tracks_gpx
 from app.mapping.products.vr_bag import vr_bag
+from app.mapping.quality.planned_lines import PlannedLine
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.s44 import Order, thu_m
 from app.mapping.tiers import tiers
@@ -353,7 +354,9 @@ def _checked(material: Material) -> SurveyCheck:
 
 
 def _lines(material: Material, options: ProductOptions) -> bytes:
-    return lines_csv(_checked(material), material.facts.frame, options.order)
+    spec = material.facts.spec
+    planned = [PlannedLine(line.name, spec.local_line(line)) for line in spec.survey_lines]
+    return lines_csv(_checked(material), material.facts.frame, options.order, planned)
 
 
 def snapshot_holidays(snapshot: MapSnapshot) -> bytes:

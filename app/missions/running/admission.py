@@ -4,7 +4,8 @@ from collections.abc import Collection, Sequence
 
 from shapely import Polygon, unary_union
 
-from app.exploration.lines.lattice import direction_of_lines_rad
+from app.exploration.lines.lattice import LEAST_LINE_M, direction_of_lines_rad
+from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.lines.spaced_lines import check_line_count
 from app.exploration.pcao.planner import PcaoPlanner
 from app.exploration.planner.options import PlannerOptions
@@ -14,6 +15,7 @@ from app.missions.spec.mission import MissionKind, MissionSpec, PlannerSpec
 from app.missions.spec.swath import SwathSonarSpec
 from app.missions.spec.vehicle import Sensor, VehicleKind, VehicleSpec
 from app.missions.task.constraints import make_constraints
+from app.missions.task.survey_lines import given_lines, not_flyable_m
 from app.missions.task.way import least_way_m
 
 
@@ -65,8 +67,10 @@ def _check_options(planner: PlannerSpec, read: Collection[str]) -> None:
 
 
 def _check_lines(spec: MissionSpec) -> None:
-    """Refuse lines so close that an area has more of them than a survey can. Raises InvalidRequestError."""
+    """Refuse lines that cannot be flown, or not as they are asked for. Raises InvalidRequestError."""
     options = spec.planner.options
+    if spec.survey_lines:
+        _check_survey_lines(spec)
     if options.line_spacing_m is None:
         return
     constraints = make_constraints(spec)
@@ -76,6 +80,37 @@ def _check_lines(spec: MissionSpec) -> None:
     except ValueError as error:
         what, _, advice = str(error).partition(": ")
         raise InvalidRequestError("planner.options.line_spacing_m", what, advice) from None
+
+
+def _check_survey_lines(spec: MissionSpec) -> None:
+    """Refuse a line plan beside what lays other lines, or without anything to fly. Raises InvalidRequestError."""
+    planner, options = spec.planner, spec.planner.options
+    if planner.name != LawnmowerPlanner.name:
+        raise InvalidRequestError(
+            "planner.name",
+            f"survey_lines are given, and planner {planner.name!r} flies where it finds best",
+            f"use {LawnmowerPlanner.name}, or leave survey_lines out",
+        )
+    for name in ("line_spacing_m", "line_heading_deg"):
+        if getattr(options, name) is not None:
+            raise InvalidRequestError(
+                f"planner.options.{name}",
+                "survey_lines are given, which say where lines lie",
+                "leave one of them out",
+            )
+    if spec.coverage.crosslines_pct > 0.0:
+        raise InvalidRequestError(
+            "coverage.crosslines_pct",
+            f"{spec.coverage.crosslines_pct:g} % is given beside survey_lines, and only lines of the plan are flown",
+            "leave it out or give 0, and add crosslines to survey_lines",
+        )
+    cut = not_flyable_m(spec)
+    if all(line.length_m - cut.get(line.name, 0.0) <= LEAST_LINE_M for line in given_lines(spec)):
+        raise InvalidRequestError(
+            "survey_lines",
+            "nothing of the lines lies inside the area and outside the keep-out zones with their margins",
+            "draw the area so that it encloses the lines, not along them",
+        )
 
 
 def check_limits(spec: MissionSpec) -> None:

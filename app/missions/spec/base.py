@@ -46,13 +46,19 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+def plain_positions(places: object) -> object:
+    """Return positions without the heights that some programs add."""
+    if isinstance(places, list | tuple) and len(places) > MAX_POSITIONS:
+        raise ValueError(f"there are {len(places)} positions, at most {MAX_POSITIONS} are taken: simplify it")
+    if isinstance(places, list | tuple):
+        return [place[:2] if isinstance(place, list | tuple) and len(place) == 3 else place for place in places]
+    return places
+
+
 def _plain_ring(ring: object) -> object:
-    """Return a ring without the heights that some programs add."""
     if isinstance(ring, list | tuple) and len(ring) > MAX_POSITIONS:
         raise ValueError(f"the ring has {len(ring)} positions, at most {MAX_POSITIONS} are taken: simplify it")
-    if isinstance(ring, list | tuple):
-        return [place[:2] if isinstance(place, list | tuple) and len(place) == 3 else place for place in ring]
-    return ring
+    return plain_positions(ring)
 
 
 # Looked at before its positions are, and no further than to the first that is wrong.

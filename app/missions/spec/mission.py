@@ -29,6 +29,7 @@ from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
 from app.missions.spec.site import SiteId
 from app.missions.spec.surface_policy import SurfacePolicy
+from app.missions.spec.survey_lines import MOST_CORNERS, MOST_LINES, MOST_LINES_KM, SurveyLine
 from app.missions.spec.swath import CoverageSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.targets import MOST_TARGETS, TargetSpec, Tracking
@@ -99,6 +100,12 @@ class MissionSpec(Model):
     area: PolygonGeometry = Field(description="The area to map, or the site to search")
     keep_out: list[PolygonGeometry] = Field(
         default_factory=list, max_length=100, description="Zones no vehicle may enter"
+    )
+    survey_lines: list[SurveyLine] = Field(
+        default_factory=list,
+        max_length=MOST_LINES,
+        description="Lines of a line plan, which planner `lawnmower` flies in place of lines of its own; what lies "
+        "outside the area or in keep-out zones is not flown. The mission ends when they are flown, or with its budget",
     )
     vehicles: list[VehicleSpec] = Field(default_factory=list, max_length=100)
     budget: Budget = Field(
@@ -274,6 +281,7 @@ class MissionSpec(Model):
                 "corner: choose a smaller one",
             )
         places = {f"keep_out.{index}": zone.ring for index, zone in enumerate(self.keep_out)}
+        places |= {f"survey_lines.{index}": line.coordinates for index, line in enumerate(self.survey_lines)}
         if self.search is not None:
             for name in ("obstacles", "simulated_obstacles"):
                 standing: list[PolygonGeometry] = getattr(self.search, name)
@@ -345,6 +353,36 @@ class MissionSpec(Model):
                     f"cast {cast.name!r} is at {list(cast.position)}, nowhere near the area: "
                     f"{self._where_it_belongs(cast.position)}",
                 )
+
+    @model_validator(mode="after")
+    def _survey_lines_can_be_told_apart_and_flown(self) -> Self:
+        if not self.survey_lines:
+            return self
+        if self.kind is MissionKind.SEARCH:
+            raise FieldError("survey_lines", "survey_lines are given and kind is search: only surveys fly lines")
+        names: dict[str, int] = {}
+        for index, line in enumerate(self.survey_lines):
+            if line.name in names:
+                raise FieldError(
+                    f"survey_lines.{index}.name",
+                    f"{line.name!r} is the name of survey_lines.{names[line.name]} already: give each line its own",
+                )
+            names[line.name] = index
+        corners = sum(len(line.coordinates) for line in self.survey_lines)
+        if corners > MOST_CORNERS:
+            words = f"the lines have {corners} positions, at most {MOST_CORNERS} are taken: simplify them"
+            raise FieldError("survey_lines", words)
+        length_km = sum(self._length_m(line) for line in self.survey_lines) / 1000.0
+        if length_km > MOST_LINES_KM:
+            words = f"the lines are {length_km:.0f} km long, at most {MOST_LINES_KM:.0f} km are taken: divide the plan"
+            raise FieldError("survey_lines", words)
+        if "crosslines_pct" not in self.coverage.model_fields_set:
+            # A plan has the crosslines that it is to have.
+            object.__setattr__(self, "coverage", self.coverage.model_copy(update={"crosslines_pct": 0.0}))
+        return self
+
+    def _length_m(self, line: SurveyLine) -> float:
+        return float(np.hypot(*np.diff(self.local_line(line), axis=0).T).sum())
 
     @model_validator(mode="after")
     def _targets_can_be_told_apart(self) -> Self:
@@ -481,6 +519,16 @@ class MissionSpec(Model):
             return area
         inner = Polygon(area).buffer(-self.limits.border_margin_m, join_style="mitre")
         return np.asarray(orient(inner).exterior.coords)[:-1]
+
+    @property
+    def lines_asked_for(self) -> bool:
+        """Whether it ends when lines are flown that somebody asked for: those of a plan, or lines at a distance."""
+        return bool(self.survey_lines) or self.planner.options.line_spacing_m is not None
+
+    def local_line(self, line: SurveyLine) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """A line's positions in the local frame, shape (n, 2)."""
+        lons, lats = zip(*line.coordinates, strict=True)
+        return np.column_stack(self.frame().to_local(np.array(lats), np.array(lons)))
 
     def to_local(self, polygon: PolygonGeometry) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Vertices of a polygon in the local frame, counter-clockwise, shape (n, 2)."""

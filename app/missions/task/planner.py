@@ -1,10 +1,12 @@
 """The planner that a mission asks for, and the circles that its vehicles turn in."""
 
 from app.estimation import Sensor, SingleBeam
+from app.exploration.lines.lawnmower import LawnmowerPlanner
 from app.exploration.planner.base import PlannerBase
 from app.exploration.planners import create_planner
 from app.missions.spec.mission import MissionSpec
 from app.missions.spec.vehicle import VehicleSpec
+from app.missions.task.survey_lines import given_lines
 
 TURN_S = 4.0
 """A vehicle whose turning circle nobody knows turns in one whose radius it flies in so many seconds."""
@@ -14,7 +16,10 @@ def make_planner(spec: MissionSpec, sensor: Sensor | None = None) -> PlannerBase
     """Return a mission's planner, which pays for turns by the widest circles of its vehicles."""
     widest_m = max((turn_radius_m(spec, vehicle) for vehicle in spec.vehicles), default=TURN_S * spec.speed_mps)
     options = spec.planner.options.model_copy(update={"turn_radius_m": widest_m})
-    return create_planner(spec.planner.name, options, SingleBeam() if sensor is None else sensor)
+    planner = create_planner(spec.planner.name, options, SingleBeam() if sensor is None else sensor)
+    if spec.survey_lines and isinstance(planner, LawnmowerPlanner):
+        planner.take_lines(given_lines(spec))
+    return planner
 
 
 def turn_radius_m(spec: MissionSpec, vehicle: VehicleSpec) -> float:

@@ -142,7 +142,7 @@ def test_every_route_that_may_change_something_says_who_may_and_what_it_takes() 
         assert isinstance(one.route, APIRoute)
         assert not one.route._embed_body_fields
     files = {one.route.operation_id for one in found if one.kind is BodyKind.FILE}
-    assert files == {"importLog", "importSoundings", "proposeZones", "setReference"}
+    assert files == {"importLog", "importSoundings", "proposeZones", "readDrawing", "setReference"}
 
 
 async def test_packed_json_is_not_unpacked(service: Tokens) -> None:

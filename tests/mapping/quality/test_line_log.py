@@ -12,6 +12,7 @@ from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.products.line_log import lines_csv
 from app.mapping.quality.line_log import LineLog
+from app.mapping.quality.planned_lines import PlannedLine, planned_names
 from app.mapping.quality.survey import SurveyCheck
 from app.mapping.quality.tracks import Tracks, cut
 from app.mapping.s44 import Order
@@ -71,6 +72,28 @@ def test_the_file_has_a_row_for_each_line_with_what_crosses_it() -> None:
     assert {row["within_pct"] for row in long} == {"100.0"}
     assert all(float(row["speed_mps"]) * float(row["duration_s"]) == pytest.approx(float(row["length_m"]), rel=0.01)
                for row in long)  # fmt: skip
+
+
+def test_lines_of_a_plan_are_told_by_its_names() -> None:
+    plan = [PlannedLine(f"L{k}", np.array([[10.0 * k + 1.0, -20.0], [10.0 * k + 1.0, 220.0]])) for k in range(11)]
+    plan.append(PlannedLine("=X", np.array([[-20.0, 98.0], [50.0, 98.0], [120.0, 102.0]])))
+    main, across = flown(lawnmower(100, 200, 10), start_s=1e9), flown([(-10, 100), (110, 100)], start_s=2e9)
+    check = SurveyCheck.of(Tracks.of({"main": main, "across": across}))
+    rows = [*csv.DictReader(io.StringIO(lines_csv(check, FRAME, Order.ORDER_1A, plan).decode().partition("\n")[2]))]
+    long = [row["planned_line"] for row in rows if row["vehicle"] == "main" and float(row["length_m"]) > 150.0]
+    assert long == [f"L{k}" for k in range(11)]
+    assert [row["planned_line"] for row in rows if row["vehicle"] == "across"] == ["'=X"]
+    between = {row["planned_line"] for row in rows if row["vehicle"] == "main" and float(row["length_m"]) < 150.0}
+    assert between <= {""}, "ways from line to line are none of them"
+    assert {row["planned_line"] for row in rows_of(check)} == {""}
+
+
+def test_what_was_flown_far_from_a_line_or_at_an_angle_to_it_is_not_it() -> None:
+    plan = [PlannedLine("a", np.array([[0.0, 0.0], [0.0, 100.0], [100.0, 200.0]]))]
+    begin_m = np.array([[0.0, 0.0], [12.0, 0.0], [-8.0, 50.0], [90.0, 195.0], [5.0, 100.0]])
+    end_m = np.array([[2.0, 90.0], [12.0, 90.0], [8.0, 50.0], [10.0, 115.0], [100.0, 100.0]])
+    assert planned_names(begin_m, end_m, plan) == ["a", "", "", "a", ""]
+    assert planned_names(begin_m[:0], end_m[:0], plan) == []
 
 
 def test_nothing_has_no_rows() -> None:

@@ -82,6 +82,7 @@ CONTRACT = {
     "GET /sites/{site_id}/changes.{format}": "getChangesFile",
     "POST /missions/{mission_id}/imports": "importSoundings",
     "POST /chart-zones": "proposeZones",
+    "POST /drawings": "readDrawing",
     "GET /missions/{mission_id}/imports": "listImports",
     "DELETE /missions/{mission_id}/imports/{import_id}": "deleteImport",
     "POST /missions/{mission_id}/logs": "importLog",

@@ -18,19 +18,22 @@ from sqlalchemy.orm import defer
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.kriging.supersoundings import merge_soundings
 from app.mapping.quality.depth_offset import offset_between
-from app.mapping.readers.file_extensions import ending
+from app.mapping.readers.file_extensions import drawing_ending, ending
 from app.mapping.readers.types import DATUM_NOTE, MapExtent, ReadError, ReadOptions
 from app.mapping.types import Grid, SoundingRows, Soundings
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL
 from app.missions.clock import now
 from app.missions.errors import ConflictError, ImportNotFoundError, InvalidRequestError
 from app.missions.live.mission import LiveMission
+from app.missions.operations.imports.drawings import drawing_view
 from app.missions.operations.imports.reader_process import ChartedZone, Reader
 from app.missions.operations.imports.uploads import Upload
 from app.missions.running.final_maps import FinalMaps
 from app.missions.spec.base import PolygonGeometry
 from app.missions.states import ENDED, NOT_STARTED
 from app.missions.views.measurements.imports import (
+    DrawingOptions,
+    DrawingView,
     ImportOptions,
     ImportView,
     ProposedZonesView,
@@ -260,6 +263,24 @@ class Imports:
             zones, notes = await self._reader.read_zones(upload, place, options.margin_m)
         shown = [_proposed(zone) for zone in zones]
         return ProposedZonesView(zones=[zone for zone in shown if zone is not None], notes=notes)
+
+    async def read_drawing(self, upload: Upload, options: DrawingOptions) -> DrawingView:
+        """Return the lines and areas that a file holds. Nothing is stored, and no mission changes.
+
+        Raises
+        ------
+        InvalidRequestError, ImportUnavailableError
+            When the file cannot be used, or nothing can be read now.
+        """
+        try:
+            kind = drawing_ending(options.filename)
+        except ReadError as error:
+            raise InvalidRequestError(error.field, str(error), error.remedy) from None
+        if not upload.size_bytes:
+            raise InvalidRequestError("file", "it is empty", "send the file's content as the body")
+        async with self._reader.turn():
+            shapes, notes = await self._reader.read_drawings(upload, kind, options.crs)
+        return await asyncio.to_thread(drawing_view, shapes, notes, options.margin_m)
 
     async def set_reference(
         self, live: LiveMission, upload: Upload, options: ImportOptions, actor: str

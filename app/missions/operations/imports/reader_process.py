@@ -21,6 +21,8 @@ from app.mapping.readers.confinement import FORBIDDEN, LOCKING_CALLS
 from app.mapping.readers.types import (
     MAX_CORNERS,
     MAX_DEPTH_M,
+    MAX_DRAWINGS,
+    MAX_DRAWN_CORNERS,
     MAX_SD_M,
     MAX_SOUNDINGS,
     MAX_ZONES,
@@ -32,6 +34,7 @@ from app.mapping.readers.types import (
 )
 from app.missions.errors import ImportUnavailableError, InvalidRequestError
 from app.missions.operations.imports.uploads import Upload
+from app.missions.spec.base import SHOWN_PATTERN
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.unnamed_file import unnamed_file
 
@@ -44,8 +47,9 @@ READING_TIMEOUT_S = 180.0
 WAITING_TIMEOUT_S = 60.0
 AT_ONCE = 1
 """Each takes a core and memory, which vehicles' decisions need."""
-MAX_ANSWER_BYTES = 1 << 16
+MAX_ANSWER_BYTES = 1 << 18
 FEWEST_CORNERS = 3
+FEWEST_ON_LINE = 2
 
 _ENVIRONMENT = ("LD_LIBRARY_PATH", "PROJ_DATA", "GDAL_DATA", "TMPDIR", "TZDIR")
 """What the reading process gets of ours: where libraries and their tables lie, and nothing that is secret."""
@@ -69,6 +73,15 @@ class _Zone(BaseModel):
     position_m: Annotated[float, Field(ge=0, le=1000)]
 
 
+class _Drawing(BaseModel):
+    """What the reading process says of a line or an area."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    kind: Literal["line", "area"]
+    name: Annotated[str, Field(min_length=1, max_length=64, pattern=SHOWN_PATTERN)]
+
+
 class _Answer(BaseModel):
     """What the reading process says. It has read what nobody vouches for, so nobody vouches for what it says."""
 
@@ -79,6 +92,7 @@ class _Answer(BaseModel):
     notes: list[Text] = Field(default=[], max_length=20)
     found: int = Field(default=0, ge=0)
     zones: list[_Zone] = Field(default=[], max_length=MAX_ZONES)
+    drawings: list[_Drawing] = Field(default=[], max_length=MAX_DRAWINGS)
     field: Text = "file"
     message: Text = ""
     remedy: Text = ""
@@ -94,6 +108,16 @@ class ChartedZone(BaseModel):
     depth_m: float | None
     position_m: float
     ring: list[tuple[float, float]]
+
+
+class DrawnShape(BaseModel):
+    """A line, or the outline of an area, which ends where it began; ``places`` are longitude and latitude."""
+
+    model_config = ConfigDict(frozen=True)
+
+    kind: Literal["line", "area"]
+    name: str
+    places: list[tuple[float, float]]
 
 
 class Found(BaseModel):
@@ -179,13 +203,36 @@ class Reader:
         task = self._task(".000", "zones", place) | {"around_m": around_m}
         with await asyncio.to_thread(unnamed_file) as result:
             answer = await self._ask(upload, task, result)
-            corners = await to_the_end(asyncio.to_thread(_corners, result, tuple(answer.shape), len(answer.zones)))
+            corners = await to_the_end(
+                asyncio.to_thread(
+                    _corners, result, tuple(answer.shape), [FEWEST_CORNERS] * len(answer.zones), MAX_CORNERS
+                )
+            )
         zones = []
-        for number, zone in enumerate(answer.zones):
-            ring = corners[corners[:, 0] == number, 1:]
+        for zone, ring in zip(answer.zones, _by_number(corners, len(answer.zones)), strict=True):
             closed = [(float(lon), float(lat)) for lon, lat in np.vstack([ring, ring[:1]])]
             zones.append(ChartedZone(**zone.model_dump(), ring=closed))
         return zones, answer.notes
+
+    async def read_drawings(self, upload: Upload, kind: str, crs: str | None) -> tuple[list[DrawnShape], list[str]]:
+        """Return the lines and areas of a file, and notes; within a :meth:`turn`.
+
+        Raises
+        ------
+        InvalidRequestError, ImportUnavailableError
+            As ``read`` does.
+        """
+        task = {"kind": kind, "what": "drawings", "crs": crs, "unconfined": self._unconfined}
+        with await asyncio.to_thread(unnamed_file) as result:
+            answer = await self._ask(upload, task, result)
+            fewest = [FEWEST_CORNERS if one.kind == "area" else FEWEST_ON_LINE for one in answer.drawings]
+            shape = tuple(answer.shape)
+            corners = await to_the_end(asyncio.to_thread(_corners, result, shape, fewest, MAX_DRAWN_CORNERS))
+        shapes = []
+        for one, places in zip(answer.drawings, _by_number(corners, len(answer.drawings)), strict=True):
+            closed = np.vstack([places, places[:1]]) if one.kind == "area" else places
+            shapes.append(DrawnShape(kind=one.kind, name=one.name, places=[(float(a), float(b)) for a, b in closed]))
+        return shapes, answer.notes
 
     def _task(self, kind: str, what: str, place: MapExtent) -> dict[str, Any]:
         grid = place.grid
@@ -267,18 +314,27 @@ def _values(result: IO[bytes], shape: tuple[int, ...], expected: tuple[int, int]
     return values.T.copy() if expected is None else values
 
 
-def _corners(result: IO[bytes], shape: tuple[int, ...], zones: int) -> NDArray[np.float64]:
-    """Return corners (n, 3), each with its zone's number, when they can be what was asked for."""
+def _corners(result: IO[bytes], shape: tuple[int, ...], fewest: list[int], most: int) -> NDArray[np.float64]:
+    """Return corners (n, 3), each with the number of what it belongs to, when they can be what was asked for.
+
+    ``fewest`` are how many each has at least, ``most`` how many all have at most.
+    """
     result.seek(0, os.SEEK_END)
-    if len(shape) != 2 or shape[0] != 3 or not 0 <= shape[1] <= MAX_CORNERS or result.tell() != 24 * shape[1]:
+    if len(shape) != 2 or shape[0] != 3 or not 0 <= shape[1] <= most or result.tell() != 24 * shape[1]:
         raise _broken_off()
     result.seek(0)
     table = np.fromfile(result, "<f8").reshape(shape).T.copy()
     number, lon, lat = table.T
     sound = bool(np.isfinite(table).all()) and bool((np.abs(lon) <= 180.0).all() and (np.abs(lat) <= 90.0).all())
-    if not sound or any(np.count_nonzero(number == one) < FEWEST_CORNERS for one in range(zones)):
+    sound &= bool(np.isin(number, np.arange(len(fewest))).all()) and bool((np.diff(number) >= 0.0).all())
+    if not sound or (np.bincount(number.astype(np.int64), minlength=len(fewest)) < fewest).any():
         raise _broken_off()
     return table
+
+
+def _by_number(corners: NDArray[np.float64], count: int) -> list[NDArray[np.float64]]:
+    """Return the positions of each thing, in order of their numbers."""
+    return np.split(corners[:, 1:], np.searchsorted(corners[:, 0], np.arange(1, count))) if count else []
 
 
 async def _run(file: IO[bytes], task: str, result: IO[bytes]) -> tuple[int, bytes]:

@@ -93,6 +93,58 @@ class ZoneOptions(BaseModel):
     )
 
 
+class DrawingOptions(BaseModel):
+    """What a file with lines and areas does not say by itself."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    filename: str = Field(
+        min_length=1,
+        max_length=200,
+        pattern=r"^[^/\\\x00-\x1f\x7f]+$",
+        description="Its name; the ending says what it is: .geojson, .json, .kml, .kmz, .gpx, .dxf, .zip (a "
+        "shapefile), .csv or .txt (name and position in each row), or .lnw (Hypack)",
+        examples=["lines_2026.lnw"],
+    )
+    crs: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=2000,
+        description="What positions are in where the file does not say: EPSG:32629, EPSG:4326 or WKT",
+    )
+    margin_m: float = Field(
+        default=50.0, ge=1, le=2000, description="How far the area around the lines reaches beyond them"
+    )
+
+
+class DrawnLineView(View):
+    """A line of a file; with name and coordinates it is one of a mission's `survey_lines`."""
+
+    name: str = Field(description="What the file calls it, else its number; no other line is called so")
+    coordinates: list[tuple[float, float]] = Field(description="[longitude, latitude], WGS 84")
+    length_m: float
+
+
+class DrawnAreaView(View):
+    """An area of a file: a polygon, or a line that ends where it began."""
+
+    name: str
+    area: PolygonGeometry = Field(description="For a mission's `area` or its `keep_out`")
+    area_m2: float
+
+
+class DrawingView(View):
+    """The lines and areas of a file, in its order."""
+
+    lines: list[DrawnLineView]
+    areas: list[DrawnAreaView]
+    around: PolygonGeometry | None = Field(
+        description="The smallest convex area around the lines with a margin, for a mission's `area` where no other is "
+        "given; null: there are no lines, or they lie far apart"
+    )
+    notes: list[str] = Field(description="What was assumed or left out, in words")
+
+
 class ProposedZoneView(View):
     """What a chart shows to keep out of. It is a proposal: nothing keeps out of it before a mission has it."""
 

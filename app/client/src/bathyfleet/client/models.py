@@ -714,6 +714,38 @@ class DoctorView(Model):
     """Of AIS; empty where it is not set up"""
 
 
+class DrawingView(Model):
+    """The lines and areas of a file, in its order."""
+
+    lines: list[DrawnLineView]
+    areas: list[DrawnAreaView]
+    around: PolygonGeometry | None
+    """The smallest convex area around the lines with a margin, for a mission's `area` where no other is given; null:
+    there are no lines, or they lie far apart
+    """
+    notes: list[str]
+    """What was assumed or left out, in words"""
+
+
+class DrawnAreaView(Model):
+    """An area of a file: a polygon, or a line that ends where it began."""
+
+    name: str
+    area: PolygonGeometry
+    """For a mission's `area` or its `keep_out`"""
+    area_m2: float
+
+
+class DrawnLineView(Model):
+    """A line of a file; with name and coordinates it is one of a mission's `survey_lines`."""
+
+    name: str
+    """What the file calls it, else its number; no other line is called so"""
+    coordinates: list[tuple[float, float]]
+    """[longitude, latitude], WGS 84"""
+    length_m: float
+
+
 class EllipseView(Model):
     """Where the target is with 95 % probability, in the plane."""
 
@@ -1175,6 +1207,10 @@ class MissionSpec(Model):
     """survey: map the sea floor; search: look for something in a partly known site, see `search`"""
     keep_out: list[PolygonGeometry] | None = None
     """Zones no vehicle may enter"""
+    survey_lines: list[SurveyLine] | None = None
+    """Lines of a line plan, which planner `lawnmower` flies in place of lines of its own; what lies outside the area
+    or in keep-out zones is not flown. The mission ends when they are flown, or with its budget
+    """
     vehicles: list[VehicleSpec] | None = None
     budget: Budget | None = None
     """How long the mission is: minutes, km_per_vehicle or steps"""
@@ -1392,8 +1428,8 @@ class PlanView(Model):
     whole: bool
     """Whether this is all; else the ways end where the time for planning was up"""
     whole_survey: WholeSurveyView | None
-    """What it takes until nothing is left to ensonify, or all lines at the distance asked for are flown, whatever
-    the budget; null: a survey of neither kind, or not all of it was planned in time
+    """What it takes until nothing is left to ensonify, or all lines that were asked for are flown, whatever the
+    budget; null: a survey of neither kind, or not all of it was planned in time
     """
     assumptions: list[str]
     """What was taken to be so, in words"""
@@ -1466,6 +1502,8 @@ class PlannerOptions(Model):
     """Course of the lines, clockwise from true north; by default that of the area's longer side, or what the planner
     finds better.
     """
+    keep_line_order: bool = False
+    """With survey_lines: fly them in the order in which they are given, though another one is shorter."""
     rollouts: int = 300
     """Changes to the team's plan that a rollout step tries."""
     tries: int = 0
@@ -2210,6 +2248,17 @@ class SurfacePolicy(Model):
     """How long a vehicle stays up that comes up by the clock"""
     good_position_sd_m: float | None = None
     """It stays at the surface until its position is known this well; null: a third of the limit"""
+
+
+class SurveyLine(Model):
+    """A line, straight or with bends as the middle of a channel has them."""
+
+    name: str
+    """What the plan calls it, as its number; no other line is called so"""
+    coordinates: list[tuple[float, float]]
+    """Two or more [longitude, latitude], flown from one to the next; heights are left out"""
+    keep_direction: bool = False
+    """Fly it as it is drawn; false: in the direction that takes less way"""
 
 
 class SurveyName(Model):

@@ -774,6 +774,34 @@ class Operations(ABC):
             query={"west_deg": west_deg, "south_deg": south_deg, "east_deg": east_deg, "north_deg": north_deg, "margin_m": margin_m},
         ))
 
+    def read_drawing(
+        self,
+        content: bytes,
+        *,
+        filename: str,
+        crs: str | None = None,
+        margin_m: float | None = None,
+    ) -> models.DrawingView:
+        """Read the lines and areas of a file: ``POST /drawings``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .geojson, .json, .kml, .kmz, .gpx, .dxf, .zip (a shapefile),
+            .csv or .txt (name and position in each row), or .lnw (Hypack)
+        crs : str
+            What positions are in where the file does not say: EPSG:32629, EPSG:4326 or WKT
+        margin_m : float, 1 to 2000, default 50.0
+            How far the area around the lines reaches beyond them
+        """
+        return self._call(Call[models.DrawingView](
+            "POST",
+            "/drawings",
+            models.DrawingView,
+            content=content,
+            query={"filename": filename, "crs": crs, "margin_m": margin_m},
+        ))
+
     def get_map(
         self,
         mission_id: str,
@@ -2366,6 +2394,34 @@ class AsyncOperations(ABC):
             models.ProposedZonesView,
             content=content,
             query={"west_deg": west_deg, "south_deg": south_deg, "east_deg": east_deg, "north_deg": north_deg, "margin_m": margin_m},
+        ))
+
+    async def read_drawing(
+        self,
+        content: bytes,
+        *,
+        filename: str,
+        crs: str | None = None,
+        margin_m: float | None = None,
+    ) -> models.DrawingView:
+        """Read the lines and areas of a file: ``POST /drawings``.
+
+        Parameters
+        ----------
+        filename : str
+            Its name; the ending says what it is: .geojson, .json, .kml, .kmz, .gpx, .dxf, .zip (a shapefile),
+            .csv or .txt (name and position in each row), or .lnw (Hypack)
+        crs : str
+            What positions are in where the file does not say: EPSG:32629, EPSG:4326 or WKT
+        margin_m : float, 1 to 2000, default 50.0
+            How far the area around the lines reaches beyond them
+        """
+        return await self._call(Call[models.DrawingView](
+            "POST",
+            "/drawings",
+            models.DrawingView,
+            content=content,
+            query={"filename": filename, "crs": crs, "margin_m": margin_m},
         ))
 
     async def get_map(

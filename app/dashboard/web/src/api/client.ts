@@ -13,6 +13,7 @@ import type {
   CorrectionsView,
   CrossoversView,
   DoctorView,
+  DrawingView,
   EventView,
   FieldProblem,
   ForecastView,
@@ -360,6 +361,15 @@ export const api = {
     upload<ProposedZonesView>(
       "POST",
       `${BASE}/chart-zones?${new URLSearchParams(ends)}`,
+      file,
+      onBytes,
+      gone,
+    ),
+  /** The lines and areas of a file of plans; `crs`: what its positions are in where it does not say. */
+  readDrawing: (crs: string, { file, onBytes, gone }: Sending) =>
+    upload<DrawingView>(
+      "POST",
+      `${BASE}/drawings?${new URLSearchParams({ filename: file.name, ...(crs ? { crs } : {}) })}`,
       file,
       onBytes,
       gone,

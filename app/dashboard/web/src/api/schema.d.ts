@@ -1028,6 +1028,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drawings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read the lines and areas of a file
+         * @description Return lines for a mission's `survey_lines` and polygons for its `area` and `keep_out`, as a file has them.
+         *
+         *     Line plans and areas from GIS, survey programs and drawings: GeoJSON, KML, GPX, DXF, shapefiles, tables, Hypack.
+         *     Nothing is stored and no mission changes.
+         */
+        post: operations["readDrawing"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/map": {
         parameters: {
             query?: never;
@@ -3391,6 +3414,56 @@ export interface components {
             traffic: components["schemas"]["TrafficFinding"][];
         };
         /**
+         * DrawingView
+         * @description The lines and areas of a file, in its order.
+         */
+        DrawingView: {
+            /** Lines */
+            lines: components["schemas"]["DrawnLineView"][];
+            /** Areas */
+            areas: components["schemas"]["DrawnAreaView"][];
+            /** @description The smallest convex area around the lines with a margin, for a mission's `area` where no other is given; null: there are no lines, or they lie far apart */
+            around: components["schemas"]["PolygonGeometry"] | null;
+            /**
+             * Notes
+             * @description What was assumed or left out, in words
+             */
+            notes: string[];
+        };
+        /**
+         * DrawnAreaView
+         * @description An area of a file: a polygon, or a line that ends where it began.
+         */
+        DrawnAreaView: {
+            /** Name */
+            name: string;
+            /** @description For a mission's `area` or its `keep_out` */
+            area: components["schemas"]["PolygonGeometry"];
+            /** Area M2 */
+            area_m2: number;
+        };
+        /**
+         * DrawnLineView
+         * @description A line of a file; with name and coordinates it is one of a mission's `survey_lines`.
+         */
+        DrawnLineView: {
+            /**
+             * Name
+             * @description What the file calls it, else its number; no other line is called so
+             */
+            name: string;
+            /**
+             * Coordinates
+             * @description [longitude, latitude], WGS 84
+             */
+            coordinates: [
+                number,
+                number
+            ][];
+            /** Length M */
+            length_m: number;
+        };
+        /**
          * EllipseView
          * @description Where the target is with 95 % probability, in the plane.
          */
@@ -4443,6 +4516,11 @@ export interface components {
              * @description Zones no vehicle may enter
              */
             keep_out?: components["schemas"]["PolygonGeometry"][];
+            /**
+             * Survey Lines
+             * @description Lines of a line plan, which planner `lawnmower` flies in place of lines of its own; what lies outside the area or in keep-out zones is not flown. The mission ends when they are flown, or with its budget
+             */
+            survey_lines?: components["schemas"]["SurveyLine"][];
             /** Vehicles */
             vehicles?: components["schemas"]["VehicleSpec"][];
             /**
@@ -4657,6 +4735,11 @@ export interface components {
                  * @description Zones no vehicle may enter
                  */
                 keep_out?: components["schemas"]["PolygonGeometry"][];
+                /**
+                 * Survey Lines
+                 * @description Lines of a line plan, which planner `lawnmower` flies in place of lines of its own; what lies outside the area or in keep-out zones is not flown. The mission ends when they are flown, or with its budget
+                 */
+                survey_lines?: components["schemas"]["SurveyLine"][];
                 /** Vehicles */
                 vehicles?: components["schemas"]["VehicleSpec"][];
                 /**
@@ -5115,7 +5198,7 @@ export interface components {
              * @description Whether this is all; else the ways end where the time for planning was up
              */
             whole: boolean;
-            /** @description What it takes until nothing is left to ensonify, or all lines at the distance asked for are flown, whatever the budget; null: a survey of neither kind, or not all of it was planned in time */
+            /** @description What it takes until nothing is left to ensonify, or all lines that were asked for are flown, whatever the budget; null: a survey of neither kind, or not all of it was planned in time */
             whole_survey: components["schemas"]["WholeSurveyView"] | null;
             /**
              * Assumptions
@@ -5280,6 +5363,12 @@ export interface components {
              * @description Course of the lines, clockwise from true north; by default that of the area's longer side, or what the planner finds better.
              */
             line_heading_deg?: number | null;
+            /**
+             * Keep Line Order
+             * @description With survey_lines: fly them in the order in which they are given, though another one is shorter.
+             * @default false
+             */
+            keep_line_order: boolean;
             /**
              * Rollouts
              * @description Changes to the team's plan that a rollout step tries.
@@ -6974,6 +7063,41 @@ export interface components {
              * @description It stays at the surface until its position is known this well; null: a third of the limit
              */
             good_position_sd_m?: number | null;
+        };
+        /**
+         * SurveyLine
+         * @description A line, straight or with bends as the middle of a channel has them.
+         */
+        SurveyLine: {
+            /**
+             * Name
+             * @description What the plan calls it, as its number; no other line is called so
+             */
+            name: string;
+            /**
+             * Coordinates
+             * @description Two or more [longitude, latitude], flown from one to the next; heights are left out
+             * @example [
+             *       [
+             *         -8.7049,
+             *         41.1851
+             *       ],
+             *       [
+             *         -8.7039,
+             *         41.1851
+             *       ]
+             *     ]
+             */
+            coordinates: [
+                number,
+                number
+            ][];
+            /**
+             * Keep Direction
+             * @description Fly it as it is drawn; false: in the direction that takes less way
+             * @default false
+             */
+            keep_direction: boolean;
         };
         /**
          * SurveyName
@@ -14268,6 +14392,110 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ProposedZonesView"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No file can be read now; too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    readDrawing: {
+        parameters: {
+            query: {
+                /** @description Its name; the ending says what it is: .geojson, .json, .kml, .kmz, .gpx, .dxf, .zip (a shapefile), .csv or .txt (name and position in each row), or .lnw (Hypack) */
+                filename: string;
+                /** @description What positions are in where the file does not say: EPSG:32629, EPSG:4326 or WKT */
+                crs?: string;
+                /** @description How far the area around the lines reaches beyond them */
+                margin_m?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** @description The file as it is, whatever its media type */
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DrawingView"];
                 };
             };
             /** @description The body cannot be read; a parameter of the address or the head cannot be taken */

@@ -67,6 +67,8 @@ export type CorrectionsView = Complete<Schemas["CorrectionsView"]>;
 export type LogView = Complete<Schemas["LogView"]>;
 export type ImportView = Complete<Schemas["ImportView"]>;
 export type ReferenceView = Complete<Schemas["ReferenceView"]>;
+export type DrawingView = Complete<Schemas["DrawingView"]>;
+export type SurveyLine = Schemas["SurveyLine"];
 export type ProposedZonesView = Complete<Schemas["ProposedZonesView"]>;
 /** What a file of depths does not say by itself, as it is typed; empty: nothing is said. */
 export type ImportOptions = Record<
@@ -115,6 +117,8 @@ export type Budget = Schemas["Budget"];
 
 /** What the form sends. */
 export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_out" | "cell_m"> & {
+  survey_lines?: readonly SurveyLine[];
+  coverage?: Partial<Schemas["CoverageSpec"]>;
   kind?: Schemas["MissionKind"];
   site?: string | null;
   site_prior?: boolean;

@@ -9,6 +9,10 @@ const MOST_BYTES = 64 * 1024 * 1024;
 /** What is read as a file of areas. */
 export const AREA_FILES = ".geojson,.json,.kml,.kmz,.gpx";
 
+/** Whether a file's name says that it is one. */
+export const isAreaFile = (name: string): boolean =>
+  AREA_FILES.split(",").some((ending) => name.toLowerCase().endsWith(ending));
+
 /** Returns the text. Throws an error in the page's words for an archive without a document. */
 export async function areaText(file: File): Promise<string> {
   const bytes = new Uint8Array(await file.arrayBuffer());

@@ -19,6 +19,7 @@ import type {
   WaypointView,
 } from "../api/types";
 import type { Bounds } from "../map/geo";
+import type { NamedLine } from "../map/marks/lines";
 import type { PlaceMark } from "../map/marks/marks";
 import type { Site } from "../map/marks/site";
 import { certaintyFor } from "../map/picture/certainty";
@@ -235,6 +236,7 @@ export interface DraftShapes {
   /** One, or several blocks. */
   areas: readonly PolygonGeometry[];
   keepOut: readonly PolygonGeometry[];
+  lines: readonly NamedLine[];
   /** Places of a search, and where vehicles come home to. */
   marks: readonly PlaceMark[];
 }

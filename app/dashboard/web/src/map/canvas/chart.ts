@@ -11,6 +11,7 @@ import { say } from "../../words/say";
 import { type Bounds, boundsOf, type Graticule, graticule, graticuleStep, widened } from "../geo";
 import { type Harbour, harbours } from "../harbours";
 import { isSame } from "../isSame";
+import type { NamedLine } from "../marks/lines";
 import type { PlaceMark, Route, Spot, Track } from "../marks/marks";
 import type { ShipMark } from "../marks/ships";
 import { type Site, sitePicture } from "../marks/site";
@@ -110,6 +111,7 @@ export class Chart {
     hatched: true,
     area: null,
     keepOut: [],
+    lines: [],
     tracks: [],
     holidays: [],
     crossings: [],
@@ -265,17 +267,18 @@ export class Chart {
   setMission(
     area: PolygonGeometry | null,
     keepOut: readonly PolygonGeometry[],
+    lines: readonly NamedLine[],
     homes: readonly LngLat[],
   ): void {
     const bounds = boundsOf(area?.coordinates[0] ?? []);
     this.#areaBounds = bounds && widened(bounds, homes);
-    this.#lay({ area, keepOut });
+    this.#lay({ area, keepOut, lines });
   }
 
   /** A mission that is being described; its areas are what is to be seen meanwhile. */
-  setDraft(areas: readonly PolygonGeometry[], keepOut: readonly PolygonGeometry[]): void {
-    this.#draftBounds = boundsOf(areas.flatMap(({ coordinates }) => coordinates[0] ?? []));
-    this.#show({ draft: { areas, keepOut } });
+  setDraft(draft: LivelyContent["draft"]): void {
+    this.#draftBounds = boundsOf(draft.areas.flatMap(({ coordinates }) => coordinates[0] ?? []));
+    this.#show({ draft });
   }
 
   /** What that mission would begin with. */

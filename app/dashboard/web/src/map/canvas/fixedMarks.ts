@@ -2,10 +2,12 @@
 
 import type { LngLat, PolygonGeometry } from "../../api/types";
 import { graticule, graticuleStep } from "../geo";
+import type { NamedLine } from "../marks/lines";
 import type { Track } from "../marks/marks";
 import type { Contour } from "../picture/contours";
 import { type Land, paintCoasts, showsCoast } from "./coast";
 import { type Paper, striped } from "./mapColours";
+import { paintPlannedLines } from "./plannedLines";
 import { labelPlaces, type Pixel, simplified } from "./polylines";
 import type { Projection } from "./projection";
 import { line, stroke, trace, way } from "./shapes";
@@ -45,6 +47,8 @@ export interface StillContent {
   hatched: boolean;
   area: PolygonGeometry | null;
   keepOut: readonly PolygonGeometry[];
+  /** Of a line plan. */
+  lines: readonly NamedLine[];
   tracks: readonly Track[];
   /** Outlines of what swath sonars missed. */
   holidays: readonly (readonly (readonly LngLat[])[])[];
@@ -72,7 +76,7 @@ export function paintStill(
   context: CanvasRenderingContext2D,
   at: Projection,
   window: Projection,
-  { lands, floor, hatched, area, keepOut, tracks, holidays, crossings, site }: StillContent,
+  { lands, floor, hatched, area, keepOut, lines, tracks, holidays, crossings, site }: StillContent,
   paper: Paper,
 ): void {
   context.lineCap = context.lineJoin = "round";
@@ -90,6 +94,7 @@ export function paintStill(
   for (const ring of area?.coordinates ?? []) {
     line(context, at, ring as LngLat[], { colour: paper.area, width: 2 }, true);
   }
+  paintPlannedLines(context, at, lines, paper);
   for (const track of tracks) way(context, at, track, paper.casing);
   for (const place of crossings) paintCrossing(context, at, place, paper);
 }

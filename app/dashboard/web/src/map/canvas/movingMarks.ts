@@ -2,12 +2,14 @@
 
 import type { LngLat, PolygonGeometry } from "../../api/types";
 import { circle } from "../geo";
+import type { NamedLine } from "../marks/lines";
 import type { Circle, PlaceMark, Route, Spot, Track } from "../marks/marks";
 import type { ShipMark } from "../marks/ships";
 import type { SwathLine } from "../marks/swath";
 import type { TargetMark } from "../marks/targets";
 import { boxOf, type Side } from "./labels";
 import type { Paper } from "./mapColours";
+import { paintPlannedLines } from "./plannedLines";
 import type { Projection } from "./projection";
 import { dot, line, stroke, trace, way } from "./shapes";
 
@@ -29,7 +31,11 @@ export type PlanLines = readonly {
 }[];
 
 export interface LivelyContent {
-  draft: { areas: readonly PolygonGeometry[]; keepOut: readonly PolygonGeometry[] };
+  draft: {
+    areas: readonly PolygonGeometry[];
+    keepOut: readonly PolygonGeometry[];
+    lines: readonly NamedLine[];
+  };
   plan: PlanLines;
   ranges: readonly Circle[];
   tails: readonly Track[];
@@ -59,7 +65,7 @@ export const WORDS_HEIGHT_PX = 15;
 export const WORDS_FONT = "12px sans-serif";
 
 export const NOTHING: LivelyContent = {
-  draft: { areas: [], keepOut: [] },
+  draft: { areas: [], keepOut: [], lines: [] },
   plan: [],
   ranges: [],
   tails: [],
@@ -108,6 +114,7 @@ export function paintLively(
       line(context, at, ring as LngLat[], { colour: paper.keepOut, width: 2.5, dash: [5, 5] });
     }
   }
+  paintPlannedLines(context, at, draft.lines, paper);
   paintPlan(context, at, plan, paper);
   for (const { at: place, radius_m, colour } of ranges) {
     line(context, at, circle(place, radius_m, 72), { colour, width: 1, dash: [4, 3] });

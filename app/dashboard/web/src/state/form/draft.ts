@@ -1,7 +1,7 @@
 /** A mission being described: the form's fields, checked and turned into what the service takes. Pure. */
 
 import SPEC from "../../api/mission.json";
-import type { LngLat, MissionView, NewMission, Sensor, VehicleSpec } from "../../api/types";
+import type { LngLat, MissionView, NewMission, Sensor, SurveyLine, VehicleSpec } from "../../api/types";
 import { areaFault, polygonOf, ringOf, sizeOf } from "../../map/area";
 import { rectangle, wayBetween } from "../../map/geo";
 import { say } from "../../words/say";
@@ -34,11 +34,14 @@ import {
 import {
   EVEN_LINES,
   fliesCrosslines,
+  lastsForLines,
+  linesOf,
   optionFault,
   optionTexts,
   typedOptions,
   wayForLines,
 } from "./plannerOptions";
+import { linesFor, wayForPlan } from "./surveyLines";
 
 /** How the area is given: typed as a rectangle, or as a ring that was drawn or came in a file. */
 export type AreaSource = "typed" | "drawn";
@@ -62,6 +65,8 @@ export interface Draft extends Texts {
   length: LengthUnit;
   /** How far apart lines over the whole area are to be, which is another way to give the length; empty: it is given. */
   spacing_m: string;
+  /** Whether the length is what all lines of the plan take. */
+  until_lines: boolean;
   /** How deep it is, for plan and forecast alone; empty: they guess. */
   floor_depth_m: string;
   /** As "latitude, longitude". */
@@ -73,6 +78,8 @@ export interface Draft extends Texts {
   source: AreaSource;
   ring: readonly LngLat[];
   keepOut: readonly (readonly LngLat[])[];
+  /** Of a line plan, for even lines to be flown as they are given. */
+  lines: readonly SurveyLine[];
   /** The other areas, in their order; `turn` is the place among all of the one that the form's fields describe. */
   blocks: readonly Block[];
   turn: number;
@@ -149,6 +156,7 @@ export function emptyDraft(middle: LngLat): Draft {
     site: "",
     length: "steps",
     spacing_m: "",
+    until_lines: false,
     floor_depth_m: "",
     goal: "",
     entry: "",
@@ -157,6 +165,7 @@ export function emptyDraft(middle: LngLat): Draft {
     source: "typed",
     ring: [],
     keepOut: [],
+    lines: [],
     blocks: [],
     turn: 0,
     block_name: "",
@@ -181,7 +190,7 @@ const NO_TIDE: string = SPEC["tide.source"].default;
 /** A draft of a mission like one that there is, its vehicles as they are described there. */
 export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
   const ring = ringOf(spec.area as NewMission["area"]);
-  const { steps: _, after: _after, ...base } = spec;
+  const { steps: _, after: _after, survey_lines: lines = [], ...base } = spec;
   const { search, tide } = base;
   const places = search && {
     goal: typedPlace(search.goal as LngLat),
@@ -202,6 +211,7 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     source: "drawn",
     ring,
     keepOut: spec.keep_out.map((zone) => ringOf(zone as NewMission["area"])),
+    lines: lines as SurveyLine[],
     tide_m: isStated ? String(tide.level_m) : "",
     tide_source: isStated ? tide.source : "",
     ...(spec.kind === "survey"
@@ -314,10 +324,13 @@ export function resolved(draft: Draft): Draft {
   return each_km === null ? draft : { ...draft, length: "km_per_vehicle", km_per_vehicle: String(each_km) };
 }
 
-/** Kilometres that each vehicle may fly for lines over an area; null where their distance is not said. */
+/** Kilometres that each vehicle may fly for lines over an area; null where neither they nor their distance are said. */
 function eachByLines(draft: Draft, ring: readonly LngLat[]): number | null {
   const spacing_m = Number(draft.spacing_m);
   const vehicles = vehicleNames(draft).length;
+  if (lastsForLines(draft) && vehicles > 0) {
+    return Number((wayForPlan(linesFor(linesOf(draft), ring), vehicles) / 1000).toPrecision(3));
+  }
   if (!(spacing_m > 0) || vehicles === 0 || ring.length < 3) return null;
   const { area_m2, east_m, north_m } = sizeOf(ring);
   const each_m = wayForLines(draft, area_m2 / (spacing_m * vehicles), Math.hypot(east_m, north_m));
@@ -325,14 +338,15 @@ function eachByLines(draft: Draft, ring: readonly LngLat[]): number | null {
 }
 
 /** What a mission's length is said in. */
-export type LengthChoice = LengthUnit | "spacing_m";
+export type LengthChoice = LengthUnit | "spacing_m" | "lines";
 
 export const lengthChoiceOf = (draft: Draft): LengthChoice =>
-  draft.spacing_m.trim() === "" ? draft.length : "spacing_m";
+  lastsForLines(draft) ? "lines" : draft.spacing_m.trim() === "" ? draft.length : "spacing_m";
 
 /** The length said in something else; lines begin as far apart as the length that there was would lay them. */
 export function withLength(choice: LengthChoice, draft: Draft): Partial<Draft> {
-  if (choice !== "spacing_m") return { length: choice, spacing_m: "" };
+  if (choice === "lines") return { until_lines: true, spacing_m: "" };
+  if (choice !== "spacing_m") return { length: choice, spacing_m: "", until_lines: false };
   const corners = cornersOf(draft);
   const now = corners.length > 2 ? estimate(draft, sizeOf(corners).area_m2) : null;
   return { spacing_m: now ? String(Number(now.spacing_m.toPrecision(2))) : "1" };
@@ -520,6 +534,7 @@ export function toMission(described: Draft): NewMission {
     kind: draft.kind,
     area,
     keep_out: draft.keepOut.map(polygonOf),
+    ...plannedLines(draft, base.coverage),
     vehicles,
     ...(draft.kind === "survey" && draft.site ? { site: draft.site } : {}),
     ...tideOf(draft, tide),
@@ -530,6 +545,16 @@ export function toMission(described: Draft): NewMission {
   const { recovery, ...made } = withTexts(mission, draft, fieldsThatCount(draft));
   const homing = point ? { recovery: { ...before, ...(recovery as object), point } } : {};
   return { ...made, ...homing } as unknown as NewMission;
+}
+
+/** The lines of the plan, which has its own crosslines. */
+function plannedLines(draft: Draft, coverage: NewMission["coverage"]): Partial<NewMission> {
+  const all = linesOf(draft);
+  if (all.length === 0) return {};
+  return {
+    survey_lines: linesFor(all, cornersOf(draft)),
+    coverage: { ...coverage, crosslines_pct: 0 },
+  };
 }
 
 /** The level's source, and what the form does not show of the tide; the level itself is a plain field. */
@@ -628,6 +653,7 @@ const OTHERS: [path: string, field: keyof Draft][] = [
   ["tide", "tide_m"],
   ["vehicles", "simulated"],
   ["keep_out", "keepOut"],
+  ["survey_lines", "lines"],
   ["area", "ring"],
   ["name", "name"],
   ["site", "site"],

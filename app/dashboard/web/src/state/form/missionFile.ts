@@ -1,7 +1,7 @@
 /** A mission's description as one file, and as a template for others. Pure. */
 
 import SPEC from "../../api/mission.json";
-import type { MissionView, NewMission, PolygonGeometry } from "../../api/types";
+import type { LngLat, MissionView, NewMission, PolygonGeometry } from "../../api/types";
 import { inDegrees, polygonOf, ringOf } from "../../map/area";
 import { say } from "../../words/say";
 import { allBlocks, type Block, copyOf, type Draft } from "./draft";
@@ -74,6 +74,7 @@ export function draftIn(fileName: string, text: string): Draft {
       ...allBlocks(draft).map((block) => block.ring),
       ...draft.keepOut,
       ...draft.obstacles,
+      ...draft.lines.map(({ coordinates }) => coordinates as LngLat[]),
     ]);
     return draft;
   } catch (error) {
@@ -90,6 +91,7 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
     ...mission,
     kind: mission.kind ?? SPEC.kind.default,
     keep_out: mission.keep_out ?? [],
+    survey_lines: mission.survey_lines ?? [],
     vehicles: mission.vehicles ?? [],
     search: mission.search ?? null,
     recovery: mission.recovery ?? null,
@@ -105,7 +107,8 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
 export function withTemplate({ mission, spacing_m = "" }: Omit<Template, "name">, draft: Draft): Draft {
   const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
     draft;
-  const { blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table } = draft;
+  const { lines, until_lines, blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table } =
+    draft;
   const { own, base, ...settings } = draftOf(mission);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
   const { sd_m: _, ...tide } = base.tide ?? {};
@@ -116,7 +119,7 @@ export function withTemplate({ mission, spacing_m = "" }: Omit<Template, "name">
     spacing_m,
     obstacles: [],
     ...{ name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery },
-    ...{ blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table },
+    ...{ lines, until_lines, blocks, turn, block_name, floor_depth_m, tide_m, tide_source, tide_table },
   };
 }
 

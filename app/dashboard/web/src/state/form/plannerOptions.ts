@@ -1,7 +1,7 @@
 /** A planner's settings as they are typed; which of them it reads is the service's to say. Pure. */
 
 import SPEC from "../../api/mission.json";
-import type { PlannerOptions, PlannerView } from "../../api/types";
+import type { PlannerOptions, PlannerView, SurveyLine } from "../../api/types";
 import { say } from "../../words/say";
 import type { Draft } from "./draft";
 import { type Field, fieldFault, schemaOf, textOf, typedValue } from "./missionFields";
@@ -14,16 +14,33 @@ export const EVEN_LINES = "lawnmower";
 /** The setting that every survey along lines is asked for: it stands beside the choice of the planner. */
 export const LINE_HEADING = "line_heading_deg";
 
-/** Whether the mission ends when lines at a distance that is given are flown. */
-export const endsWithLines = ({ planner, spacing_m, options }: Draft): boolean =>
+/** The lines of a plan that are flown: other planners fly where they find best. */
+export const linesOf = ({ kind, planner, lines }: Draft): readonly SurveyLine[] =>
+  kind === "survey" && planner === EVEN_LINES ? lines : [];
+
+/** The setting that lines of a plan are flown in its order. */
+const KEEP_ORDER = "keep_line_order";
+
+/** Whether the mission is as long as the lines of its plan take. */
+export const lastsForLines = (draft: Draft): boolean => draft.until_lines && linesOf(draft).length > 0;
+
+/** Whether the mission ends when lines are flown that are given, or whose distance is. */
+export const endsWithLines = (draft: Draft): boolean => linesOf(draft).length > 0 || isSpaced(draft);
+
+const isSpaced = ({ planner, spacing_m, options }: Draft): boolean =>
   planner === EVEN_LINES && (spacing_m.trim() || options.line_spacing_m?.trim() || "") !== "";
 
-/** Whether lines across all others are flown in the end. */
-export const fliesCrosslines = (draft: Draft): boolean => draft.planner === "swath" || endsWithLines(draft);
+/** Whether lines across all others are flown in the end; a plan has its own. */
+export const fliesCrosslines = (draft: Draft): boolean =>
+  draft.planner === "swath" || (linesOf(draft).length === 0 && isSpaced(draft));
+
+/** Settings that say where lines lie, which the lines of a plan say themselves. */
+const LINES_LIE: readonly string[] = [LINE_HEADING, "line_spacing_m"];
 
 /** What settings are called, where their names are not enough. */
 const LABELS: Readonly<Record<string, () => string>> = {
   [LINE_HEADING]: () => say("asked.courseOfTheLines"),
+  [KEEP_ORDER]: () => say("lines.inOrder"),
   line_spacing_m: () => say("asked.distanceOfTheLines"),
 };
 
@@ -53,6 +70,14 @@ export function optionsOf(planner: string, planners: readonly PlannerView[]): st
   return Object.keys(read).filter((name) => optionField(name) !== null);
 }
 
+/** The settings that the form shows for a draft. */
+export const shownOptions = (draft: Draft, planners: readonly PlannerView[]): string[] =>
+  optionsOf(draft.planner, planners).filter((name) =>
+    name === KEEP_ORDER
+      ? linesOf(draft).length > 0
+      : linesOf(draft).length === 0 || !LINES_LIE.includes(name),
+  );
+
 /** Another planner, with the settings that it reads, too: others it would refuse. */
 export function withPlanner(
   planner: string,
@@ -73,14 +98,20 @@ export function optionFault(name: string, text: string): string {
 }
 
 /** The settings to send: those that were typed, the distance of lines where the mission's length is said by it, and the trained controller with which a copied mission's planner flies. */
-export function typedOptions({ planner, options, base, spacing_m }: Draft): PlannerOptions {
+export function typedOptions(draft: Draft): PlannerOptions {
+  const { planner, options, base, spacing_m } = draft;
+  const isPlanned = linesOf(draft).length > 0;
   const typed = Object.entries(options).flatMap(([name, text]) => {
+    if (isPlanned && LINES_LIE.includes(name)) return [];
     const field = optionField(name);
     const value = field && text.trim() !== "" ? typedValue(field, text) : null;
     return value == null ? [] : [[name, value]];
   });
   const model = base.planner?.name === planner ? base.planner.options?.model : null;
-  const spaced = planner === EVEN_LINES && Number(spacing_m) > 0 ? { line_spacing_m: Number(spacing_m) } : {};
+  const spaced =
+    planner === EVEN_LINES && !isPlanned && Number(spacing_m) > 0
+      ? { line_spacing_m: Number(spacing_m) }
+      : {};
   return { ...Object.fromEntries(typed), ...spaced, ...(model ? { model } : {}) };
 }
 

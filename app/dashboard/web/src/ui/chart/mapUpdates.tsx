@@ -9,6 +9,7 @@ import type { Chart, Pin } from "../../map/canvas/chart";
 import type { Look } from "../../map/canvas/mapColours";
 import type { PlanLines } from "../../map/canvas/movingMarks";
 import { outliersOf, placeOf } from "../../map/marks/crossings";
+import { namedLines } from "../../map/marks/lines";
 import type { PlaceMark, Route, Track } from "../../map/marks/marks";
 import { cutAt } from "../../map/marks/plan";
 import { recoveryMarks, waitingCircle, wayHome } from "../../map/marks/recovery";
@@ -97,8 +98,13 @@ export function follow(chart: Chart): () => void {
       const present = mission.value;
       if ((present?.id ?? "") === shownMission) return;
       shownMission = present?.id ?? "";
-      const { area = null, keep_out = [] } = present?.spec ?? {};
-      chart.setMission(area, keep_out, present ? homesOf(present.spec).map(({ at }) => at) : []);
+      const { area = null, keep_out = [], survey_lines = [] } = present?.spec ?? {};
+      chart.setMission(
+        area,
+        keep_out,
+        namedLines(survey_lines),
+        present ? homesOf(present.spec).map(({ at }) => at) : [],
+      );
       // What lies over the map is laid out first.
       requestAnimationFrame(() => {
         chart.fit(overlaid);
@@ -239,7 +245,11 @@ function followDraft(chart: Chart): () => void {
   let typing: ReturnType<typeof setTimeout> | undefined;
   const stop = effect(() => {
     const areas = draftShapes.value?.areas ?? [];
-    chart.setDraft(areas, draftShapes.value?.keepOut ?? []);
+    chart.setDraft({
+      areas,
+      keepOut: draftShapes.value?.keepOut ?? [],
+      lines: draftShapes.value?.lines ?? [],
+    });
     const corners = JSON.stringify(areas.map(({ coordinates }) => coordinates));
     if (corners === shown) return;
     shown = corners;

@@ -1,9 +1,10 @@
 import "./AreaFields.css";
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import type { LngLat } from "../../api/types";
+import type { DrawingView, LngLat } from "../../api/types";
 import { areasIn, sizeOf } from "../../map/area";
-import { AREA_FILES, areaText } from "../../map/areaText";
+import { AREA_FILES, areaText, isAreaFile } from "../../map/areaText";
+import { whyNotCommand } from "../../state/access";
 import { withAreas } from "../../state/form/blocks";
 import { centred, cornersOf } from "../../state/form/draft";
 import { asTyped, withRings } from "../../state/form/places";
@@ -20,7 +21,18 @@ import {
 import { say } from "../../words/say";
 import { Button, FilesButton } from "../parts/Controls";
 import { ChartZones } from "./ChartZones";
+import { DrawingQuestions } from "./DrawingQuestions";
 import { Fault, Text, useForm } from "./Fields";
+import { useDrawingFile } from "./useDrawingFile";
+
+/** Those that the page does not read itself. */
+const DRAWING_FILES = ".dxf,.zip";
+
+/** The areas that the service found in a file, as GeoJSON. */
+const featuresOf = ({ areas }: DrawingView) => ({
+  type: "FeatureCollection",
+  features: areas.map(({ name, area }) => ({ type: "Feature", properties: { name }, geometry: area })),
+});
 
 /** Where to map: drawn on the map, typed as a rectangle, or read from a file; and where not to go. */
 export function AreaFields() {
@@ -63,10 +75,9 @@ export function AreaFields() {
     others.value = [];
     set({ source: "drawn", ring });
   };
-  const read = async ([file]: File[]) => {
-    if (!file) return;
+  const takeText = (name: string, text: string) => {
     try {
-      const found = areasIn(file.name, await areaText(file));
+      const found = areasIn(name, text);
       set(({ keepOut }) => {
         const zones = withRings(keepOut, found.keepOut);
         const stay = zones.length - found.keepOut.length;
@@ -74,6 +85,18 @@ export function AreaFields() {
         return { source: "drawn", ring: found.area, keepOut: zones };
       });
       others.value = found.others;
+    } catch (error) {
+      note.value = error instanceof Error ? error.message : String(error);
+    }
+  };
+  // Drawings and shapefiles are read by the service.
+  const drawn = useDrawingFile((found, name) => takeText(name, JSON.stringify(featuresOf(found))));
+  const read = async ([file]: File[]) => {
+    if (!file) return;
+    note.value = "";
+    if (!isAreaFile(file.name) && !whyNotCommand.peek()) return drawn.read(file);
+    try {
+      takeText(file.name, await areaText(file));
     } catch (error) {
       note.value = error instanceof Error ? error.message : String(error);
     }
@@ -96,10 +119,16 @@ export function AreaFields() {
         >
           {say("area.drawRectangle")}
         </Button>
-        <FilesButton accept={AREA_FILES} id="area-file" onFiles={(files) => void read(files)}>
-          {say("area.fromAFile")}
+        <FilesButton
+          accept={whyNotCommand.value ? AREA_FILES : `${AREA_FILES},${DRAWING_FILES}`}
+          id="area-file"
+          busy={drawn.busy}
+          onFiles={(files) => void read(files)}
+        >
+          {say(drawn.busy ? "lines.beingRead" : "area.fromAFile")}
         </FilesButton>
       </div>
+      <DrawingQuestions of={drawn} id="area" />
       {drawing.value ? (
         <p class="hint" role="status" data-testid="drawing" data-ready={drawingReady.value}>
           {drawing.value.shape === "polygon"

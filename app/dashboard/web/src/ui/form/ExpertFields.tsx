@@ -1,4 +1,4 @@
-import { LINE_HEADING, optionsOf, withPlanner } from "../../state/form/plannerOptions";
+import { LINE_HEADING, shownOptions, withPlanner } from "../../state/form/plannerOptions";
 import { say } from "../../words/say";
 import { Choice, same } from "../parts/Controls";
 import { Part, useForm } from "./Fields";
@@ -54,9 +54,7 @@ function Algorithm({ fault }: { fault: string }) {
           {say("expert.ofCannotBeUsed", { p: p.name, package: p.package, problem: p.problem })}
         </small>
       ))}
-      <PlannerOptionFields
-        names={optionsOf(draft.planner, planners).filter((name) => name !== LINE_HEADING)}
-      />
+      <PlannerOptionFields names={shownOptions(draft, planners).filter((name) => name !== LINE_HEADING)} />
       {fault ? <span class="fault">▲ {fault}</span> : null}
     </>
   );

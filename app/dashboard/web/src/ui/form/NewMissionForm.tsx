@@ -5,6 +5,7 @@ import { api, ServiceError } from "../../api/client";
 import type { LngLat, PlannerView } from "../../api/types";
 import { polygonOf } from "../../map/area";
 import { boundsOf } from "../../map/geo";
+import { namedLines } from "../../map/marks/lines";
 import type { PlaceMark } from "../../map/marks/marks";
 import { recoveryMarks } from "../../map/marks/recovery";
 import { placeOf } from "../../state/coordinates";
@@ -22,6 +23,7 @@ import {
   turnedInto,
   vehicleNames,
 } from "../../state/form/draft";
+import { linesOf } from "../../state/form/plannerOptions";
 import { createMissions, describeMission, said } from "../../state/session";
 import {
   copied,
@@ -88,6 +90,7 @@ export function NewMissionForm() {
         .filter(({ ring }) => ring.length > 2)
         .map(({ ring }) => polygonOf(ring)),
       keepOut: draft.value.keepOut.filter((zone) => zone.length > 2).map(polygonOf),
+      lines: namedLines(linesOf(draft.value)),
       marks: draftMarks(draft.value),
     };
   });

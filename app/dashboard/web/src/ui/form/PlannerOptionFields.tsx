@@ -14,9 +14,21 @@ export function PlannerOptionFields({ names }: { names: readonly string[] }) {
       {names.map((name) => {
         const field = optionField(name);
         if (!field) return null;
-        const { default: usual, description, enum: choices } = schemaOf(field);
+        const { type, default: usual, description, enum: choices } = schemaOf(field);
         const id = `option-${name}`;
         const text = draft.options[name] ?? "";
+        if (type === "boolean")
+          return (
+            <label key={name} class="check" title={description}>
+              <input
+                id={id}
+                type="checkbox"
+                checked={(text || String(usual)) === "true"}
+                onChange={(event) => change(name, String(event.currentTarget.checked))}
+              />
+              {field.label}
+            </label>
+          );
         return (
           <div key={name} class="field">
             <label for={id}>{field.label}</label>

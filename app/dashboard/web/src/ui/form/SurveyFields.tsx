@@ -9,6 +9,7 @@ import {
   blockTitle,
   canPlan,
   cornersOf,
+  type Draft,
   estimate,
   faultsOf,
   type LengthChoice,
@@ -18,10 +19,12 @@ import {
 } from "../../state/form/draft";
 import { FIELDS } from "../../state/form/missionFields";
 import {
+  EVEN_LINES,
   endsWithLines,
   fliesCrosslines,
   LINE_HEADING,
-  optionsOf,
+  linesOf,
+  shownOptions,
   withPlanner,
 } from "../../state/form/plannerOptions";
 import { distance, duration, fixed } from "../../state/format";
@@ -31,6 +34,7 @@ import { Forecast } from "../forecast/Forecast";
 import { Planned, usePlan } from "../forecast/Planned";
 import { Choice } from "../parts/Controls";
 import { Fault, Part, Text, useForm } from "./Fields";
+import { LineFields } from "./LineFields";
 import { PlannerOptionFields } from "./PlannerOptionFields";
 
 /** What the survey is to give: how sure, how complete, how long it may take; and what follows from that. */
@@ -119,18 +123,21 @@ function Coverage() {
           <Part of="crosslines" />
         </div>
       ) : null}
-      {optionsOf(draft.planner, planners).includes(LINE_HEADING) ? (
+      {shownOptions(draft, planners).includes(LINE_HEADING) ? (
         <PlannerOptionFields names={[LINE_HEADING]} />
       ) : null}
+      {draft.planner === EVEN_LINES ? <LineFields /> : null}
       <Fault field="planner" />
     </div>
   );
 }
 
-const lengths = (): readonly (readonly [LengthChoice, string])[] => [
+const lengths = (draft: Draft): readonly (readonly [LengthChoice, string])[] => [
   ["minutes", say("asked.minutesAtSea")],
   ["km_per_vehicle", say("asked.kilometresEach")],
-  ["spacing_m", say("asked.metresBetweenLines")],
+  linesOf(draft).length > 0
+    ? ["lines", say("asked.untilAllLinesAreFlown")]
+    : ["spacing_m", say("asked.metresBetweenLines")],
   ["steps", say("asked.steps")],
 ];
 
@@ -140,7 +147,7 @@ function Length() {
   const chosen = lengthChoiceOf(draft);
   return (
     <div class="pair">
-      {chosen === "spacing_m" ? (
+      {chosen === "lines" ? null : chosen === "spacing_m" ? (
         <Text field="spacing_m" label={say("asked.linesApartM")} numeric />
       ) : (
         <Part of="length" />
@@ -149,7 +156,7 @@ function Length() {
         {say("asked.lengthIn")}
         <Choice
           value={chosen}
-          options={lengths()}
+          options={lengths(draft)}
           id="field-length"
           onChoose={(choice) => set((present) => withLength(choice, present))}
         />
