@@ -42,6 +42,7 @@ def test_lines_of_a_plan_come_from_a_file_and_are_what_the_mission_flies(watched
     expect(by_id(page, "option-line_heading_deg")).to_have_count(0)
     by_id(page, "lines-as-drawn").check()
     expect(by_id(page, "planned-whole")).to_be_visible()
+    expect(by_id(page, "planned")).to_have_attribute("data-plan", "new")
     picture(page, "survey-lines")
     by_id(page, "field-name").fill("The client's lines")
     by_id(page, "create-mission").click()

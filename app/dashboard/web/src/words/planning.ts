@@ -142,10 +142,6 @@ export const PLANNING = {
   "lines.beingRead": { en: "Being read …", pt: "A ler …" },
   "lines.stopReading": { en: "Stop reading", pt: "Parar de ler" },
   "lines.readIt": { en: "Read it", pt: "Ler" },
-  "lines.fromFile": {
-    en: "{lines} {lines|line|lines} from {name}",
-    pt: "{lines} {lines|fiada|fiadas} de {name}",
-  },
   "lines.noneInFile": { en: "{name} holds no lines", pt: "{name} não contém fiadas" },
   "lines.given": {
     en: "{lines} {lines|line|lines} of a plan, {metres}: flown as {lines|it is|they are} given.",

@@ -9,6 +9,8 @@ import { stroke, trace } from "./shapes";
 const LABEL_PX = 11;
 /** Free room around a name. */
 const PADDING_PX = 4;
+/** So far off the vertical names begin to read from left to right, radians. */
+const LEANING = 0.1;
 
 export function paintPlannedLines(
   context: CanvasRenderingContext2D,
@@ -36,7 +38,7 @@ export function paintPlannedLines(
     taken.push({ x: middle.x, y: middle.y, radius });
     context.save();
     context.translate(middle.x, middle.y);
-    context.rotate(middle.angle);
+    context.rotate(upright(middle.angle));
     context.lineWidth = 3.2;
     context.setLineDash([]);
     context.strokeStyle = paper.casing;
@@ -46,6 +48,9 @@ export function paintPlannedLines(
     context.restore();
   }
 }
+
+/** Lines to the north, which are never quite that, all read upwards. */
+const upright = (angle: number): number => (angle > Math.PI / 2 - LEANING ? angle - Math.PI : angle);
 
 const lengthOf = (points: readonly Pixel[]): number =>
   points.slice(1).reduce((sum, [x, y], i) => {

@@ -27,10 +27,7 @@ export function LineFields() {
   const take = (found: DrawingView, name: string) => {
     const lines = linesIn(found);
     areas.value = areasOf(found);
-    notes.value = [
-      say(lines.length > 0 ? "lines.fromFile" : "lines.noneInFile", { name, lines: lines.length }),
-      ...found.notes,
-    ];
+    notes.value = lines.length > 0 ? found.notes : [say("lines.noneInFile", { name }), ...found.notes];
     if (lines.length === 0) return;
     const [first] = areas.peek();
     set((present) => ({

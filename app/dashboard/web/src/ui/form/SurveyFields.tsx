@@ -146,7 +146,7 @@ function Length() {
   const { draft, set } = useForm();
   const chosen = lengthChoiceOf(draft);
   return (
-    <div class="pair">
+    <div class={chosen === "lines" ? "" : "pair"}>
       {chosen === "lines" ? null : chosen === "spacing_m" ? (
         <Text field="spacing_m" label={say("asked.linesApartM")} numeric />
       ) : (
