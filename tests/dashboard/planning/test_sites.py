@@ -92,9 +92,7 @@ def test_surveys_that_cannot_be_compared_are_told_of_in_words(page: Page, servic
     for number in (1, 2):
         tide = {"level_m": 1.0, "source": "gauge"} if number == 2 else {}
         mission = service.post("/missions", mission_spec(name=f"Tide {number}", area=AREA, site=site, tide=tide))["id"]
-        service.post(
-            f"/missions/{mission}/measurements", {"items": soundings(60, start_s=START_S + number * DAY_S)}
-        )
+        service.post(f"/missions/{mission}/measurements", {"items": soundings(60, start_s=START_S + number * DAY_S)})
         service.act(mission, "abort")
         missions.append(mission)
         assert service.get(f"/sites/{site}/surveys")[number - 1]["surveyed"]

@@ -188,9 +188,7 @@ def test_casts_of_a_file_leave_those_that_another_operator_adds_in_that_second(
     sections = "".join(
         f"Section 2026-325 {hour:02d}:00:00 41:11:06N -8:42:15\n0 15{hour}0\n30 1506\n" for hour in (2, 3)
     )
-    by_id(page, "cast-file").set_input_files(
-        files=[text_file("day.svp", f"[SVP_VERSION_2]\nday.svp\n{sections}")]
-    )
+    by_id(page, "cast-file").set_input_files(files=[text_file("day.svp", f"[SVP_VERSION_2]\nday.svp\n{sections}")])
     expect(by_id(page, "cast-name")).to_have_value("day.svp")
     by_id(page, "cast-add").click()
     expect(listed).to_have_count(4)
