@@ -1,4 +1,4 @@
-"""On a phone, in either language, nothing in dialogs, the form and panes reaches beyond the window or is hard to press."""
+"""On a phone, in either language, nothing in dialogs, form and panes reaches beyond the window or is hard to press."""
 
 from collections.abc import Iterator
 

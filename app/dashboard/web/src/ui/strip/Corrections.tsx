@@ -49,9 +49,11 @@ export function Corrections() {
   });
   // What others change is shown, too.
   const changed = useComputed(() => view.value.events.findLast(({ kind }) => kind === "corrections")?.id);
+  const seen = useRef(changed.peek());
   useSignalEffect(() => {
     const id = selectedId.peek();
-    if (!id || changed.value === undefined || !answer.peek()) return;
+    if (!id || changed.value === seen.current) return;
+    seen.current = changed.value;
     ask(id, api.corrections).catch((error: unknown) => {
       if (selectedId.peek() === id) fault.value = said(error);
     });
