@@ -191,7 +191,9 @@ def test_casts_of_a_file_leave_those_that_another_operator_adds_in_that_second(
     )
     by_id(page, "cast-file").set_input_files(files=[text_file("day.svp", f"[SVP_VERSION_2]\nday.svp\n{sections}")])
     expect(by_id(page, "cast-name")).to_have_value("day.svp")
-    by_id(page, "cast-add").click()
+    with page.expect_response(lambda answer: answer.request.method == "POST") as sent:
+        by_id(page, "cast-add").click()
+    assert sent.value.ok, sent.value.text()
     expect(listed).to_have_count(4)
     names = ["theirs before", "theirs meanwhile", "day.svp 1", "day.svp 2"]
     for item, name in zip(listed.all(), names, strict=True):
