@@ -65,7 +65,8 @@ def export_site(
         typer.Option("--from", help="Mission of the earlier survey.", show_default="the one before the other"),
     ] = None,
     later: Annotated[
-        str | None, typer.Option("--to", help="Mission of the later survey.", show_default="the newest")
+        str | None,
+        typer.Option("--to", help="Mission of the later survey.", show_default="the newest that can be compared"),
     ] = None,
     confidence: Annotated[
         float, typer.Option(min=0.5, max=0.9999, help="Of unchanged ground this share is not called changed.")

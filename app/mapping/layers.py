@@ -256,7 +256,7 @@ LAYERS = {
         ),
         LayerKind(
             "flags",
-            "Landmarks",
+            "Known",
             "never seen, seen but not known well enough, known to the asked accuracy",
             "1",
             _flags,

@@ -37,6 +37,7 @@ from tests.support.storage.databases import Databases
 # what they are called, profiles go down, names of casts have a letter, times go on, steps were flown, lengths have one
 # unit, there is such a site, there is a reference grid to differ from, and such a mission to go on after.
 BEYOND_THE_SCHEMA = {
+    "addCasts",
     "changeSite",
     "createMission",
     "createSite",

@@ -33,9 +33,15 @@ _COMPARED = _MAPPED | problems("conflict")
 
 Site = Annotated[SiteId, Path(description="The site's id", examples=["0197a3c8-6f2e-7c41-9d0f-5b2f6f0c1a2b"])]
 _Earlier = Annotated[
-    SiteId | None, Query(alias="from", description="Mission of the earlier survey; default: the one before the other")
+    SiteId | None,
+    Query(
+        alias="from", description="Mission of the earlier survey; default: the one before the other, below its datum"
+    ),
 ]
-_Later = Annotated[SiteId | None, Query(alias="to", description="Mission of the later survey; default: the newest")]
+_Later = Annotated[
+    SiteId | None,
+    Query(alias="to", description="Mission of the later survey; default: the newest that can be compared"),
+]
 _Confidence = Annotated[
     float,
     Query(gt=0, lt=1, allow_inf_nan=False, description="Of unchanged ground this share is not called changed"),

@@ -19,7 +19,7 @@ from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.spec.systematic_errors import SystematicErrors
-from app.missions.spec.water import MOST_NAME, CastDescription, CastRules, SoundSpeed
+from app.missions.spec.water import MOST_NAME, CastDescription, CastRules, NewCasts, SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
 from app.missions.views.measurements.corrections import CastsView, CorrectionsView, TideCorrection
 from app.missions.views.measurements.systematic_errors import SystematicErrorsView
@@ -89,6 +89,20 @@ async def get_casts(service: Service, reader: Reader, mission: Mission, order: S
     with suppress(MapNotReadyError):
         await newest_map(mission, service.maps, patient=False)
     return await casts_view(mission, order)
+
+
+@router.post(
+    "/sound-speed/casts",
+    operation_id="addCasts",
+    summary="Add sound speed casts",
+    responses=_CHANGE | problems("conflict"),
+)
+async def add_casts(new: NewCasts, operator: Operator, mission: Mission) -> CorrectionsView:
+    """Add the casts of a file to those that there are, at any time, all or none: every sounding is corrected anew.
+
+    What others add meanwhile stays.
+    """
+    return await casts.add_casts(mission, new, operator.name)
 
 
 @router.put(

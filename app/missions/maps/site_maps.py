@@ -135,13 +135,14 @@ class SiteMap:
 
 @dataclass(frozen=True)
 class SiteChange:
-    """What changed at a site between two surveys."""
+    """What changed at a site between two surveys; ``left_out`` says in words which others were passed over, and why."""
 
     facts: SiteFacts
     change: Change
     earlier: Survey
     later: Survey
     surveys: tuple[Surveyed, Surveyed]
+    left_out: tuple[str, ...] = ()
 
     @property
     def last_colour_m(self) -> float:
@@ -180,7 +181,7 @@ class SiteChange:
         )
 
     def _notes(self) -> list[str]:
-        notes = []
+        notes = list(self.left_out)
         if INSTANTANEOUS_WATER_LEVEL in (survey.vertical_datum.epsg for survey in self.surveys):
             notes.append("the water level is not corrected: where it differed, every difference holds that as well")
         if not self.change.compared.any():

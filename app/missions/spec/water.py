@@ -157,6 +157,21 @@ class CastRules(Model):
     )
 
 
+class NewCasts(Model):
+    """Sound speed casts that are added to those that a mission has."""
+
+    casts: list[Cast] = Field(
+        min_length=1,
+        max_length=MOST_CASTS,
+        description="All of them are taken or none; one of a name that there is replaces that cast",
+    )
+    assumed_mps: ProfileSpeed | None = Field(
+        default=None,
+        description="Speed that is set in the sonars, m/s, for a mission's first casts; where it has casts it has to "
+        "be theirs. Null: theirs, or 1500",
+    )
+
+
 class SoundSpeed(Cast, CastRules):
     """Sound speed correction: every beam is followed through a cast's profile for the time that its sonar measured.
 

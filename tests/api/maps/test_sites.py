@@ -291,8 +291,39 @@ async def test_surveys_below_another_datum_are_not_mixed(client: httpx.AsyncClie
     assert [one["mission_id"] for one in known["surveys"]] == [second]
     refused = await client.get(f"/sites/{site}/changes")
     assert (refused.status_code, refused.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+    words = refused.json()["detail"]
+    assert words.startswith("no two of these surveys have depths below one datum: ")
+    assert words.count("below instantaneous water level") == words.count("below EPSG:5861") == 1
     assert (await client.put(f"/missions/{first}/tide", json={"level_m": 1.0})).status_code == 200
     assert (await client.get(f"/sites/{site}/changes")).status_code == 200
+
+
+@pytest.mark.slow
+async def test_the_newest_surveys_below_one_datum_are_compared_and_others_named(client: httpx.AsyncClient) -> None:
+    site = await new_site(client)
+    missions = [await surveyed(client, site, START_S + day * DAY_S) for day in range(4)]
+    for corrected in (0, 2):
+        answer = await client.put(f"/missions/{missions[corrected]}/tide", json={"level_m": 1.0})
+        assert answer.status_code == 200, answer.text
+
+    async def compared(**asked: str) -> tuple[list[int], list[str]]:
+        found = await get(client, f"/sites/{site}/changes", **asked)
+        ends = [missions.index(found[end]["mission_id"]) for end in ("earlier", "later")]
+        return ends, [note for note in found["notes"] if "is left out" in note]
+
+    ends, notes = await compared()
+    assert (ends, len(notes)) == ([1, 3], 1)
+    assert "its depths are below EPSG:5861" in notes[0]
+    assert (await compared(to=missions[2]))[0] == [0, 2]
+    ends, notes = await compared(**{"from": missions[0]})
+    assert (ends, len(notes)) == ([0, 2], 2)
+    assert await compared(**{"from": missions[3], "to": missions[1]}) == ([3, 1], [])
+    apart = {"from": missions[0], "to": missions[1]}
+    assert (await client.get(f"/sites/{site}/changes", params=apart)).status_code == 409
+    newest = await client.get(f"/sites/{site}/changes", params={"from": missions[3]})
+    assert (newest.status_code, newest.json()["errors"][0]["field"]) == (422, "to")
+    oldest = await client.get(f"/sites/{site}/changes", params={"to": missions[0]})
+    assert oldest.status_code == 404
 
 
 async def test_a_mission_that_begins_with_depths_below_another_datum_is_told_so(client: httpx.AsyncClient) -> None:

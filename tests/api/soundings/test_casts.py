@@ -162,6 +162,73 @@ async def test_casts_that_come_at_the_same_time_are_all_kept(client: httpx.Async
     assert await speeds(client, path) == [1500.0 + 5 * (hour // 2) for hour in range(10)]
 
 
+async def test_files_of_several_casts_that_two_operators_add_at_the_same_time_are_all_kept(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    await post(client, path, hourly(10))
+    casts = f"{path}/sound-speed/casts"
+
+    def section(name: str, number: int) -> dict[str, Any]:
+        hours = 2 * number + (1 if name == "b" else 0)
+        return cast(1500 + 5 * hours, hours) | {"name": f"{name} {number}", "source": f"{name}.svp"}
+
+    async def add(name: str) -> dict[str, Any]:
+        answer = await client.post(casts, json={"casts": [section(name, n) for n in range(5)], "assumed_mps": 1490})
+        assert answer.status_code == 200, answer.text
+        return dict(answer.json())
+
+    await asyncio.gather(add("a"), add("b"))
+    told = (await client.get(casts)).json()
+    assert [one["name"] for one in told["casts"]] == [f"{name} {n}" for n in range(5) for name in "ab"]
+    assert told["assumed_mps"] == 1490.0, "the speed set in the sonars comes with the first of all casts"
+    # Read once more, a file replaces its own casts only.
+    again = await client.post(casts, json={"casts": [section("b", 0) | {"profile": [[0, 1600]]}]})
+    speed = again.json()["sound_speed"]
+    assert len([speed, *speed["further"]]) == 10
+    told = (await client.get(casts)).json()
+    assert [(one["name"], one["profile"]) for one in told["casts"]][:2] == [
+        ("a 0", [[0.0, 1500.0]]),
+        ("b 0", [[0.0, 1600.0]]),
+    ]
+    events = (await client.get(f"{path}/events", headers={"Accept": "application/json"})).json()
+    words = [one["message"] for one in events if one["kind"] == "corrections"]
+    assert any(line.startswith("sound speed casts 'a 0', 'a 1', 'a 2', 'a 3', 'a 4' added by ") for line in words)
+    assert words[-1].startswith("sound speed cast 'b 0' replaced by ")
+
+
+async def test_of_several_casts_all_are_added_or_none(client: httpx.AsyncClient, path: str) -> None:
+    await post(client, path, hourly(3))
+    casts = f"{path}/sound-speed/casts"
+    named = [cast(1510, 0) | {"name": "one"}, cast(1520, 1, NEAR) | {"name": "two"}]
+    timeless = cast(1530, 2) | {"name": "three", "time": None}
+    far = cast(1530, 2, [100.0, 0.0]) | {"name": "three"}
+    for listed, field, words in (
+        ([*named, timeless], "casts.2.time", "cast 'three' has no time"),
+        ([*named, far], "casts.2.position", "nowhere near the area"),
+        ([*named, cast(1530, 2) | {"name": "two"}], "casts.2.name", "two casts are called 'two'"),
+        ([*named, cast(1530, 2) | {"name": "..."}], "casts.2.name", "is no name of a cast"),
+        ([*named, cast(99, 2) | {"name": "three"}], "casts.2.profile.0.1", ""),
+        ([], "casts", ""),
+    ):
+        answer = await client.post(casts, json={"casts": listed})
+        assert answer.status_code == 422, (listed, answer.text)
+        [error] = answer.json()["errors"]
+        assert error["field"] == field, error
+        assert words in error["message"], error
+    assert (await client.get(casts)).json()["casts"] == []
+    await put(client, f"{casts}/pier", cast(1510, 0) | {"time": None})
+    answer = await client.post(casts, json={"casts": named})
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "casts")
+    assert "cast 'pier' has no time" in answer.text
+    other = await client.post(casts, json={"casts": named, "assumed_mps": 1490})
+    assert (other.status_code, other.json()["type"]) == (409, "urn:bathyfleet:problem:conflict")
+    assert "1500 m/s is set in the sonars" in other.json()["detail"]
+    assert [one["name"] for one in (await client.get(casts)).json()["casts"]] == ["pier"]
+    await put(client, f"{casts}/pier", cast(1510, 0))
+    answer = await client.put(f"{casts}/second", json=cast(1520, 1, [100.0, 0.0]))
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "position")
+
+
 async def test_soundings_far_from_their_cast_and_casts_far_apart_are_told(client: httpx.AsyncClient, path: str) -> None:
     await post(client, path, [*hourly(10), *pings(range(20))])
     told = (await client.get(f"{path}/sound-speed/casts")).json()

@@ -1,5 +1,6 @@
 """What takes long says so, and keeps nothing else from being done."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,33 @@ def test_one_file_that_is_being_made_keeps_no_other_from_being_fetched(page: Pag
     assert late.value.suggested_filename.endswith(".csv")
     expect(by_id(page, "making")).to_be_hidden()
     expect(by_id(page, "file-soundings.csv")).to_be_enabled()
+
+
+def test_a_note_is_sent_once_and_what_is_typed_meanwhile_stays(page: Page, service: Service) -> None:
+    mission = service.create(name="Notes", steps=3)
+    show(page, mission)
+    by_id(page, "toggle-log").click()
+    held: list[Route] = []
+    page.route("**/notes", lambda route: held.append(route))
+    write, note = by_id(page, "write-note"), by_id(page, "note")
+    note.fill("battery changed")
+    note.press("Enter")
+    expect(write).to_have_attribute("aria-disabled", "true")
+    expect(write).to_have_css("cursor", "progress")
+    note.press("Enter")
+    write.click(force=True)
+    expect(write).to_be_focused()
+    note.fill("and the other one, too")
+    note.press("Enter")
+    held[0].continue_()
+    page.unroute("**/notes")
+    expect(write).not_to_have_attribute("aria-disabled", "true")
+    expect(note).to_have_value("and the other one, too")
+    note.press("Enter")
+    expect(note).to_have_value("")
+    expect(write).to_be_disabled()
+    by_id(page, "log-level").select_option("notes")
+    expect(by_id(page, "log").locator("li .message")).to_have_text(
+        [re.compile("and the other one, too"), re.compile("battery changed")]
+    )
+    assert len(held) == 1

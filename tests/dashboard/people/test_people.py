@@ -5,11 +5,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pypdfium2
 import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
+from tests.support.api.rest import soundings
 from tests.support.dashboard.browser import PATIENCE_MS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_state, need_axe, show, violations
@@ -170,15 +172,38 @@ def test_a_download_is_cancelled_without_a_complaint(shared: Page) -> None:
 
 def test_a_printed_page_has_the_map_and_nothing_to_press(shared: Page) -> None:
     page = shared
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print")
-    for shown in ("mission-name", "map", "legend", "card-rover"):
+    for shown in ("mission-name", "printed-map", "card-rover"):
         if page.get_by_test_id(shown).count():
             expect(by_id(page, shown).first).to_be_visible()
-    for hidden in ("abort", "toggle-missions", "toggle-files", "measure"):
+    for hidden in ("abort", "toggle-missions", "toggle-files", "measure", "map"):
         expect(by_id(page, hidden)).not_to_be_visible()
     page.emulate_media(media="screen")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    expect(by_id(page, "printed-map")).to_have_count(0)
+    expect(by_id(page, "map")).to_be_visible()
     sheets = pypdfium2.PdfDocument(io.BytesIO(page.pdf(print_background=True, prefer_css_page_size=True)))
     assert len(sheets) <= 2
+
+
+@pytest.mark.parametrize("theme", ["dark", "night"])
+def test_what_is_printed_is_on_white_paper_in_every_theme(page: Page, service: Service, theme: str) -> None:
+    page.add_init_script(f"localStorage.setItem('bathyfleet.theme', '\"{theme}\"')")
+    mission = service.create(name=f"Printed by {theme}", vehicles=[{"name": "rover", "kind": "rest"}])
+    service.post(f"/missions/{mission}/measurements", {"items": soundings(20)})
+    show(page, mission)
+    by_id(page, "toggle-corrections").click()
+    expect(by_id(page, "corrections-tide")).to_be_visible()
+    sheets = pypdfium2.PdfDocument(io.BytesIO(page.pdf(prefer_css_page_size=True)))
+    pictures = [np.asarray(sheets[i].render(scale=0.5).to_pil().convert("L")) for i in range(len(sheets))]
+    assert all(np.median(picture) == 255 for picture in pictures)
+    assert all((picture < 90).mean() < 0.1 for picture in pictures), "neither map nor text lies on dark ground"
+    text = "".join(sheet.get_textpage().get_text_range() for sheet in sheets)
+    assert "Water level" in text
+    assert "Apply" not in text
+    expect(page.locator("html")).to_have_attribute("data-theme", theme)
+    expect(by_id(page, "printed-map")).to_have_count(0)
 
 
 def test_the_first_mission_is_guided_by_what_is_really_done(page: Page, service: Service) -> None:

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import httpx
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
@@ -79,6 +79,23 @@ def test_a_token_that_an_earlier_page_kept_is_used_once_and_removed(page: Page, 
     assert tokens["viewer"] not in kept_by_scripts(page)
     page.reload()
     expect(page.get_by_test_id("account")).to_contain_text("the viewer")
+
+
+def test_signing_in_is_asked_for_once_and_says_that_it_is_on_its_way(page: Page, tokens: dict[str, str]) -> None:
+    page.goto(f"/#/missions/{tokens['mission']}")
+    held: list[Route] = []
+    token, send = page.get_by_test_id("token"), page.get_by_test_id("send-token")
+    expect(send).to_be_disabled()
+    token.fill(tokens["viewer"])
+    page.route("**/session", lambda route: held.append(route) if route.request.method == "POST" else route.continue_())
+    token.press("Enter")
+    expect(send).to_have_text("Signing in…")
+    expect(send).to_have_attribute("aria-disabled", "true")
+    token.press("Enter")
+    send.click(force=True)
+    held[0].continue_()
+    expect(page.get_by_test_id("account")).to_contain_text("viewer")
+    assert len(held) == 1
 
 
 def test_a_viewer_sees_what_he_may_not_do_and_signs_out(page: Page, tokens: dict[str, str]) -> None:

@@ -86,6 +86,33 @@ def test_what_is_known_of_a_site_is_shown_and_saved(page: Page, service: Service
     expect(by_id(page, "mission-name")).to_have_text("Day 1")
 
 
+def test_surveys_that_cannot_be_compared_are_told_of_in_words(page: Page, service: Service) -> None:
+    site = service.post("/sites", {"name": "Tidal quay", "area": AREA, "cell_m": 2.0})["id"]
+    missions = []
+    for number in (1, 2):
+        tide = {"level_m": 1.0, "source": "gauge"} if number == 2 else {}
+        mission = service.post("/missions", mission_spec(name=f"Tide {number}", area=AREA, site=site, tide=tide))["id"]
+        service.post(f"/missions/{mission}/measurements", {"items": soundings(60, start_s=START_S + number * DAY_S)})
+        service.act(mission, "abort")
+        missions.append(mission)
+        assert service.get(f"/sites/{site}/surveys")[number - 1]["surveyed"]
+    page.goto("/")
+    by_id(page, "open-sites").click()
+    shown = by_id(page, "site-view").get_by_role("region", name="Changes", exact=True)
+    expect(shown.get_by_role("alert")).to_contain_text("no two of these surveys have depths below one datum")
+    expect(shown.get_by_role("alert")).to_contain_text("Tide 1 below instantaneous water level")
+    expect(by_id(page, "changes-from")).to_have_value("")
+    third = service.post("/missions", mission_spec(name="Tide 3", area=AREA, site=site))["id"]
+    service.post(f"/missions/{third}/measurements", {"items": soundings(60, start_s=START_S + 3 * DAY_S)})
+    service.act(third, "abort")
+    assert service.get(f"/sites/{site}/surveys")[2]["surveyed"]
+    by_id(page, "sites-close").click()
+    by_id(page, "open-sites").click()
+    expect(by_id(page, "changes")).to_contain_text("Tide 3")
+    expect(by_id(page, "changes-from")).to_have_value(missions[0])
+    expect(shown).to_contain_text("Tide 2 is left out: its depths are below EPSG:5861")
+
+
 def test_a_site_is_changed_and_an_empty_one_deleted(page: Page, service: Service) -> None:
     site = service.post("/sites", {"name": "Quay", "area": AREA, "cell_m": 2.0})["id"]
     page.goto("/")

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from playwright.sync_api import FilePayload, expect
+from playwright.sync_api import FilePayload, Route, expect
 
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
@@ -121,7 +121,7 @@ def test_casts_are_added_from_files_changed_and_removed(watched: Watched, servic
     expect(by_id(page, "cast-time")).to_have_value("2026-11-20 21:00:30")
     by_id(page, "cast-file").set_input_files(files=[text_file("again.asvp", morning)])
     by_id(page, "cast-name").fill("morning.asvp")
-    with page.expect_response(lambda answer: answer.request.method == "PUT"):
+    with page.expect_response(lambda answer: answer.request.method == "POST"):
         by_id(page, "cast-add").click()
     assert service.get(corrections)["sound_speed"]["source"] == "again.asvp", "the file that it was read from last"
 
@@ -161,3 +161,42 @@ def test_casts_are_added_from_files_changed_and_removed(watched: Watched, servic
     listed.nth(0).get_by_role("button", name="Remove").click()
     expect(listed).to_have_count(1)
     assert service.get(corrections)["sound_speed"]["name"] == "noon"
+
+
+def test_casts_of_a_file_leave_those_that_another_operator_adds_in_that_second(
+    watched: Watched, service: Service, surveyed: str
+) -> None:
+    page, casts = watched.page, f"/missions/{surveyed}/sound-speed/casts"
+    show(page, surveyed)
+    by_id(page, "toggle-corrections").click()
+    listed, pane = by_id(page, "cast"), by_id(page, "corrections")
+
+    def other(name: str, hour: int) -> None:
+        one = {"name": name, "profile": [[0, 1500 + hour]], "time": f"2026-11-21T{hour:02d}:30:00Z"}
+        service.post(casts, {"casts": [one]})
+
+    # What others add is shown without being asked for.
+    other("theirs before", 0)
+    expect(listed).to_have_count(1)
+    expect(listed).to_contain_text("theirs before")
+
+    def late(route: Route) -> None:
+        if route.request.method == "POST":
+            other("theirs meanwhile", 1)
+        route.continue_()
+
+    page.route("**/sound-speed/**", late)
+    sections = "".join(
+        f"Section 2026-325 {hour:02d}:00:00 41:11:06N -8:42:15\n0 15{hour}0\n30 1506\n" for hour in (2, 3)
+    )
+    by_id(page, "cast-file").set_input_files(files=[text_file("day.svp", f"[SVP_VERSION_2]\nday.svp\n{sections}")])
+    expect(by_id(page, "cast-name")).to_have_value("day.svp")
+    with page.expect_response(lambda answer: answer.request.method == "POST") as sent:
+        by_id(page, "cast-add").click()
+    assert sent.value.ok, sent.value.text()
+    expect(listed).to_have_count(4)
+    names = ["theirs before", "theirs meanwhile", "day.svp 1", "day.svp 2"]
+    for item, name in zip(listed.all(), names, strict=True):
+        expect(item).to_contain_text(name)
+    expect(pane.get_by_role("alert")).to_have_count(0)
+    assert [one["name"] for one in service.get(casts)["casts"]] == names

@@ -5,14 +5,14 @@ import { effect } from "@preact/signals";
 import { render } from "preact";
 import { findCharts } from "./state/device/baseMap";
 import { startSession } from "./state/session";
-import { isDark, theme } from "./state/store";
+import { isDark, printing, theme } from "./state/store";
 import { askBeforeLeaving } from "./state/uploads";
 import { App } from "./ui/App";
 
 effect(() => {
   const { value } = theme;
-  document.documentElement.dataset.theme =
-    value === "contrast" || value === "night" ? value : isDark.value ? "dark" : "light";
+  const own = !printing.value && (value === "contrast" || value === "night") ? value : null;
+  document.documentElement.dataset.theme = own ?? (isDark.value ? "dark" : "light");
 });
 startSession();
 askBeforeLeaving();

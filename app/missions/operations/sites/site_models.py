@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -125,7 +125,9 @@ class SiteModels:
     async def changes(
         self, site_id: str, earlier: str | None = None, later: str | None = None, confidence: float = 0.95
     ) -> SiteChange:
-        """Return what changed between the surveys of two missions; by default the newest and the one before it.
+        """Return what changed between the surveys of two missions.
+
+        By default these are the newest survey that can be compared and the one before it with which it can.
 
         Raises
         ------
@@ -134,7 +136,7 @@ class SiteModels:
         """
         missions, rows = await self._complete(site_id)
         rows = [row for row in rows if row.summary["cells"]]
-        known = {row.mission_id: row for row in rows}
+        known = {row.mission_id for row in rows}
         for field, mission in (("from", earlier), ("to", later)):
             if mission is not None and mission not in known:
                 if mission in {one.id for one in missions}:
@@ -142,23 +144,11 @@ class SiteModels:
                         f"{field}: mission {mission} has found no depth yet", "wait until it has ended"
                     )
                 raise InvalidRequestError(field, f"{mission!r} is no mission of the site", "see the site's surveys")
-        second = known[later] if later is not None else next((row for row in reversed(rows)), None)
-        if earlier is None and second is not None:
-            place = rows.index(second)
-            first = rows[place - 1] if place else None
-        else:
-            first = known.get(earlier or "")
-        if first is None or second is None:
-            raise MapNotReadyError("the site has no two surveys to compare", "finish another mission of the site")
-        if first.mission_id == second.mission_id:
-            raise InvalidRequestError("to", "it is the same survey as from", "give another mission")
+        first, second = _comparable(rows, earlier, later)
         pair = (_surveyed(first), _surveyed(second))
-        if pair[0].vertical_datum.epsg != pair[1].vertical_datum.epsg:
-            raise ConflictError(
-                f"depths of one are below {pair[0].vertical_datum.statement}, of the other below "
-                f"{pair[1].vertical_datum.statement}",
-                "correct both to one datum: PUT /api/v1/missions/{id}/tide",
-            )
+        # Two that were asked for leave nothing out.
+        passed = rows if earlier is None or later is None else []
+        notes = [_left_out(row) for row in passed[rows.index(first) :] if not _same_datum(row, first)]
         async with self._database.reading() as session:
             spec = SiteSpec.model_validate((await stored_site(session, site_id)).spec)
             contents = await site_queries.contents(session, [one.mission_id for one in pair])
@@ -166,7 +156,7 @@ class SiteModels:
         def compute() -> SiteChange:
             facts = _facts(site_id, spec)
             before, after = (_placed(contents[one.mission_id][1], facts) for one in pair)
-            return SiteChange(facts, compare(before, after, confidence), before, after, pair)
+            return SiteChange(facts, compare(before, after, confidence), before, after, pair, tuple(notes))
 
         async with self._fusing:
             return await asyncio.to_thread(compute)
@@ -276,6 +266,50 @@ def _counting(rows: Sequence[SiteSurveyRow]) -> list[SiteSurveyRow]:
     """Return the surveys that count: those whose depths are below the datum of the newest."""
     found = [row for row in rows if row.summary["cells"]]
     return [row for row in found if row.summary["datum_epsg"] == found[-1].summary["datum_epsg"]]
+
+
+def _same_datum(one: SiteSurveyRow, other: SiteSurveyRow) -> bool:
+    return bool(one.summary["datum_epsg"] == other.summary["datum_epsg"])
+
+
+def _left_out(row: SiteSurveyRow) -> str:
+    """Return in words that a survey is not compared, and why."""
+    return f"{row.mission_name} is left out: its depths are below {row.summary['vertical_datum']}"
+
+
+def _pairs(
+    rows: Sequence[SiteSurveyRow], earlier: str | None, later: str | None
+) -> Iterator[tuple[SiteSurveyRow, SiteSurveyRow]]:
+    """Yield what may be compared where datums allow it, the newest first; of two that are given these alone."""
+    for place in reversed(range(len(rows))):
+        if later in (None, rows[place].mission_id):
+            before = rows if earlier is not None and later is not None else rows[:place]
+            for first in reversed(before):
+                if earlier in (None, first.mission_id):
+                    yield first, rows[place]
+
+
+def _comparable(
+    rows: Sequence[SiteSurveyRow], earlier: str | None, later: str | None
+) -> tuple[SiteSurveyRow, SiteSurveyRow]:
+    """Return the newest two surveys whose depths are below one datum, with those that are given.
+
+    Raises MapNotReadyError, InvalidRequestError, ConflictError.
+    """
+    if earlier is not None and earlier == (later or rows[-1].mission_id):
+        raise InvalidRequestError("to", "it is the same survey as from", "give another mission")
+    pairs = list(_pairs(rows, earlier, later))
+    if not pairs:
+        raise MapNotReadyError("the site has no two surveys to compare", "finish another mission of the site")
+    for pair in pairs:
+        if _same_datum(*pair):
+            return pair
+    asked = {row.mission_id: row for pair in pairs for row in pair}.values()
+    below = "; ".join(f"{row.mission_name} below {row.summary['vertical_datum']}" for row in asked)
+    raise ConflictError(
+        f"no two of these surveys have depths below one datum: {below}",
+        "correct two of them to one datum, with a water level or a tide table: PUT /api/v1/missions/{id}/tide",
+    )
 
 
 def _surveyed(row: SiteSurveyRow) -> Surveyed:

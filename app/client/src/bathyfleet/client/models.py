@@ -1325,6 +1325,17 @@ class MissionView(Model):
     """Share of all metres flown that led along planned legs; null while nothing was flown."""
 
 
+class NewCasts(Model):
+    """Sound speed casts that are added to those that a mission has."""
+
+    casts: list[Cast]
+    """All of them are taken or none; one of a name that there is replaces that cast"""
+    assumed_mps: float | None = None
+    """Speed that is set in the sonars, m/s, for a mission's first casts; where it has casts it has to be theirs.
+    Null: theirs, or 1500
+    """
+
+
 class NoteRequest(Model):
     """What the next watch should know."""
 

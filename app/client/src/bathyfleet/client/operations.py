@@ -291,9 +291,9 @@ class Operations(ABC):
         Parameters
         ----------
         from_ : str
-            Mission of the earlier survey; default: the one before the other
+            Mission of the earlier survey; default: the one before the other, below its datum
         to : str
-            Mission of the later survey; default: the newest
+            Mission of the later survey; default: the newest that can be compared
         confidence : float, default 0.95
             Of unchanged ground this share is not called changed
         """
@@ -329,9 +329,9 @@ class Operations(ABC):
         Parameters
         ----------
         from_ : str
-            Mission of the earlier survey; default: the one before the other
+            Mission of the earlier survey; default: the one before the other, below its datum
         to : str
-            Mission of the later survey; default: the newest
+            Mission of the later survey; default: the newest that can be compared
         confidence : float, default 0.95
             Of unchanged ground this share is not called changed
         """
@@ -502,6 +502,15 @@ class Operations(ABC):
             f"/missions/{part(mission_id)}/sound-speed/casts",
             models.CastsView,
             query={"order": order},
+        ))
+
+    def add_casts(self, mission_id: str, body: models.NewCasts | Mapping[str, Any]) -> models.CorrectionsView:
+        """Add sound speed casts: ``POST /missions/{mission_id}/sound-speed/casts``."""
+        return self._call(Call[models.CorrectionsView](
+            "POST",
+            f"/missions/{part(mission_id)}/sound-speed/casts",
+            models.CorrectionsView,
+            body=body,
         ))
 
     def set_cast(
@@ -1892,9 +1901,9 @@ class AsyncOperations(ABC):
         Parameters
         ----------
         from_ : str
-            Mission of the earlier survey; default: the one before the other
+            Mission of the earlier survey; default: the one before the other, below its datum
         to : str
-            Mission of the later survey; default: the newest
+            Mission of the later survey; default: the newest that can be compared
         confidence : float, default 0.95
             Of unchanged ground this share is not called changed
         """
@@ -1935,9 +1944,9 @@ class AsyncOperations(ABC):
         Parameters
         ----------
         from_ : str
-            Mission of the earlier survey; default: the one before the other
+            Mission of the earlier survey; default: the one before the other, below its datum
         to : str
-            Mission of the later survey; default: the newest
+            Mission of the later survey; default: the newest that can be compared
         confidence : float, default 0.95
             Of unchanged ground this share is not called changed
         """
@@ -2116,6 +2125,15 @@ class AsyncOperations(ABC):
             f"/missions/{part(mission_id)}/sound-speed/casts",
             models.CastsView,
             query={"order": order},
+        ))
+
+    async def add_casts(self, mission_id: str, body: models.NewCasts | Mapping[str, Any]) -> models.CorrectionsView:
+        """Add sound speed casts: ``POST /missions/{mission_id}/sound-speed/casts``."""
+        return await self._call(Call[models.CorrectionsView](
+            "POST",
+            f"/missions/{part(mission_id)}/sound-speed/casts",
+            models.CorrectionsView,
+            body=body,
         ))
 
     async def set_cast(

@@ -6,7 +6,6 @@ import type {
   AlarmReport,
   AlarmView,
   Budget,
-  CastDescription,
   CastRules,
   CastsView,
   ChangesView,
@@ -26,6 +25,7 @@ import type {
   MissionAction,
   MissionSummary,
   MissionView,
+  NewCasts,
   NewMission,
   NewSite,
   OrderView,
@@ -201,9 +201,6 @@ function post<T>(path: string, body?: unknown, patience = ORDERED): Promise<T> {
   );
 }
 
-const castPath = (id: string, name: string) =>
-  `${missionPath(id)}/sound-speed/casts/${encodeURIComponent(name)}`;
-
 const put = <T>(path: string, body: unknown): Promise<T> =>
   request<T>(
     path,
@@ -219,7 +216,7 @@ const vehiclePath = (id: string, name: string) => `${missionPath(id)}/vehicles/$
 
 const sitePath = (id: string, part = "") => `/sites/${encodeURIComponent(id)}${part && `/${part}`}`;
 
-/** Which two surveys are compared, by their missions; empty: the newest and the one before it. */
+/** Which two surveys are compared, by their missions; empty: the newest that can be. */
 export interface Compared {
   from: string;
   to: string;
@@ -227,8 +224,10 @@ export interface Compared {
 
 export const NEWEST_TWO: Compared = { from: "", to: "" };
 
-const between = ({ from, to }: Compared): string =>
-  from && to ? `?${new URLSearchParams({ from, to })}` : "";
+function between(compared: Compared): string {
+  const given = Object.entries(compared).filter(([, mission]) => mission !== "");
+  return given.length > 0 ? `?${new URLSearchParams(given)}` : "";
+}
 
 /** A file on its way: `onBytes` is told how much has gone. */
 export interface Sending {
@@ -335,10 +334,12 @@ export const api = {
   deleteSoundSpeed: (id: string) =>
     request<CorrectionsView>(`${missionPath(id)}/sound-speed`, { method: "DELETE" }),
   casts: (id: string) => request<CastsView>(`${missionPath(id)}/sound-speed/casts`),
-  setCast: (id: string, name: string, cast: CastDescription) =>
-    put<CorrectionsView>(castPath(id, name), cast),
+  addCasts: (id: string, casts: NewCasts) =>
+    post<CorrectionsView>(`${missionPath(id)}/sound-speed/casts`, casts, STORED),
   deleteCast: (id: string, name: string) =>
-    request<CorrectionsView>(castPath(id, name), { method: "DELETE" }),
+    request<CorrectionsView>(`${missionPath(id)}/sound-speed/casts/${encodeURIComponent(name)}`, {
+      method: "DELETE",
+    }),
   setCastRule: (id: string, rules: CastRules) =>
     put<CorrectionsView>(`${missionPath(id)}/sound-speed/rule`, rules),
   logs: (id: string) => poll<LogView[]>(`${missionPath(id)}/logs`),

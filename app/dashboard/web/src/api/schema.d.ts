@@ -768,7 +768,13 @@ export interface paths {
          */
         get: operations["getCasts"];
         put?: never;
-        post?: never;
+        /**
+         * Add sound speed casts
+         * @description Add the casts of a file to those that there are, at any time, all or none: every sounding is corrected anew.
+         *
+         *     What others add meanwhile stays.
+         */
+        post: operations["addCasts"];
         delete?: never;
         options?: never;
         head?: never;
@@ -4889,6 +4895,22 @@ export interface components {
              * @description Share of all metres flown that led along planned legs; null while nothing was flown.
              */
             readonly efficiency_pct: number | null;
+        };
+        /**
+         * NewCasts
+         * @description Sound speed casts that are added to those that a mission has.
+         */
+        NewCasts: {
+            /**
+             * Casts
+             * @description All of them are taken or none; one of a name that there is replaces that cast
+             */
+            casts: components["schemas"]["Cast"][];
+            /**
+             * Assumed Mps
+             * @description Speed that is set in the sonars, m/s, for a mission's first casts; where it has casts it has to be theirs. Null: theirs, or 1500
+             */
+            assumed_mps?: number | null;
         };
         /**
          * NodeState
@@ -11331,9 +11353,9 @@ export interface operations {
     getChanges: {
         parameters: {
             query?: {
-                /** @description Mission of the earlier survey; default: the one before the other */
+                /** @description Mission of the earlier survey; default: the one before the other, below its datum */
                 from?: string;
-                /** @description Mission of the later survey; default: the newest */
+                /** @description Mission of the later survey; default: the newest that can be compared */
                 to?: string;
                 /** @description Of unchanged ground this share is not called changed */
                 confidence?: number;
@@ -11493,9 +11515,9 @@ export interface operations {
     getChangesFile: {
         parameters: {
             query?: {
-                /** @description Mission of the earlier survey; default: the one before the other */
+                /** @description Mission of the earlier survey; default: the one before the other, below its datum */
                 from?: string;
-                /** @description Mission of the later survey; default: the newest */
+                /** @description Mission of the later survey; default: the newest that can be compared */
                 to?: string;
                 /** @description Of unchanged ground this share is not called changed */
                 confidence?: number;
@@ -12697,6 +12719,132 @@ export interface operations {
             };
             /** @description A file of pings is missing or damaged */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    addCasts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewCasts"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -78,7 +78,7 @@ export type ImportOptions = Record<
 export type TideCorrection = Schemas["TideCorrection"];
 export type CastsView = Complete<Schemas["CastsView"]>;
 export type CastView = Complete<Schemas["CastView"]>;
-export type CastDescription = Schemas["CastDescription"];
+export type NewCasts = Schemas["NewCasts"];
 export type CastRules = Schemas["CastRules"];
 export type SoundSpeed = Schemas["SoundSpeed"];
 export type SystematicErrorsView = Complete<Schemas["SystematicErrorsView"]>;
@@ -134,6 +134,8 @@ export type NewMission = Pick<Schemas["MissionSpec"], "name" | "area" | "keep_ou
     "goal" | "goal_radius_m" | "entry" | "window_s" | "safety_m" | "scanner" | "obstacles"
   >;
   tide?: Partial<Schemas["Tide"]>;
+  sound_speed?: Schemas["SoundSpeed"] | null;
+  systematic_errors?: Partial<Schemas["SystematicErrors"]>;
   recovery?: { point: LngLat } & Partial<Schemas["Recovery"]>;
 };
 

@@ -166,8 +166,12 @@ const systemDark = signal(matchMedia("(prefers-color-scheme: dark)").matches);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (e) => {
   systemDark.value = e.matches;
 });
-export const isDark = computed(() =>
-  theme.value === "system" ? systemDark.value : theme.value === "dark" || theme.value === "night",
+/** Whether the page is being put on paper, which is white. */
+export const printing = signal(false);
+export const isDark = computed(
+  () =>
+    !printing.value &&
+    (theme.value === "system" ? systemDark.value : theme.value === "dark" || theme.value === "night"),
 );
 
 /** What maps can show, as the service says; empty until its first answer. */

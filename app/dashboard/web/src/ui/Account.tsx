@@ -74,6 +74,8 @@ export function AccountDialog() {
   );
 }
 
+const SIGN_IN_FORM = "sign-in-form";
+
 /** Asks for an access token, which is tried once and kept nowhere. */
 export function SignIn() {
   const text = useSignal("");
@@ -81,6 +83,7 @@ export function SignIn() {
   const sending = useSignal(false);
   const why = signedOut.value;
   const submit = async () => {
+    if (sending.peek()) return;
     sending.value = true;
     fault.value = "";
     try {
@@ -93,6 +96,7 @@ export function SignIn() {
   };
   return (
     <form
+      id={SIGN_IN_FORM}
       class="notice sign-in"
       data-testid="sign-in"
       onSubmit={(event) => {
@@ -108,9 +112,15 @@ export function SignIn() {
         {say("account.accessToken")}
         <Typed text={text} id="token" type="password" autocomplete="current-password" />
       </label>
-      <button type="submit" class="command primary" disabled={sending.value || text.value.trim() === ""}>
+      <Button
+        id="send-token"
+        kind="command primary"
+        disabled={text.value.trim() === ""}
+        busy={sending.value}
+        form={SIGN_IN_FORM}
+      >
         {sending.value ? say("account.signingIn") : say("account.signIn2")}
-      </button>
+      </Button>
       {fault.value ? (
         <p class="fault" role="alert" data-testid="sign-in-fault">
           ▲ {fault.value}

@@ -278,7 +278,7 @@ export const FRAME = {
   "bottomStrip.travelled": { en: "Travelled", pt: "Percorrido" },
   "bottomStrip.moreAboutThisMission": { en: "More about this mission", pt: "Mais sobre esta missão" },
   "bottomStrip.charts": { en: "Charts", pt: "Gráficos" },
-  "bottomStrip.rejected": { en: "Rejected{it}", pt: "Rejeitadas{it}" },
+  "bottomStrip.rejected": { en: "Rejected soundings{it}", pt: "Sondas rejeitadas{it}" },
   "bottomStrip.files": { en: "Files", pt: "Ficheiros" },
   "bottomStrip.compare": { en: "Compare", pt: "Comparar" },
   "bottomStrip.log": { en: "Log {it}", pt: "Registo {it}" },

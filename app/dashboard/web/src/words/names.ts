@@ -18,7 +18,7 @@ export const NAMES = {
   "layer.depth": { en: "Depth", pt: "Profundidade" },
   "layer.uncertainty": { en: "Uncertainty", pt: "Incerteza" },
   "layer.count": { en: "Soundings", pt: "Sondas" },
-  "layer.flags": { en: "Landmarks", pt: "Marcas" },
+  "layer.flags": { en: "Known", pt: "Conhecido" },
   "layer.sounded": { en: "Sounded", pt: "Sondado" },
   "layer.density": { en: "Density", pt: "Densidade" },
   "layer.slope": { en: "Slope", pt: "Declive" },
@@ -34,6 +34,6 @@ export const NAMES = {
   "choice.return": { en: "return", pt: "regressar" },
   "choice.stop": { en: "stop", pt: "parar" },
   "landmark.unseen": { en: "never seen", pt: "nunca visto" },
-  "landmark.visible": { en: "visible", pt: "visível" },
-  "landmark.accurate": { en: "accurate", pt: "exato" },
+  "landmark.visible": { en: "seen", pt: "visto" },
+  "landmark.accurate": { en: "known as asked", pt: "conhecido como pedido" },
 } as const;

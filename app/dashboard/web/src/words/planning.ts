@@ -171,7 +171,7 @@ export const PLANNING = {
     pt: "A maior incerteza vertical da S-44 da OHI onde é mais exigente, em água sem profundidade. Um mapa por si só não reivindica nenhuma ordem",
   },
   "asked.standardDeviation": { en: "Standard deviation, {unit}", pt: "Desvio padrão, {unit}" },
-  "asked.coverage": { en: "Coverage", pt: "Cobertura" },
+  "asked.surveyLines": { en: "Survey lines", pt: "Fiadas" },
   "asked.plannedBySeeExpertSettings": {
     en: "Planned by {planner}, see expert settings.",
     pt: "Planeada por {planner}, ver definições avançadas.",
@@ -347,6 +347,10 @@ export const PLANNING = {
   "mission.gauge": { en: "gauge", pt: "marégrafo" },
   "mission.table": { en: "Table: {tideSource}", pt: "Tabela: {tideSource}" },
   "mission.tableTid": { en: "Table (.tid)", pt: "Tabela (.tid)" },
+  "mission.castsAndLevelsStay": {
+    en: "Sound speed casts and water levels belong to the day of the survey: those of the mission that is repeated are left out. Give this one's own here or later in Corrections.",
+    pt: "Os perfis de velocidade do som e os níveis da água são do dia do levantamento: os da missão repetida ficam de fora. Indique os desta aqui ou mais tarde em Correções.",
+  },
   "mission.tidesCanBeSetAndChanged": {
     en: "Tides can be set and changed at any time; soundings keep their raw values.",
     pt: "As marés podem ser dadas e mudadas em qualquer altura; as sondas mantêm os valores em bruto.",
@@ -528,8 +532,8 @@ export const PLANNING = {
   },
   "draft.fullCoverage": { en: "Full coverage", pt: "Cobertura total" },
   "draft.linesAsFarApartAsThe": {
-    en: "Lines as far apart as the measured depth lets swath sonars see, then what was missed. Needs a multibeam on every vehicle.",
-    pt: "Fiadas tão afastadas quanto a profundidade medida deixa ver aos multifeixes, depois o que falhou. Exige um multifeixe em cada veículo.",
+    en: "All ground is ensonified: lines as far apart as the measured depth lets swath sonars see, then what was missed. Needs a multibeam on every vehicle.",
+    pt: "Todo o fundo é insonificado: fiadas tão afastadas quanto a profundidade medida deixa ver aos multifeixes, depois o que falhou. Exige um multifeixe em cada veículo.",
   },
   "draft.copy": { en: "{name} (copy)", pt: "{name} (cópia)" },
   "draft.latitude": { en: "Latitude", pt: "Latitude" },
@@ -615,8 +619,8 @@ export const PLANNING = {
   "forecast.afterSteps": { en: " after {stepsSimulated} steps", pt: " após {stepsSimulated} passos" },
   "forecast.forecastNotMeasured": { en: "Forecast, not measured", pt: "Previsão, não medição" },
   "forecast.duration": { en: "Duration", pt: "Duração" },
-  "forecast.wellKnown": { en: "Well known{simulated}", pt: "Bem conhecido{simulated}" },
+  "forecast.known": { en: "Known{simulated}", pt: "Conhecido{simulated}" },
   "forecast.ensonified": { en: "Ensonified", pt: "Insonificado" },
-  "forecast.landmarksLeft": { en: "Landmarks left{simulated}", pt: "Marcas por ver{simulated}" },
+  "forecast.leftToBeKnown": { en: "Left to be known{simulated}", pt: "Por conhecer{simulated}" },
   "forecast.meanDeviation": { en: "Mean deviation{simulated}", pt: "Desvio médio{simulated}" },
 } as const;

@@ -213,7 +213,7 @@ export class Chart {
   }
 
   /** Draws what the map shows for another window: charts under it as far as they are on the screen. */
-  paintOn(context: CanvasRenderingContext2D, at: Projection): void {
+  paintOn(context: CanvasRenderingContext2D, at: Projection, look: Look): void {
     if (this.#tiles) {
       // Within one turn of the event loop what MapLibre draws can be read.
       this.#map.redraw();
@@ -223,22 +223,17 @@ export class Chart {
       const [left, top] = [x + (drawn.width - width) / 2, y + (drawn.height - height) / 2];
       context.drawImage(this.#map.getCanvas(), left, top, width, height);
     }
-    paintStill(context, at, this.#sheets.projection, this.#still, PAPER[this.#look]);
+    paintStill(context, at, this.#sheets.projection, this.#still, PAPER[look]);
     const toTheRight = () => "right" as const;
     const labels = this.#labelsOf(context, at);
     const all = [...labels.always, ...labels.beside];
-    paintNames(
-      context,
-      at,
-      this.#namesBeside(context, at, boxesOf(all, all.map(toTheRight))),
-      PAPER[this.#look],
-    );
+    paintNames(context, at, this.#namesBeside(context, at, boxesOf(all, all.map(toTheRight))), PAPER[look]);
     const sides = {
       marks: this.#lively.marks.map(toTheRight),
       targets: this.#lively.targets.map(toTheRight),
       ships: this.#lively.ships.map(({ alarm }) => (alarm ? "right" : null)),
     };
-    paintLively(context, at, { ...this.#lively, pointed: null }, sides, PAPER[this.#look]);
+    paintLively(context, at, { ...this.#lively, pointed: null }, sides, PAPER[look]);
   }
 
   /** Charts under everything else, from a server of raster tiles; none without an address. */

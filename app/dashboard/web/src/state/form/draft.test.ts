@@ -1,15 +1,17 @@
 import { describe, expect, it } from "vitest";
-import type { MissionView } from "../../api/types";
+import type { MissionView, NewMission } from "../../api/types";
 import { boundsOf } from "../../map/geo";
 import {
   areaOf,
   canPlan,
   centred,
   copyOf,
+  draftFrom,
   emptyDraft,
   estimate,
   faultsOf,
   fieldOf,
+  hasDaysWater,
   sensorOf,
   toMission,
   vehicleNames,
@@ -343,6 +345,40 @@ it("a copy keeps what the form does not show, and its vehicles as they are descr
   expect(again).not.toHaveProperty("steps");
   expect(again.limits).toMatchObject({ keep_out_margin_m: 25, com_range_m: null });
   expect(again.area).toEqual(original.area);
+});
+
+describe("casts and water levels", () => {
+  const tide = { level_m: 1.2, source: "gauge", sd_m: 0.1, datum_epsg: 5715, datum_offset_m: -2.5 };
+  const wrong = { depth_m: 0.1, roll_offset_deg: 0.4, sound_speed_mps: 3 };
+  const spec = {
+    ...toMission(draft),
+    kind: "survey",
+    search: null,
+    tide,
+    sound_speed: { name: "pier", profile: [[0, 1510]], further: [] },
+    systematic_errors: { vehicles: { "sim-1": wrong }, water_level: [[1_795_225_140, 0.2]], source: "lines" },
+  } as unknown as MissionView["spec"];
+
+  it("of the day of a survey are in no copy of it; its datum and its instruments' errors are", () => {
+    const copy = copyOf({ name: "Quay", spec });
+    expect([copy.tide_m, copy.tide_source]).toEqual(["", ""]);
+    const again = toMission(copy);
+    expect(again).not.toHaveProperty("sound_speed");
+    expect(again.tide).toEqual({ datum_epsg: 5715, datum_offset_m: -2.5 });
+    expect(again.systematic_errors).toEqual({
+      vehicles: { "sim-1": { ...wrong, sound_speed_mps: 0 } },
+      water_level: [],
+      source: "lines",
+    });
+    expect(hasDaysWater(spec as Partial<NewMission>)).toBe(true);
+    expect(hasDaysWater(again)).toBe(false);
+  });
+
+  it("stay in a mission that is edited", () => {
+    const made = toMission(draftFrom({ name: "Quay", spec }));
+    const { tide: level, sound_speed, systematic_errors } = spec;
+    expect(made).toMatchObject({ name: "Quay", tide: level, sound_speed, systematic_errors });
+  });
 });
 
 describe("recovery", () => {

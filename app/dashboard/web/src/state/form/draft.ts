@@ -187,8 +187,51 @@ export function emptyDraft(middle: LngLat): Draft {
 /** Where the water level of a mission comes from that has none. */
 const NO_TIDE: string = SPEC["tide.source"].default;
 
-/** A draft of a mission like one that there is, its vehicles as they are described there. */
-export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
+/** Whether a level was stated, be it of nothing. */
+const isLevel = ({ level_m = 0, source = NO_TIDE }: NonNullable<NewMission["tide"]>): boolean =>
+  level_m !== 0 || source !== NO_TIDE;
+
+/** A description for another day: without casts and water levels, with the datum and what is wrong with instruments. */
+export function withoutDaysWater(described: Partial<NewMission>): Partial<NewMission> {
+  const { sound_speed: _, tide = {}, systematic_errors: errors, ...others } = described;
+  const { datum_epsg, datum_offset_m } = tide;
+  const datum = { ...(datum_epsg ? { datum_epsg } : {}), ...(datum_offset_m ? { datum_offset_m } : {}) };
+  const instruments = Object.entries(errors?.vehicles ?? {}).map(
+    ([name, wrong]) => [name, { ...wrong, sound_speed_mps: 0 }] as const,
+  );
+  return {
+    ...others,
+    ...(Object.keys(datum).length > 0 ? { tide: datum } : {}),
+    ...(errors
+      ? { systematic_errors: { ...errors, water_level: [], vehicles: Object.fromEntries(instruments) } }
+      : {}),
+  };
+}
+
+/** Whether a description holds casts or water levels of its day. */
+export function hasDaysWater({
+  sound_speed,
+  tide = {},
+  systematic_errors: errors,
+}: Partial<NewMission>): boolean {
+  const steered = Object.values(errors?.vehicles ?? {}).some(({ sound_speed_mps }) => sound_speed_mps !== 0);
+  return !!sound_speed || isLevel(tide) || !!errors?.water_level?.length || steered;
+}
+
+/** A new mission like one that there is, for another day; its vehicles as they are described there. */
+export function copyOf(mission: Pick<MissionView, "spec" | "name">): Draft {
+  const draft = draftFrom(mission);
+  return {
+    ...draft,
+    name: say("draft.copy", { name: mission.name }),
+    tide_m: "",
+    tide_source: "",
+    base: withoutDaysWater(draft.base),
+  };
+}
+
+/** A draft that describes a mission as it is described. */
+export function draftFrom({ spec, name }: Pick<MissionView, "spec" | "name">): Draft {
   const ring = ringOf(spec.area as NewMission["area"]);
   const { steps: _, after: _after, survey_lines: lines = [], ...base } = spec;
   const { search, tide } = base;
@@ -198,13 +241,12 @@ export function copyOf({ spec, name }: Pick<MissionView, "spec" | "name">): Draf
     obstacles: search.obstacles.map((one) => ringOf(one as NewMission["area"])),
   };
   const texts = textsOf(spec, spec.kind);
-  // A level of nothing is a level where somebody stated it.
-  const isStated = texts.tide_m !== "" || (tide.source ?? NO_TIDE) !== NO_TIDE;
+  const isStated = isLevel(tide);
   return {
     ...emptyDraft(ring[0] ?? [0, 0]),
     ...texts,
     ...places,
-    name: say("draft.copy", { name }),
+    name,
     kind: spec.kind,
     site: spec.site ?? "",
     length: Object.keys(spec.budget)[0] as LengthUnit,

@@ -2,7 +2,7 @@ import { readFileSync } from "node:fs";
 import ts from "typescript";
 import { afterEach, describe, expect, it } from "vitest";
 import type { MissionView, NewMission } from "../../api/types";
-import { copyOf, type Draft, emptyDraft, faultsOf, fieldOf, toMission, turnedInto } from "./draft";
+import { copyOf, type Draft, draftFrom, emptyDraft, faultsOf, fieldOf, toMission, turnedInto } from "./draft";
 import {
   FIELDS,
   type Field,
@@ -67,14 +67,14 @@ describe.each(ENTRIES)("the field %s", (name, field) => {
     expect(fieldFault(field, text)).toBe("");
   });
 
-  it("is sent at its place, copied, and has the service's refusal shown beside it", () => {
+  it("is sent at its place, shown again, and has the service's refusal shown beside it", () => {
     const draft = draftWith(
       { ...length, ...led, [name]: text, max_depth_m: name === "max_depth_m" ? text : "6000" },
       kind,
     );
     const mission = toMission(draft);
     expect(valueAt(mission, field.path)).toBe(other ?? switched ?? Number(text) * (field.factor ?? 1));
-    expect(copyOf(shown(mission))).toMatchObject({ ...length, [name]: text });
+    expect(draftFrom(shown(mission))).toMatchObject({ ...length, [name]: text });
     expect(fieldOf(field.path, draft)).toBe(name);
   });
 });

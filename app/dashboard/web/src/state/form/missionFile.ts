@@ -4,7 +4,7 @@ import SPEC from "../../api/mission.json";
 import type { LngLat, MissionView, NewMission, PolygonGeometry } from "../../api/types";
 import { inDegrees, polygonOf, ringOf } from "../../map/area";
 import { say } from "../../words/say";
-import { allBlocks, type Block, copyOf, type Draft } from "./draft";
+import { allBlocks, type Block, type Draft, draftFrom, withoutDaysWater } from "./draft";
 
 const FORMAT = "bathyfleet mission";
 
@@ -100,10 +100,10 @@ export function draftOf(mission: NewMission & { steps?: number }): Draft {
     budget: budget ?? { steps: steps ?? SPEC["budget.steps"].default },
   };
   const shown = { name: mission.name, spec: whole } as unknown as Pick<MissionView, "name" | "spec">;
-  return { ...copyOf(shown), name: mission.name };
+  return draftFrom(shown);
 }
 
-/** What a template says of a mission elsewhere: everything but its name, its places and the day's water level. */
+/** What a template says of a mission elsewhere: everything but its name, its places, and the day's casts and water levels. */
 export function withTemplate({ mission, spacing_m = "" }: Omit<Template, "name">, draft: Draft): Draft {
   const { name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery } =
     draft;
@@ -111,11 +111,10 @@ export function withTemplate({ mission, spacing_m = "" }: Omit<Template, "name">
     draft;
   const { own, base, ...settings } = draftOf(mission);
   const placeless = Object.entries(own).map(([vehicle, { recovery_point: _, ...rest }]) => [vehicle, rest]);
-  const { sd_m: _, ...tide } = base.tide ?? {};
   return {
     ...settings,
     own: Object.fromEntries(placeless),
-    base: { ...base, tide },
+    base: withoutDaysWater(base),
     spacing_m,
     obstacles: [],
     ...{ name, site, source, ring, keepOut, latitude, longitude, east_m, north_m, goal, entry, recovery },

@@ -14,9 +14,9 @@ export function SwathCard() {
   if (!progress || progress.holidays === null) return null;
   const found = holidays.value?.features ?? [];
   return (
-    <article class="card target" data-testid="swath-card" aria-label={say("swath.swathCoverage")}>
+    <article class="card target" data-testid="swath-card" aria-label={say("swath.ensonifiedAndMissed")}>
       <header>
-        <h2>{say("swath.swathCoverage")}</h2>
+        <h2>{say("swath.ensonifiedAndMissed")}</h2>
       </header>
       <dl class="big">
         <div title={say("swath.shareOfTheAreaSCells")}>

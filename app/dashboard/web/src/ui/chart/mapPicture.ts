@@ -2,7 +2,7 @@
 
 import { signal } from "@preact/signals";
 import type { Chart } from "../../map/canvas/chart";
-import { PAPER } from "../../map/canvas/mapColours";
+import { type Look, PAPER } from "../../map/canvas/mapColours";
 import { drawingOf, drawnBy } from "../../map/picture/drawings";
 import { paletteOf, symbolOf } from "../../map/picture/layerColours";
 import { colourAt, type Rgb } from "../../map/picture/palette";
@@ -39,8 +39,8 @@ const STOPS = 24;
 
 export type PictureKind = "png" | "pdf";
 
-/** Draws what the map shows as a sheet of A4. Throws where there is no map. */
-export async function mapPicture(kind: PictureKind): Promise<{ name: string; content: Blob }> {
+/** A sheet of A4 with what the map shows, on paper of a look. Throws where there is no map. */
+function sheetOn(paper: Look) {
   const chart = shownChart.peek();
   const present = mission.peek();
   if (!chart || !present) throw new Error(say("topBar.noMissionIsChosen"));
@@ -72,10 +72,20 @@ export async function mapPicture(kind: PictureKind): Promise<{ name: string; con
     },
     legend: legend(),
     vehicles: marks(),
-    paper: PAPER[look()],
+    paper: PAPER[paper],
     nautical: units.peek() === "nautical",
-    paint: (on, to) => chart.paintOn(on, to),
+    paint: (on, to) => chart.paintOn(on, to, paper),
   });
+  return { canvas, context, sheet, present };
+}
+
+/** The map as it is printed, on white paper; null where there is none. */
+export const printedMap = (): HTMLCanvasElement | null =>
+  shownChart.peek() && mission.peek() ? sheetOn("light").canvas : null;
+
+/** Draws what the map shows as a sheet of A4. Throws where there is no map. */
+export async function mapPicture(kind: PictureKind): Promise<{ name: string; content: Blob }> {
+  const { canvas, context, sheet, present } = sheetOn(look());
   const name = `${present.name.replaceAll(/[^\p{L}\p{N}._-]+/gu, "-") || "map"}-${shownLayer.peek()?.name ?? "map"}.${kind}`;
   if (kind === "pdf") {
     const picture = context.getImageData(0, 0, canvas.width, canvas.height);

@@ -23,23 +23,11 @@ export function FleetDialog() {
         <p class="empty">{say("fleet.noVehicleWasHeardYetSwitch")}</p>
       ) : (
         // biome-ignore lint/a11y/noNoninteractiveTabindex: a table wider than the window is scrolled with the keyboard
-        <div class="fleet-scroll" tabIndex={0}>
+        <div class="fleet-scroll stacked" tabIndex={0}>
           <table>
             <thead>
               <tr>
-                {[
-                  say("asked.vehicle"),
-                  say("compare.state"),
-                  say("fleet.mission"),
-                  say("fleet.positionAge"),
-                  say("charts.battery"),
-                  say("cards.vehicleDepth"),
-                  say("charts.altitude"),
-                  say("fleet.speed"),
-                  say("fleet.place"),
-                  ...(from ? [say("cards.fromHere")] : []),
-                  say("fleet.link"),
-                ].map((title) => (
+                {[say("asked.vehicle"), ...Object.values(titles(from !== null))].map((title) => (
                   <th key={title} scope="col">
                     {title}
                   </th>
@@ -57,6 +45,20 @@ export function FleetDialog() {
     </Dialog>
   );
 }
+
+/** What is told of each vehicle, beside its name. */
+const titles = (isWayKnown: boolean) => ({
+  state: say("compare.state"),
+  mission: say("fleet.mission"),
+  position: say("fleet.positionAge"),
+  battery: say("charts.battery"),
+  depth: say("cards.vehicleDepth"),
+  altitude: say("charts.altitude"),
+  speed: say("fleet.speed"),
+  place: say("fleet.place"),
+  ...(isWayKnown ? { way: say("cards.fromHere") } : {}),
+  link: say("fleet.link"),
+});
 
 /** From where the way to each vehicle is told: the own ship as it was told with the lists, else this device; null: not known. */
 function useFrom(): LngLat | null {
@@ -81,32 +83,39 @@ function Line({ vehicle: v, from }: { vehicle: VehicleView; from: LngLat | null 
   const state = listsLive.value ? told : whenLastHeard(told);
   const name = missions.value?.find((m) => m.id === v.mission_id)?.name;
   const link = [v.kind, v.imc_id === null ? null : `0x${v.imc_id.toString(16).padStart(4, "0")}`, v.address];
+  const title = titles(from !== null);
   return (
     <tr data-testid={`fleet-${v.name}`}>
       <th scope="row">{v.name}</th>
-      <td>
+      <td data-title={title.state}>
         <span class={`tone ${state.tone}`}>{state.words}</span>
         {v.reason ? <small>{v.reason}</small> : null}
       </td>
-      <td>
+      <td data-title={title.mission}>
         {v.mission_id === null ? (
           say("fleet.free")
         ) : (
           <a href={`#/missions/${v.mission_id}`}>{name ?? say("fleet.shownBelow")}</a>
         )}
       </td>
-      <td>{age(v.lat_deg === null ? null : ageSeconds(v, listedAt.value, now.value))}</td>
-      <td>{batteryWords(v)}</td>
-      <td>{metres(v.depth_m)}</td>
-      <td>{metres(v.altitude_m)}</td>
-      <td>{v.speed_mps === null ? "–" : speed(v.speed_mps)}</td>
-      <td>
+      <td data-title={title.position}>
+        {age(v.lat_deg === null ? null : ageSeconds(v, listedAt.value, now.value))}
+      </td>
+      <td data-title={title.battery}>{batteryWords(v)}</td>
+      <td data-title={title.depth}>{metres(v.depth_m)}</td>
+      <td data-title={title.altitude}>{metres(v.altitude_m)}</td>
+      <td data-title={title.speed}>{v.speed_mps === null ? "–" : speed(v.speed_mps)}</td>
+      <td data-title={title.place}>
         {v.lon_deg === null || v.lat_deg === null
           ? "–"
           : place([v.lon_deg, v.lat_deg], coordinateFormat.value)}
       </td>
-      {from ? <td title={say("cards.distanceAndTrueBearing")}>{wayTo(v, from) ?? "–"}</td> : null}
-      <td>{link.filter((part) => part !== null).join(" · ")}</td>
+      {from ? (
+        <td data-title={title.way} title={say("cards.distanceAndTrueBearing")}>
+          {wayTo(v, from) ?? "–"}
+        </td>
+      ) : null}
+      <td data-title={title.link}>{link.filter((part) => part !== null).join(" · ")}</td>
     </tr>
   );
 }

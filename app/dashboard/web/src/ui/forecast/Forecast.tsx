@@ -166,7 +166,7 @@ const simulatedOf = (view: ForecastView): string =>
 const knownTitle = (view: ForecastView | undefined): string =>
   view?.whole_survey
     ? say("forecast.ensonified")
-    : say("forecast.wellKnown", { simulated: view ? simulatedOf(view) : "" });
+    : say("forecast.known", { simulated: view ? simulatedOf(view) : "" });
 
 function Figures({ view }: { view: ForecastView }) {
   const simulated = simulatedOf(view);
@@ -183,7 +183,7 @@ function Figures({ view }: { view: ForecastView }) {
         </div>
         {view.whole_survey ? null : (
           <div class="figure">
-            <dt>{say("forecast.landmarksLeft", { simulated })}</dt>
+            <dt>{say("forecast.leftToBeKnown", { simulated })}</dt>
             <dd>{between(view.remaining_pct_range, percent)}</dd>
           </div>
         )}

@@ -2,7 +2,7 @@ import "./NewMissionForm.css";
 import { useSignal, useSignalEffect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
-import type { LngLat, PlannerView } from "../../api/types";
+import type { LngLat, NewMission, PlannerView } from "../../api/types";
 import { polygonOf } from "../../map/area";
 import { boundsOf } from "../../map/geo";
 import { namedLines } from "../../map/marks/lines";
@@ -14,11 +14,13 @@ import {
   blockTitle,
   copyOf,
   type Draft,
+  draftFrom,
   emptyDraft,
   type FaultKey,
   type Faults,
   faultsOf,
   fieldOf,
+  hasDaysWater,
   toMission,
   turnedInto,
   vehicleNames,
@@ -53,7 +55,7 @@ export function NewMissionForm() {
   const edited = editedMission.peek();
   const draft = useSignal(
     edited
-      ? { ...copyOf(edited), name: edited.name, floor_depth_m: floorDepth.peek() }
+      ? { ...draftFrom(edited), floor_depth_m: floorDepth.peek() }
       : original
         ? copyOf(original)
         : emptyDraft(mapCentre.peek()),
@@ -216,6 +218,11 @@ export function NewMissionForm() {
         <VehicleFields />
         <RecoveryFields />
         <ExpertFields fault={plannersFault.value} />
+        {original && hasDaysWater(original.spec as Partial<NewMission>) ? (
+          <p class="hint" data-testid="days-water">
+            {say("mission.castsAndLevelsStay")}
+          </p>
+        ) : null}
         <details>
           <summary>{say("mission.tide")}</summary>
           <div class="pair">

@@ -43,7 +43,7 @@ export function SurveyFields() {
     <fieldset class="asked">
       <legend>{say("asked.whatIsAsked")}</legend>
       <Quality />
-      <Coverage />
+      <SurveyLines />
       <Length />
       <Expected />
     </fieldset>
@@ -92,14 +92,14 @@ function Quality() {
   );
 }
 
-/** How the area is covered. */
-function Coverage() {
+/** How lines are laid over the area. */
+function SurveyLines() {
   const { draft, planners, set } = useForm();
   const presets = Object.entries(PLANNER_PRESETS).filter(
     ([name]) => name === draft.planner || canPlan(name, draft),
   );
   return (
-    <div role="radiogroup" aria-label={say("asked.coverage")}>
+    <div role="radiogroup" aria-label={say("asked.surveyLines")}>
       {presets.map(([name, { title, words }]) => (
         <label key={name} class="preset">
           <input

@@ -5,6 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type uPlot from "uplot";
 import { csvOf, digits, fileNameOf, lineWords } from "../../state/analysis/plotFile";
 import { clock, plain } from "../../state/format";
+import { printing } from "../../state/store";
 import { language, say } from "../../words/say";
 import { Button, flips } from "./Controls";
 import { save } from "./download";
@@ -69,10 +70,12 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
   useEffect(() => {
     const element = box.current;
     if (!element || !Drawing) return;
-    const styles = getComputedStyle(element);
+    // As they are when it is drawn: on paper they are others.
+    const colour = (name: string, otherwise: string) => () =>
+      getComputedStyle(element).getPropertyValue(name).trim() || otherwise;
     const axis = {
-      stroke: styles.getPropertyValue("--ink-2").trim() || "#667788",
-      grid: { stroke: styles.getPropertyValue("--rule").trim() || "#8884", width: 1 },
+      stroke: colour("--ink-2", "#667788"),
+      grid: { stroke: colour("--rule", "#8884"), width: 1 },
       ticks: { show: false },
       font: large.value ? "13px sans-serif" : "12px sans-serif",
     };
@@ -126,7 +129,9 @@ export function Plot({ title, xs, lines, unit, time = false, range, down = false
       made.setSize({ width: Math.max(160, element.clientWidth), height }),
     );
     watcher.observe(element);
+    const unwatched = printing.subscribe(() => made.redraw(false));
     return () => {
+      unwatched();
       watcher.disconnect();
       made.destroy();
       chart.current = null;

@@ -1,18 +1,30 @@
-/** A sheet of paper has another shape than the window: the map is printed as it is seen, made smaller as one picture. */
+/** What is printed is on white paper whatever the screen's colours, with the map as a sheet of its own, large enough to read. */
 
-/** A4 on its side without its margins, in the pixels of style sheets, and how much of its height the map gets. */
-const PAPER_PX = { width: 1047, height: 390 };
+import { printing } from "../../state/store";
+import { printedMap } from "../chart/mapPicture";
 
-/** Tells the print style how large the map is; returns what ends that. */
+/** Puts the map's sheet on the page while it is printed; returns what ends that. */
 export function watchPrinting(root: HTMLElement): () => void {
-  const measure = () => {
-    const map = root.querySelector(".chart")?.getBoundingClientRect();
-    if (!map || map.width === 0) return;
-    const fit = Math.min(PAPER_PX.width / map.width, PAPER_PX.height / map.height);
-    root.style.setProperty("--map-width", `${map.width}px`);
-    root.style.setProperty("--map-height", `${map.height}px`);
-    root.style.setProperty("--map-fit", String(fit));
+  let sheet: HTMLCanvasElement | null = null;
+  const after = () => {
+    sheet?.remove();
+    sheet = null;
+    printing.value = false;
   };
-  window.addEventListener("beforeprint", measure);
-  return () => window.removeEventListener("beforeprint", measure);
+  const before = () => {
+    after();
+    printing.value = true;
+    sheet = printedMap();
+    if (!sheet) return;
+    sheet.className = "printed-map";
+    sheet.dataset.testid = "printed-map";
+    root.querySelector(".stage")?.append(sheet);
+  };
+  window.addEventListener("beforeprint", before);
+  window.addEventListener("afterprint", after);
+  return () => {
+    window.removeEventListener("beforeprint", before);
+    window.removeEventListener("afterprint", after);
+    after();
+  };
 }

@@ -39,10 +39,12 @@ export function Changed({ site, surveys }: { site: string; surveys: readonly Sur
   const { earlier, later } = found.value ?? {};
   const from = compared.value.from || earlier?.mission_id || "";
   const to = compared.value.to || later?.mission_id || "";
-  const options = surveys.map(
+  const named = surveys.map(
     ({ mission_id, name, ended_at }) =>
       [mission_id, ended_at ? `${name}, ${day(new Date(ended_at))}` : name] as const,
   );
+  // While none is compared, none is shown as chosen.
+  const options = (chosen: string) => (chosen ? named : ([["", "–"], ...named] as const));
   const choose = (part: Partial<Compared>) => {
     compared.value = { from, to, ...part };
   };
@@ -63,7 +65,7 @@ export function Changed({ site, surveys }: { site: string; surveys: readonly Sur
           <Choice
             id="changes-from"
             value={from}
-            options={options}
+            options={options(from)}
             onChoose={(chosen) => choose({ from: chosen })}
           />
         </label>
@@ -72,7 +74,7 @@ export function Changed({ site, surveys }: { site: string; surveys: readonly Sur
           <Choice
             id="changes-to"
             value={to}
-            options={options}
+            options={options(to)}
             onChoose={(chosen) => choose({ to: chosen })}
           />
         </label>

@@ -48,23 +48,24 @@ export function Site({ site, onChange }: { site: SiteView; onChange: () => void 
 /** The surveys whose depths the site has, oldest first. */
 function Surveys({ surveys }: { surveys: readonly SurveyView[] }) {
   const number = (value: number | null, digits: number) => (value === null ? "–" : fixed(value, digits));
+  const titles = {
+    mission: say("fleet.mission"),
+    day: say("site.day"),
+    share: say("site.sharePct"),
+    depths: say("site.depthsM"),
+    deviation: say("site.deviationM"),
+    changed: say("site.changedPct"),
+    below: say("site.below"),
+  };
   return (
     <section aria-label={say("site.surveys")}>
       <h3>{say("site.surveys")}</h3>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a table wider than the window is scrolled with the keyboard */}
-      <div class="site-table" tabIndex={0}>
+      <div class="site-table stacked" tabIndex={0}>
         <table data-testid="site-surveys">
           <thead>
             <tr>
-              {[
-                say("fleet.mission"),
-                say("site.day"),
-                say("site.sharePct"),
-                say("site.depthsM"),
-                say("site.deviationM"),
-                say("site.changedPct"),
-                say("site.below"),
-              ].map((title) => (
+              {Object.values(titles).map((title) => (
                 <th key={title} scope="col">
                   {title}
                 </th>
@@ -89,14 +90,16 @@ function Surveys({ surveys }: { surveys: readonly SurveyView[] }) {
                     <small>{say("site.leftOut", { leftOut: survey.left_out })}</small>
                   ) : null}
                 </th>
-                <td>{survey.ended_at ? day(new Date(survey.ended_at)) : "–"}</td>
-                <td>{fixed(survey.share_pct, 0)}</td>
-                <td>
+                <td data-title={titles.day}>{survey.ended_at ? day(new Date(survey.ended_at)) : "–"}</td>
+                <td data-title={titles.share}>{fixed(survey.share_pct, 0)}</td>
+                <td data-title={titles.depths}>
                   {number(survey.min_depth_m, 1)}–{number(survey.max_depth_m, 1)}
                 </td>
-                <td>{number(survey.median_sd_m, 2)}</td>
-                <td title={say("site.aboutFiveIsChance")}>{number(survey.changed_pct, 1)}</td>
-                <td>{survey.vertical_datum}</td>
+                <td data-title={titles.deviation}>{number(survey.median_sd_m, 2)}</td>
+                <td data-title={titles.changed} title={say("site.aboutFiveIsChance")}>
+                  {number(survey.changed_pct, 1)}
+                </td>
+                <td data-title={titles.below}>{survey.vertical_datum}</td>
               </tr>
             ))}
           </tbody>

@@ -1,8 +1,7 @@
 import { type Signal, useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { api } from "../../api/client";
-import SPEC from "../../api/mission.json";
-import type { CastsView, CastView, CorrectionsView } from "../../api/types";
+import type { CastsView, CastView, NewCasts } from "../../api/types";
 import { whyNotCommand } from "../../state/access";
 import { type Cast, castsOf, timeOf, written } from "../../state/analysis/soundSpeedCast";
 import { count, dayAndTimeUtc, fixed, latitude, longitude, metres, plain } from "../../state/format";
@@ -230,7 +229,11 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
     }
     const assumed_mps = found.sound_speed?.assumed_mps ?? numberOf(assumed);
     if (assumed_mps === null) fault.value = say("corrections.typeNumbers");
-    else void change((id) => sent(id, found, casts, assumed_mps));
+    else {
+      // The speed set in the sonars comes with the first casts; later ones leave it, and what others added, as it is.
+      const first = found.sound_speed ? {} : { assumed_mps };
+      void change((id) => api.addCasts(id, { casts, ...first }));
+    }
   };
   return (
     <>
@@ -278,10 +281,8 @@ function CastForm({ found, form, busy, change, fault, assumed, show }: FormProps
   );
 }
 
-type Named = Cast & { name: string; source: string };
-
 /** What is typed, each cast with its name; words about what is wrong. Times and places that are typed count first. */
-function typedCasts(form: FormProps["form"]): Named[] | string {
+function typedCasts(form: FormProps["form"]): NewCasts["casts"] | string {
   const casts = castsOf(form.text.peek());
   const [first] = casts;
   if (!first) return say("corrections.noProfile");
@@ -297,30 +298,4 @@ function typedCasts(form: FormProps["form"]): Named[] | string {
   const [lon, lat] = place.map(numberOf);
   if (lon == null || lat == null) return say("casts.typePlace");
   return [{ ...first, name, source, time, position: [lon, lat] }];
-}
-
-/** Sends casts: one by itself; several, or the first with another speed set in the sonars, all at once. */
-function sent(
-  id: string,
-  { sound_speed }: CorrectionsView,
-  casts: readonly Named[],
-  assumed_mps: number,
-): Promise<CorrectionsView> {
-  const [one] = casts;
-  // One by itself leaves alone what somebody else adds at the same time.
-  if (one && casts.length === 1 && (sound_speed || assumed_mps === SPEC["sound_speed.assumed_mps"].default)) {
-    const { name, ...described } = one;
-    return api.setCast(id, name, described);
-  }
-  const known = sound_speed ? [sound_speed, ...sound_speed.further] : [];
-  const kept = known.filter(({ name }) => !casts.some((cast) => cast.name === name));
-  const [first, ...further] = [...kept, ...casts].map(({ name, profile, time, position, source }) => ({
-    name,
-    profile: [...profile],
-    time,
-    position,
-    source,
-  }));
-  const { rule = "nearest_in_time", within_h = SPEC["sound_speed.within_h"].default } = sound_speed ?? {};
-  return api.setSoundSpeed(id, { ...first, further, assumed_mps, rule, within_h });
 }

@@ -65,6 +65,8 @@ export function Charts() {
   const ink = isDark.value ? DARK_INKS : INKS;
   const colour = (i: number) => ink[i % ink.length] as string;
   const { title, unit, down } = METRICS[metric.value];
+  // A step's coverage is what was ensonified where swath sonars measure.
+  const isSwept = mission.value?.progress.ensonified_pct != null;
   // What is heard of vehicles after the end is no part of the mission.
   const heard = ended.value ? {} : samples.value;
   const over = figuresOver(metric.value, telemetry.value, heard);
@@ -75,13 +77,17 @@ export function Charts() {
       ) : (
         <>
           <Plot
-            title={say("charts.coverageAndRemaining")}
+            title={say(isSwept ? "charts.ensonifiedAndLeft" : "charts.knownAndLeft")}
             xs={f.numbers}
             unit="%"
             range={[0, 100]}
             lines={[
-              { label: say("charts.covered"), colour: colour(0), values: f.coverage },
-              { label: say("charts.remaining"), colour: colour(1), dash: [6, 4], values: f.remaining },
+              {
+                label: say(isSwept ? "charts.ensonified" : "charts.known"),
+                colour: colour(0),
+                values: f.coverage,
+              },
+              { label: say("charts.left"), colour: colour(1), dash: [6, 4], values: f.remaining },
             ]}
           />
           <Plot

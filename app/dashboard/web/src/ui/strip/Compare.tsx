@@ -121,7 +121,7 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
     [say("compare.vehicles"), (m) => String(m.vehicles.length)],
     [say("asked.length"), (m) => lengthWords(m.progress)],
     ...coverageRows([one, two]),
-    [say("compare.remainingLandmarks"), (m) => percent(m.progress.remaining_pct, 1)],
+    [say("compare.leftToBeKnown"), (m) => percent(m.progress.remaining_pct, 1)],
     [say("bottomStrip.meanDeviation"), (m) => metres(m.progress.mean_sd_m, 3)],
     [say("bottomStrip.soundings"), (m) => count(m.progress.soundings)],
     [say("compare.rejected"), (m) => count(m.progress.rejected)],
@@ -165,7 +165,7 @@ function Both({ one, other }: { one: MissionView; other: Other }) {
       </p>
       <div class="charts">
         <Plot
-          title={say("compare.remainingLandmarks")}
+          title={say("compare.leftToBeKnown")}
           xs={xs}
           unit="%"
           range={[0, 100]}

@@ -1,5 +1,6 @@
 import "./Corrections.css";
-import { useSignal, useSignalEffect } from "@preact/signals";
+import { useComputed, useSignal, useSignalEffect } from "@preact/signals";
+import { useRef } from "preact/hooks";
 import { api } from "../../api/client";
 import SPEC from "../../api/mission.json";
 import type { CorrectionsView } from "../../api/types";
@@ -8,7 +9,7 @@ import { type Cast, castsOf } from "../../state/analysis/soundSpeedCast";
 import { profileEnds } from "../../state/analysis/soundSpeedProfile";
 import { count, dayAndTime, plain } from "../../state/format";
 import { said } from "../../state/session";
-import { selectedId } from "../../state/store";
+import { selectedId, view } from "../../state/store";
 import { say } from "../../words/say";
 import { Button, FileButton, Trouble, Typed } from "../parts/Controls";
 import { Casts, RULES } from "./Casts";
@@ -19,14 +20,22 @@ export function Corrections() {
   const answer = useSignal<CorrectionsView | null>(null);
   const busy = useSignal(false);
   const fault = useSignal("");
+  /** How often was asked, and which answer is shown: one that was asked for earlier may come later. */
+  const numbers = useRef({ asked: 0, shown: 0 });
+  const ask = async (id: string, asked: Parameters<Change>[0]) => {
+    const number = ++numbers.current.asked;
+    const found = await asked(id);
+    if (selectedId.peek() !== id || number < numbers.current.shown) return;
+    numbers.current.shown = number;
+    answer.value = found;
+  };
   const change: Change = async (asked) => {
     const id = selectedId.peek();
     if (!id) return;
     busy.value = true;
     fault.value = "";
     try {
-      const found = await asked(id);
-      if (selectedId.peek() === id) answer.value = found;
+      await ask(id, asked);
     } catch (error) {
       if (selectedId.peek() === id) fault.value = said(error);
     } finally {
@@ -37,6 +46,17 @@ export function Corrections() {
     selectedId.value;
     answer.value = null;
     void change(api.corrections);
+  });
+  // What others change is shown, too.
+  const changed = useComputed(() => view.value.events.findLast(({ kind }) => kind === "corrections")?.id);
+  const seen = useRef(changed.peek());
+  useSignalEffect(() => {
+    const id = selectedId.peek();
+    if (!id || changed.value === seen.current) return;
+    seen.current = changed.value;
+    ask(id, api.corrections).catch((error: unknown) => {
+      if (selectedId.peek() === id) fault.value = said(error);
+    });
   });
   const found = answer.value;
   return (

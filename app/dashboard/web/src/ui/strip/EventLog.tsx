@@ -2,7 +2,6 @@ import "./EventLog.css";
 import { useComputed, useSignal } from "@preact/signals";
 import { api } from "../../api/client";
 import type { EventView, Level } from "../../api/types";
-import { whyNotCommand } from "../../state/access";
 import { clock, daysOf } from "../../state/format";
 import { vehicleOf } from "../../state/past/placeThen";
 import { showEvent } from "../../state/past/whereabouts";
@@ -13,6 +12,7 @@ import { Button, Choice, into, same, Typed } from "../parts/Controls";
 
 const SIGNS: Record<Level, string> = { info: "·", warning: "▲", alarm: "✕" };
 const MOST_SHOWN = 300;
+const NOTE_FORM = "note-form";
 /** Which lines are shown. */
 const choices = () =>
   [
@@ -118,11 +118,13 @@ function NoteForm() {
   const sending = useSignal(false);
   const write = async () => {
     const id = selectedId.value;
-    if (!id || text.value.trim() === "") return;
+    const note = text.value.trim();
+    if (!id || note === "" || sending.peek()) return;
     sending.value = true;
     try {
-      await api.note(id, text.value.trim());
-      text.value = "";
+      await api.note(id, note);
+      // What is typed meanwhile is the next one.
+      if (text.peek().trim() === note) text.value = "";
       fault.value = "";
     } catch (error) {
       fault.value = said(error);
@@ -132,6 +134,7 @@ function NoteForm() {
   };
   return (
     <form
+      id={NOTE_FORM}
       class="note-form"
       onSubmit={(event) => {
         event.preventDefault();
@@ -145,14 +148,15 @@ function NoteForm() {
         maxLength={2000}
         id="note"
       />
-      <button
-        type="submit"
-        class="command"
-        disabled={sending.value || text.value.trim() === "" || whyNotCommand.value !== ""}
-        title={whyNotCommand.value}
+      <Button
+        id="write-note"
+        commands
+        disabled={text.value.trim() === ""}
+        busy={sending.value}
+        form={NOTE_FORM}
       >
         {say("log.writeDown")}
-      </button>
+      </Button>
       {fault.value ? (
         <span class="fault" role="alert">
           {fault.value}
