@@ -152,7 +152,8 @@ async def import_log(
     Every record counts once, however often it comes: by radio, in another log, or in the same file again.
     """
     service = state.service
-    service.logs.check(mission, options)
+    length = request.headers.get("content-length", "")
+    service.logs.check(mission, options, int(length) if length.isdecimal() else None)
     try:
         async with AsyncExitStack() as keeping:
             incoming = service.uploads.receive(request.stream(), state.settings.max_import_bytes)
@@ -182,6 +183,20 @@ async def list_logs(reader: Reader, service: Service, mission: Mission) -> list[
 async def get_log(import_id: ImportId, reader: Reader, service: Service, mission: Mission) -> LogView:
     """Return the import of a log."""
     return await service.logs.one(mission, import_id)
+
+
+@router.delete(
+    "/logs/{import_id}",
+    operation_id="deleteLog",
+    summary="Stop reading a log, or take it back",
+    responses=_FOUND | problems("conflict"),
+)
+async def delete_log(import_id: ImportId, service: Service, operator: Operator, mission: Mission) -> LogView:
+    """Let nothing count of what a log brought: soundings, pings, track; reading it ends.
+
+    The map is made anew of the rest. What the log brought stays stored, marked; the same file sent again counts again.
+    """
+    return await service.logs.take_back(mission, import_id, operator.name)
 
 
 @router.put(

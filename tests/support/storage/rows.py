@@ -15,6 +15,7 @@ from app.storage.models import (
     ConsoleRow,
     EventRow,
     ImportRow,
+    LogRow,
     MissionOwnerRow,
     MissionRow,
     MissionVehicleRow,
