@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
 from app.api.access.auth import Operator, Reader
+from app.api.http.first_completed import first_of
 from app.api.http.problems import ProblemError, problems
 from app.api.mission import Mission
 from app.api.schemas import API
@@ -103,13 +104,27 @@ async def propose_zones(
     """Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
 
     Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
-    looks at them and takes those that apply into `keep_out`.
+    looks at them and takes those that apply into `keep_out`. Reading ends with the connection.
     """
+    found: list[ProposedZonesView] = []
+
+    async def left() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+
     try:
         async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
-            return await state.service.imports.propose_zones(upload, options)
+
+            async def read() -> None:
+                found.append(await state.service.imports.propose_zones(upload, options))
+
+            # Nobody else's file waits for one that nobody waits for any more.
+            await first_of(read(), left())
     except ClientDisconnect:
-        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+        found.clear()
+    if not found:
+        raise ProblemError("malformed-body", "the connection ended before the file did, or before it was read")
+    return found[0]
 
 
 @router.get(
