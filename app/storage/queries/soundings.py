@@ -39,18 +39,17 @@ async def insert_new(
     if not rows:
         return set()
     insert = sqlite.insert if session.get_bind().dialect.name == "sqlite" else postgresql.insert
-    new_row = insert(SoundingRow)
+    row = insert(SoundingRow)
     if any_taken_back:
         # Of two with one identity in a statement PostgreSQL would refuse the second.
-        rows = list({tuple(row[name] for name in IDENTITY): row for row in reversed(rows)}.values())[::-1]
-        values = {name: new_row.excluded[name] for name in rows[0] if name not in IDENTITY}
-        fresh: dict[str, Any] = {"ruling": None, "log": None} | values
-        statement = new_row.on_conflict_do_update(
-            index_elements=IDENTITY, set_=fresh, where=SoundingRow.verdict == TAKEN_BACK
-        )
+        rows = list({tuple(one[name] for name in IDENTITY): one for one in reversed(rows)}.values())[::-1]
+        values: dict[str, Any] = {name: row.excluded[name] for name in rows[0] if name not in IDENTITY}
+        taken_back = SoundingRow.verdict == TAKEN_BACK
+        values = {"ruling": None, "log": None} | values
+        settled = row.on_conflict_do_update(index_elements=IDENTITY, set_=values, where=taken_back)
     else:
-        statement = new_row.on_conflict_do_nothing(index_elements=IDENTITY)
-    statement = statement.returning(SoundingRow.vehicle, SoundingRow.time_s, SoundingRow.beam)
+        settled = row.on_conflict_do_nothing(index_elements=IDENTITY)
+    statement = settled.returning(SoundingRow.vehicle, SoundingRow.time_s, SoundingRow.beam)
     new: set[Identity] = set()
     # Some at a time: a statement is prepared by the event loop's thread.
     for first in range(0, len(rows), ROWS_AT_ONCE):

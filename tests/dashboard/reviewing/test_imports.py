@@ -76,6 +76,39 @@ def test_a_log_is_sent_its_counts_are_shown_and_its_soundings_are_on_the_map(
     assert watched.complaints == []
 
 
+def test_a_log_is_taken_back_after_a_question_and_counts_again_when_it_is_sent_again(
+    watched: Watched, service: Service, tmp_path: Path
+) -> None:
+    page = watched.page
+    mission = mission_over(service, rectangle(-25, 0, 35, 60))
+    content = writer.write(tmp_path / "Data.lsf.gz", writer.survey(PINGS)).read_bytes()
+    show(page, mission)
+    by_id(page, "toggle-imports").click()
+    by_id(page, "log-vehicle").fill("wrong")
+    by_id(page, "log-file").set_input_files(files=[file("Data.lsf.gz", content)])
+    log = by_id(page, "logs").locator("> li")
+    expect(log).to_have_attribute("data-state", "done")
+    expect(by_id(page, "soundings")).to_have_text(str(PINGS))
+    by_id(page, "log-delete").click()
+    expect(by_id(page, "log-delete-really")).to_have_text("Leave all that it brought out of the map")
+    page.get_by_role("button", name="Keep it").click()
+    expect(log).to_have_attribute("data-state", "done")
+    by_id(page, "log-delete").click()
+    by_id(page, "log-delete-really").click()
+    expect(log).to_have_attribute("data-state", "taken-back")
+    expect(by_id(page, "log-taken-back")).to_contain_text("Taken back by local operator")
+    expect(by_id(page, "log-delete")).to_have_count(0)
+    expect(by_id(page, "soundings")).to_have_text("0")
+    by_id(page, "log-vehicle").fill("")
+    by_id(page, "log-file").set_input_files(files=[file("Data.lsf.gz", content)])
+    expect(log).to_have_count(2)
+    expect(log.first).to_contain_text(f"Soundings: {PINGS} accepted")
+    expect(log.first).to_contain_text(writer.NAME)
+    expect(by_id(page, "soundings")).to_have_text(str(PINGS))
+    assert violations(page) == []
+    assert watched.complaints == []
+
+
 def test_whose_a_multibeams_file_is_has_to_be_said_and_what_is_refused_is_told(
     watched: Watched, mission: str, tmp_path: Path
 ) -> None:
