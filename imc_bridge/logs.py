@@ -7,7 +7,9 @@ what radio never carried while the vehicle was under water is here. The same int
 from __future__ import annotations
 
 import gzip
+import hashlib
 import os
+import re
 import struct
 import zlib
 from collections import Counter
@@ -40,9 +42,15 @@ BLOCK_BYTES = 1 << 20
 GZIP_MAGIC = b"\x1f\x8b"
 _ORDERS = {struct.pack(f"{order}H", SYNC): struct.Struct(f"{order}H") for order in "<>"}
 """How a packet's size is read, by its first two bytes."""
+_SYNC = re.compile(b"|".join(map(re.escape, _ORDERS)))
 SIZE_OFFSET = 4
 UNREADABLE = (EOFError, gzip.BadGzipFile, zlib.error)
 """What a log raises that was cut off while it was written or copied."""
+SPARE_BYTES = 1 << 27
+WASTED_TIMES = 8
+"""So many bytes, and so many times those of its packets, may be looked at in vain: what reading costs has a bound."""
+UNPACKED_TIMES = 100
+"""Telemetry is packed to a tenth. What grows more than this and ``SPARE_BYTES`` was made to fill a machine."""
 
 OWN = ("EstimatedState", "Distance", "NavigationUncertainty", "EntityList", "EntityInfo", "FuelLevel", "SonarData")
 IDENTIFYING = ("Announce", "EntityList", "EntityInfo")
@@ -105,6 +113,8 @@ class PacketFile:
     size_bytes, read_bytes : int
         Of the file as it lies on disk, for showing how far reading has come.
     packets, skipped_bytes : int
+    wasted_bytes : int
+        How many bytes were looked at that turned out to be of no packet, each as often as that was done.
     cut_off : bool
         Whether the file ends in the middle of a packet or of its compression, as after a power loss.
     """
@@ -114,25 +124,52 @@ class PacketFile:
         self.read_bytes = 0
         self.packets = 0
         self.skipped_bytes = 0
+        self.wasted_bytes = 0
         self.cut_off = False
+        self._packet_bytes = 0
         self._path = path
 
     def __iter__(self) -> Iterator[bytes]:
-        """Yield every packet from the beginning."""
-        self.packets = self.skipped_bytes = self.read_bytes = 0
+        """Yield every packet from the beginning. Raises LogError where hardly anything is one."""
+        self.packets = self.skipped_bytes = self.wasted_bytes = self._packet_bytes = 0
+        rest = b""
+        for block in self._blocks():
+            data = rest + block
+            used = yield from self._packets(data, last=False)
+            rest = data[used:]
+        self.read_bytes = self.size_bytes
+        used = yield from self._packets(rest, last=True)
+        self.cut_off |= used < len(rest)
+
+    def unpacked_sha256(self) -> str:
+        """Return the SHA-256 of what a compressed file holds, in hexadecimal digits; of another one nothing.
+
+        Raises LogError as reading does.
+        """
+        with self._path.open("rb") as raw:
+            if raw.read(len(GZIP_MAGIC)) != GZIP_MAGIC:
+                return ""
+        digest = hashlib.sha256()
+        for block in self._blocks():
+            digest.update(block)
+        return digest.hexdigest()
+
+    def _blocks(self) -> Iterator[bytes]:
+        """Yield the content from the beginning, unpacked. Raises LogError where there is far more than in the file."""
+        self.read_bytes = unpacked_bytes = 0
         self.cut_off = False
         with self._path.open("rb") as raw:
             compressed = raw.read(len(GZIP_MAGIC)) == GZIP_MAGIC
             raw.seek(0)
             stream = cast(BufferedReader, gzip.GzipFile(fileobj=raw)) if compressed else raw
-            rest = b""
             while block := self._block(stream, raw):
-                data = rest + block
-                used = yield from self._packets(data, last=False)
-                rest = data[used:]
-            self.read_bytes = self.size_bytes
-            used = yield from self._packets(rest, last=True)
-            self.cut_off |= used < len(rest)
+                unpacked_bytes += len(block)
+                if compressed and unpacked_bytes > SPARE_BYTES + UNPACKED_TIMES * self.size_bytes:
+                    raise LogError(
+                        f"{self._path.name} unpacks to more than {UNPACKED_TIMES} times its size",
+                        "unpack it, and send what is a log",
+                    )
+                yield block
 
     def _block(self, stream: BufferedReader, raw: BufferedReader) -> bytes:
         try:
@@ -161,19 +198,32 @@ class PacketFile:
                     continue
                 break
             if after < end and data[after : after + 2] not in _ORDERS and not _sound(data[place:after]):
+                self._waste(size)
                 place = self._skip(data, place)
                 continue
             self.packets += 1
+            self._packet_bytes += size
             yield data[place:after]
             place = after
         return place
 
     def _skip(self, data: bytes, place: int) -> int:
         """Return where the next packet may begin."""
-        found = [at for sync in _ORDERS if (at := data.find(sync, place + 1)) >= 0]
-        after = min(found, default=len(data) - 1)
+        # One search for either beginning: one that occurs nowhere would be looked for to the end of the data each time.
+        found = _SYNC.search(data, place + 1)
+        after = len(data) - 1 if found is None else found.start()
         self.skipped_bytes += after - place
+        self._waste(after - place)
         return after
+
+    def _waste(self, count: int) -> None:
+        """Count bytes that were looked at in vain. Raises LogError where these are too many."""
+        self.wasted_bytes += count
+        if self.wasted_bytes > SPARE_BYTES + WASTED_TIMES * self._packet_bytes:
+            raise LogError(
+                f"{self._path.name} holds hardly any whole IMC packet",
+                "copy the file again, or send what was written of it without damage",
+            )
 
 
 def _sound(packet: bytes) -> bool:

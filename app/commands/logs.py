@@ -116,6 +116,8 @@ def _sent(service: RunningService, mission: str, path: Path, vehicle: str | None
         show(log.read_bytes or 0, log.size_bytes or 0)
         time.sleep(ASK_EVERY_S)
         log = LogView.model_validate(service.ask(mission, "GET", f"logs/{log.id}"))
+    if log.state is LogState.TAKEN_BACK:
+        raise CommandError(f"{log.file} was taken back by {log.taken_back_by}", "send it again to have it after all")
     if log.result is None:
         raise CommandError(f"{log.file}: {log.problem}", log.remedy)
     show(log.size_bytes or 0, log.size_bytes or 0)

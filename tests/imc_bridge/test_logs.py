@@ -1,18 +1,20 @@
 """Vehicles' own logs, as soundings: what the file holds is what comes out, however damaged the file is."""
 
 import gzip
+import hashlib
 import math
 import statistics
 from itertools import pairwise
 from pathlib import Path
+from typing import SupportsIndex
 
 import imcpy
 import numpy as np
 import pytest
 from imcpy.coordinates import WGS84
 
-from imc_bridge import BridgeSettings, PingRefused, Sounding, SoundingRefused, StateReport, SwathPing
-from imc_bridge.logs import LogError, VehicleLog
+from imc_bridge import BridgeSettings, PingRefused, Sounding, SoundingRefused, StateReport, SwathPing, logs
+from imc_bridge.logs import LogError, PacketFile, VehicleLog
 from tests.support.imc import log_writer as writer
 
 SETTINGS = BridgeSettings()
@@ -174,3 +176,70 @@ def test_a_real_log_of_dune_is_read_as_a_whole(captures: Path) -> None:
     depths = [sounding.bottom_depth_m for sounding in found]
     assert 20.0 < statistics.fmean(depths) < 30.0
     assert max(abs(a - b) for a, b in pairwise(depths)) < 1.5
+
+
+class Searched(bytes):
+    """Bytes that count how many of them are looked through for something."""
+
+    looked_at = 0
+
+    def find(
+        self,
+        sub: object,
+        start: SupportsIndex | None = None,
+        end: SupportsIndex | None = None,
+    ) -> int:
+        """Find as bytes do."""
+        at = super().find(sub, start, end)  # type: ignore[arg-type]
+        self.looked_at += (len(self) if at < 0 else at) - int(start or 0)
+        return at
+
+
+@pytest.mark.parametrize("sync", sorted(logs._ORDERS))
+def test_what_is_no_packet_is_looked_through_once(tmp_path: Path, sync: bytes) -> None:
+    """Where one byte order occurs often and the other never, that one was looked for to the end each time."""
+    data = Searched(sync * 5000)
+    file = PacketFile(writer.write(tmp_path / "Data.lsf", []))
+    place = 0
+    while place < len(data) - 1:
+        place = file._skip(data, place)
+    assert file.skipped_bytes == file.wasted_bytes == len(data) - 1
+    assert data.looked_at <= 2 * len(data)
+
+
+@pytest.mark.parametrize("name", ["Data.lsf", "Data.lsf.gz"])
+def test_a_file_of_sizes_that_are_not_true_is_not_looked_through_for_hours(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logs, "SPARE_BYTES", 1 << 20)
+    good = b"".join(writer.survey(20))
+    # Each beginning claims 65535 bytes, of which the checksum is not that.
+    begin = good[:4] + b"\xff\xff"
+    path = writer.write(tmp_path / name, [good, begin * 40_000])
+    file = PacketFile(path)
+    with pytest.raises(LogError, match=f"{name} holds hardly any whole IMC packet") as refused:
+        list(file)
+    assert refused.value.remedy
+    assert file.wasted_bytes <= (1 << 20) + 8 * len(good) + (1 << 17)
+    # A log that is damaged somewhere is read.
+    packets = list(writer.survey(20))
+    assert list(PacketFile(writer.write(tmp_path / name, [*packets, begin * 5, *packets]))) == packets * 2
+
+
+def test_a_file_that_unpacks_to_far_more_than_a_log_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(logs, "SPARE_BYTES", 1 << 20)
+    path = tmp_path / "Data.lsf.gz"
+    path.write_bytes(gzip.compress(b"".join(writer.survey(20)) + next(iter(writer.survey(1))) * 200_000))
+    for read in (lambda: list(PacketFile(path)), PacketFile(path).unpacked_sha256):
+        with pytest.raises(LogError, match="unpacks to more than 100 times its size"):
+            read()
+
+
+def test_a_packed_log_is_known_by_what_is_in_it(tmp_path: Path) -> None:
+    plain = writer.write(tmp_path / "Data.lsf", writer.survey(20))
+    digest = hashlib.sha256(plain.read_bytes()).hexdigest()
+    assert PacketFile(plain).unpacked_sha256() == ""
+    packed = tmp_path / "Data.lsf.gz"
+    for level in (1, 9):
+        packed.write_bytes(gzip.compress(plain.read_bytes(), level))
+        assert PacketFile(packed).unpacked_sha256() == digest

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
 from app.api.access.auth import Operator, Reader
+from app.api.http.first_completed import first_of
 from app.api.http.problems import ProblemError, problems
 from app.api.mission import Mission
 from app.api.schemas import API
@@ -105,13 +106,27 @@ async def propose_zones(
     """Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
 
     Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
-    looks at them and takes those that apply into `keep_out`.
+    looks at them and takes those that apply into `keep_out`. Reading ends with the connection.
     """
+    found: list[ProposedZonesView] = []
+
+    async def left() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+
     try:
         async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
-            return await state.service.imports.propose_zones(upload, options)
+
+            async def read() -> None:
+                found.append(await state.service.imports.propose_zones(upload, options))
+
+            # Nobody else's file waits for one that nobody waits for any more.
+            await first_of(read(), left())
     except ClientDisconnect:
-        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+        found.clear()
+    if not found:
+        raise ProblemError("malformed-body", "the connection ended before the file did, or before it was read")
+    return found[0]
 
 
 @charts_router.post(
@@ -176,7 +191,8 @@ async def import_log(
     Every record counts once, however often it comes: by radio, in another log, or in the same file again.
     """
     service = state.service
-    service.logs.check(mission, options)
+    length = request.headers.get("content-length", "")
+    service.logs.check(mission, options, int(length) if length.isdecimal() else None)
     try:
         async with AsyncExitStack() as keeping:
             incoming = service.uploads.receive(request.stream(), state.settings.max_import_bytes)
@@ -206,6 +222,20 @@ async def list_logs(reader: Reader, service: Service, mission: Mission) -> list[
 async def get_log(import_id: ImportId, reader: Reader, service: Service, mission: Mission) -> LogView:
     """Return the import of a log."""
     return await service.logs.one(mission, import_id)
+
+
+@router.delete(
+    "/logs/{import_id}",
+    operation_id="deleteLog",
+    summary="Stop reading a log, or take it back",
+    responses=_FOUND | problems("conflict"),
+)
+async def delete_log(import_id: ImportId, service: Service, operator: Operator, mission: Mission) -> LogView:
+    """Let nothing count of what a log brought: soundings, pings, track; reading it ends.
+
+    The map is made anew of the rest. What the log brought stays stored, marked; the same file sent again counts again.
+    """
+    return await service.logs.take_back(mission, import_id, operator.name)
 
 
 @router.put(

@@ -182,7 +182,7 @@ class LiveMission:
         self._threads = threads
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
         self.notice_imports = Shared(self._notice_imports)
-        """Take up the soundings of logs that the command line imported while this process had the mission."""
+        """Count anew where logs were taken in, by the command line as well, or taken back since that was last done."""
 
     def part(self, kind: Callable[["LiveMission"], Part]) -> Part:
         """Return the mission's own object of a class, made of the mission when it is first asked for."""
@@ -207,7 +207,10 @@ class LiveMission:
         async def read() -> Counts:
             async with self.database.reading() as session:
                 counted = await sounding_queries.counts(session, self.id)
+                before = self.pings.taken_back
                 pinged = await self.pings.open(session)
+            if self.pings.taken_back != before:
+                await self.trails.read_again()
             self.stored_soundings.changed(newest_import=newest)
             self.swath.correct(self.gate.corrections)
             return Counts(

@@ -63,6 +63,13 @@ class Trails:
                 self._newest_id = newest
             return dict(self._trails)
 
+    async def read_again(self) -> None:
+        """Forget what was read: points that were stored before do not count any more."""
+        async with self._reading:
+            self._newest_id = 0
+            for known in (self._points, self._heard, self._imported, self._trails):
+                known.clear()
+
     @property
     def length_m(self) -> float:
         """How far all vehicles went, as of the last time that someone asked for the trails."""

@@ -20,6 +20,7 @@ async def pings_of(live: LiveMission) -> PingsView:
             rejected=row.rejected,
             size_bytes=row.size,
             sha256=row.digest,
+            taken_back=row.log in live.pings.taken_back,
         )
         for row in files
     ]
@@ -37,10 +38,11 @@ async def pings_of(live: LiveMission) -> PingsView:
         )
         for vehicle, found in sorted(waiting.items())
     ]
+    counting = [part for part in parts if not part.taken_back]
     return PingsView(
-        pings=sum(part.pings for part in parts),
-        beams=sum(part.beams for part in parts),
-        rejected=sum(part.rejected for part in parts),
+        pings=sum(part.pings for part in counting),
+        beams=sum(part.beams for part in counting),
+        rejected=sum(part.rejected for part in counting),
         parts=parts,
     )
 

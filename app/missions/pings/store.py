@@ -28,6 +28,7 @@ from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.database import Database
 from app.storage.models import PingBlockRow, PingChunkRow
 from app.storage.ping_files import PingFileError, PingFiles, PingPlaceError, file_name
+from app.storage.queries import logs as log_queries
 from app.storage.queries import pings as ping_queries
 from app.storage.queries.pings import Totals
 
@@ -104,15 +105,18 @@ class PingStore:
         self._any = False
         """Whether there were pings when the mission was opened."""
         self._took = False
+        self.taken_back: frozenset[int] = frozenset()
+        """Numbers of the logs that were taken back: what they brought does not count."""
         self._moving = asyncio.Lock()
         self._mover: asyncio.Task[None] | None = None
         self._tidying: asyncio.Task[None] | None = None
         self._not_before_s = -math.inf
 
     async def open(self, session: AsyncSession) -> Totals:
-        """Look what there is; returns how many pings are stored."""
-        stored = await ping_queries.totals(session, self._mission_id)
-        self._any = stored != Totals()
+        """Look what there is; returns how many pings are stored and count."""
+        self.taken_back = await log_queries.taken_back(session, self._mission_id)
+        stored = await ping_queries.totals(session, self._mission_id, without=self.taken_back)
+        self._any = stored != Totals() or bool(self.taken_back)
         self._newest_s = await ping_queries.newest_times(session, self._mission_id)
         waiting = await ping_queries.waiting(session, self._mission_id)
         self._waiting = Counter({vehicle: found.pings + found.rejected for vehicle, found in waiting.items()})
@@ -185,9 +189,12 @@ class PingStore:
                 blocks.append(JudgedBlock(vehicle, source, indices, judged, pack(judged)))
         return JudgedBatch(verdicts, blocks)
 
-    async def take(self, batches: Sequence[JudgedBatch], step: int, session: AsyncSession) -> TakenPings:
+    async def take(
+        self, batches: Sequence[JudgedBatch], step: int, session: AsyncSession, *, log: int | None = None
+    ) -> TakenPings:
         """Store pings in the caller's transaction, which nobody else does meanwhile; those that are known are not.
 
+        ``log``: the number of the log that brings them.
         Call :meth:`committed` with the result once the transaction has committed.
         """
         verdicts: list[ItemVerdict] = []
@@ -215,7 +222,7 @@ class PingStore:
                 stored[block.vehicle] = stored.get(block.vehicle, Totals()) + sizes
                 if len(good):
                     accepted.setdefault(block.vehicle, []).append(good)
-                rows.append(self._row(block, sizes, step, received))
+                rows.append(self._row(block, sizes, step, received) | {"log": log})
             verdicts += own
         await ping_queries.add_blocks(session, rows)
         return TakenPings(verdicts, stored, {vehicle: joined(parts) for vehicle, parts in accepted.items()})
@@ -244,7 +251,7 @@ class PingStore:
         self._newest_s[vehicle] = max(newest_s, float(times_s.max()))
         if times_s.min() > newest_s:
             return set()
-        return await ping_queries.known_times(session, self._mission_id, vehicle, times_s)
+        return await ping_queries.known_times(session, self._mission_id, vehicle, times_s, without=self.taken_back)
 
     def committed(self, taken: TakenPings) -> None:
         """Note that what was taken is stored; what there is enough of is moved to a file beside everything else."""
@@ -312,8 +319,10 @@ class PingStore:
                 chunks = await ping_queries.chunks(session, self._mission_id)
             missing = [one for one in chunks if one.last_block > done.get(one.vehicle, 0) and one.first_block <= until]
             for chunk in missing:
-                pings = await self._accepted_of(chunk, done.get(chunk.vehicle, 0), until, until_step)
-                done[chunk.vehicle] = chunk.last_block
+                before, done[chunk.vehicle] = done.get(chunk.vehicle, 0), chunk.last_block
+                if chunk.log in self.taken_back:
+                    continue
+                pings = await self._accepted_of(chunk, before, until, until_step)
                 if len(pings):
                     yield chunk.vehicle, pings
             if missing:
@@ -323,6 +332,7 @@ class PingStore:
             after = rows[-1].id
             for row in rows:
                 done[row.vehicle] = row.id
+            rows = [row for row in rows if row.log not in self.taken_back]
             wanted = [row for row in rows if until_step is None or row.step <= until_step]
             for vehicle, pings in await asyncio.to_thread(_accepted_by_vehicle, wanted):
                 yield vehicle, pings
@@ -341,11 +351,11 @@ class PingStore:
             raise _unreadable(error) from None
 
     async def contents(self) -> tuple[Sequence[PingChunkRow], Mapping[str, ping_queries.Waiting]]:
-        """Return the files, and by vehicle what is in none yet."""
+        """Return the files, and by vehicle what is in none yet, without what was taken back."""
         async with self._database.reading() as session:
             return (
                 await ping_queries.chunks(session, self._mission_id),
-                await ping_queries.waiting(session, self._mission_id),
+                await ping_queries.waiting(session, self._mission_id, without=self.taken_back),
             )
 
     async def file(self, number: int) -> tuple[PingChunkRow, bytes] | None:
@@ -426,6 +436,7 @@ def _chunk_of(rows: Sequence[PingBlockRow]) -> tuple[PingChunkRow, bytes]:
         times=b"".join(row.times for row in rows),
         digest=digest,
         size=len(content),
+        log=first.log,
     )
     return chunk, content
 

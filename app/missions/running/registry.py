@@ -271,6 +271,11 @@ class MissionRegistry:
             raise ConflictError(f"the mission is {live.header.state}", "finish or abort it first")
         counts = live.journal.counts
         _refuse_measured(live.header.step, counts.accepted + counts.rejected, counts.pings + counts.rejected_pings)
+        async with live.database.reading() as session:
+            # What was taken back is kept as well.
+            measured = sum((await sounding_queries.counts(session, live.id)).values())
+            pinged = await ping_queries.totals(session, live.id)
+        _refuse_measured(0, measured, pinged.pings + pinged.rejected)
         self._maps.forget(live.id)
         async with live.database.writing() as session:
             await _delete(session, live.id)

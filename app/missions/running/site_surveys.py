@@ -63,7 +63,7 @@ async def _period(live: LiveMission) -> tuple[float, float] | None:
     """Return when the mission measured, Unix seconds, never after it ended: clocks may be wrong, or simulated."""
     async with live.database.reading() as session:
         extent = await sounding_queries.extent(session, live.id, "accepted")
-        pinged = await ping_queries.period(session, live.id)
+        pinged = await ping_queries.period(session, live.id, without=live.pings.taken_back)
     ends = [] if extent is None else [extent.first_time_s, extent.last_time_s]
     ends += [] if pinged is None else [*pinged]
     ended_s = live.header.updated_at.timestamp()

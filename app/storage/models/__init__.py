@@ -7,7 +7,7 @@ from app.storage.models.access import AuditRow, SessionRow, TokenRow
 from app.storage.models.alarms import AlarmDeliveryRow, AlarmRow
 from app.storage.models.base import Base
 from app.storage.models.maps import AdjustmentRow, ImportRow, ReferenceRow, StoredMapRow, TideTableRow
-from app.storage.models.measurements import PositionRow, ScanRow, SoundingRow, TargetRangeRow, TelemetryRow
+from app.storage.models.measurements import LogRow, PositionRow, ScanRow, SoundingRow, TargetRangeRow, TelemetryRow
 from app.storage.models.missions import (
     BatchRow,
     EventRow,
@@ -31,6 +31,7 @@ __all__ = [
     "ConsoleRow",
     "EventRow",
     "ImportRow",
+    "LogRow",
     "MissionOwnerRow",
     "MissionRow",
     "MissionVehicleRow",

@@ -47,6 +47,34 @@ class SoundingRow(Base):
     reason: Mapped[str] = mapped_column(Text, default="")
     ruling: Mapped[str | None] = mapped_column(String(16))
     """An operator's decision, which overrules gate and map: restored or rejected."""
+    log: Mapped[int | None] = mapped_column(BigId)
+    """The :class:`LogRow` of the log that brought it; None: it was sent, or brought before logs were numbered."""
+
+
+class LogRow(Base):
+    """A vehicle's own log, of which something is stored; taken back and sent again it is another one.
+
+    Rows of other tables have its number in their column ``log``.
+    """
+
+    __tablename__ = "logs"
+    __table_args__ = (
+        Index("ix_logs_mission", "mission_id", "digest"),
+        # The number of a log that went with its mission must never be another one's.
+        {"sqlite_autoincrement": True},
+    )
+
+    id: Mapped[int] = mapped_column(BigId, primary_key=True, autoincrement=True)
+    mission_id: Mapped[str] = mapped_column(ForeignKey("missions.id", ondelete="CASCADE"))
+    vehicle: Mapped[str] = mapped_column(String(64))
+    digest: Mapped[str] = mapped_column(String(64))
+    """SHA-256 of its content, unpacked."""
+    altimeter: Mapped[str] = mapped_column(String(64))
+    """The entity whose distances were taken as soundings."""
+    file: Mapped[str] = mapped_column(String(200))
+    created_at: Mapped[datetime]
+    taken_back_at: Mapped[datetime | None]
+    taken_back_by: Mapped[str | None] = mapped_column(String(200))
 
 
 class TargetRangeRow(Base):
@@ -124,6 +152,7 @@ class PositionRow(Base):
     depth_m: Mapped[float]
     imported: Mapped[bool] = mapped_column(default=False, server_default=false())
     """Whether a log brought it later; else ids are in the order in which positions arrived."""
+    log: Mapped[int | None] = mapped_column(BigId)
 
 
 class TelemetryRow(Base):

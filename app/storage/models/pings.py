@@ -37,6 +37,8 @@ class PingBlockRow(Base):
     """Pings that were refused; the content has them and why."""
     times: Mapped[bytes] = mapped_column(LargeBinary)
     content: Mapped[bytes] = mapped_column(LargeBinary)
+    log: Mapped[int | None] = mapped_column(BigId)
+    """The :class:`LogRow` of the log that brought them."""
 
 
 class PingChunkRow(Base):
@@ -66,3 +68,5 @@ class PingChunkRow(Base):
     digest: Mapped[str] = mapped_column(String(64))
     """SHA-256 of the file."""
     size: Mapped[int] = mapped_column(BigId)
+    log: Mapped[int | None] = mapped_column(BigId)
+    """The log that brought all of them; None: none brought any."""

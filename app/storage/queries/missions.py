@@ -6,11 +6,11 @@ from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Select, Subquery, func, select, update
+from sqlalchemy import ColumnElement, Select, Subquery, func, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import aliased, defer
 
-from app.storage.models import EventRow, MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
+from app.storage.models import EventRow, LogRow, MissionRow, MissionVehicleRow, PositionRow, StepRow, WaypointRow
 
 ALL = select(MissionRow.id).order_by(MissionRow.created_at.desc(), MissionRow.id)
 """The ids of all missions, newest first."""
@@ -250,6 +250,12 @@ async def add_positions(session: AsyncSession, rows: Sequence[dict[str, Any]]) -
         await session.execute(PositionRow.__table__.insert(), list(rows))  # type: ignore[attr-defined]
 
 
+def _counts(mission_id: str) -> ColumnElement[bool]:
+    """Return the condition that a position is of no log that was taken back."""
+    taken_back = select(LogRow.id).where(LogRow.mission_id == mission_id, LogRow.taken_back_at.is_not(None))
+    return or_(PositionRow.log.is_(None), PositionRow.log.not_in(taken_back))
+
+
 def positions_after(mission_id: str, after_id: int) -> Select[*tuple[Any, ...]]:
     """Return the query of places that were written after the one of this id: id, vehicle, origin, time and place."""
     return (
@@ -262,7 +268,7 @@ def positions_after(mission_id: str, after_id: int) -> Select[*tuple[Any, ...]]:
             PositionRow.lat_deg,
             PositionRow.depth_m,
         )
-        .where(PositionRow.mission_id == mission_id, PositionRow.id > after_id)
+        .where(PositionRow.mission_id == mission_id, PositionRow.id > after_id, _counts(mission_id))
         .order_by(PositionRow.id)
     )
 
@@ -282,7 +288,7 @@ async def track_points(session: AsyncSession, mission_id: str) -> dict[str, list
     """Return each vehicle's places as (longitude, latitude, depth, time), in the order of arrival."""
     query = (
         select(PositionRow.vehicle, PositionRow.lon_deg, PositionRow.lat_deg, PositionRow.depth_m, PositionRow.time_s)
-        .where(PositionRow.mission_id == mission_id)
+        .where(PositionRow.mission_id == mission_id, _counts(mission_id))
         .order_by(PositionRow.vehicle, PositionRow.id)
     )
     result: dict[str, list[tuple[float, float, float, float]]] = {}

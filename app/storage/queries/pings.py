@@ -1,12 +1,12 @@
 """Queries on the pings of swath sonars: blocks in the database, and the files that blocks were moved to."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import ColumnElement, delete, func, insert, or_, select, true
 from sqlalchemy.ext.asyncio import AsyncSession
 from sqlalchemy.orm import defer
 
@@ -40,8 +40,20 @@ async def add_blocks(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> N
         await session.execute(insert(PingBlockRow), list(rows))
 
 
-async def known_times(session: AsyncSession, mission_id: str, vehicle: str, times_s: NDArray[np.float64]) -> set[float]:
-    """Return those of the times at which a ping of the vehicle is stored already.
+def _not_of(table: type[PingBlockRow] | type[PingChunkRow], without: Collection[int]) -> ColumnElement[bool]:
+    """Return the condition that no log of these numbers brought the pings."""
+    return or_(table.log.is_(None), table.log.not_in(without)) if without else true()
+
+
+async def known_times(
+    session: AsyncSession,
+    mission_id: str,
+    vehicle: str,
+    times_s: NDArray[np.float64],
+    *,
+    without: Collection[int] = (),
+) -> set[float]:
+    """Return those of the times at which a ping of the vehicle is stored already, by no log ``without`` which it is.
 
     Only blocks and files that may have one are looked at: of pings in the order they were made none, or the last.
     """
@@ -52,6 +64,7 @@ async def known_times(session: AsyncSession, mission_id: str, vehicle: str, time
             table.vehicle == vehicle,
             table.last_time_s >= float(times_s.min()),
             table.first_time_s <= float(times_s.max()),
+            _not_of(table, without),
         )
         for stored in await session.scalars(query):
             found.update(np.intersect1d(np.frombuffer(stored, "<f8"), times_s).tolist())
@@ -68,18 +81,21 @@ async def newest_times(session: AsyncSession, mission_id: str) -> dict[str, floa
     return newest
 
 
-async def period(session: AsyncSession, mission_id: str) -> tuple[float, float] | None:
-    """Return the times of a mission's first and last ping; None without any."""
+async def period(
+    session: AsyncSession, mission_id: str, *, without: Collection[int] = ()
+) -> tuple[float, float] | None:
+    """Return the times of a mission's first and last ping, ``without`` those of some logs; None without any."""
     ends: list[float] = []
     for table in (PingBlockRow, PingChunkRow):
         query = select(func.min(table.first_time_s), func.max(table.last_time_s))
-        first_s, last_s = (await session.execute(query.where(table.mission_id == mission_id))).one()
+        of_mission = (table.mission_id == mission_id, _not_of(table, without))
+        first_s, last_s = (await session.execute(query.where(*of_mission))).one()
         ends += [] if first_s is None else [first_s, last_s]
     return (min(ends), max(ends)) if ends else None
 
 
-async def waiting(session: AsyncSession, mission_id: str) -> dict[str, Waiting]:
-    """Return by vehicle what is in no file yet."""
+async def waiting(session: AsyncSession, mission_id: str, *, without: Collection[int] = ()) -> dict[str, Waiting]:
+    """Return by vehicle what is in no file yet, ``without`` what some logs brought."""
     table = PingBlockRow
     query = select(
         table.vehicle,
@@ -90,19 +106,20 @@ async def waiting(session: AsyncSession, mission_id: str) -> dict[str, Waiting]:
         func.min(table.first_time_s),
         func.max(table.last_time_s),
     )
-    found = await session.execute(query.where(table.mission_id == mission_id).group_by(table.vehicle))
+    of_mission = (table.mission_id == mission_id, _not_of(table, without))
+    found = await session.execute(query.where(*of_mission).group_by(table.vehicle))
     return {
         vehicle: Waiting(int(pings), int(beams), int(rejected), blocks, first_s, last_s)
         for vehicle, pings, beams, rejected, blocks, first_s, last_s in found
     }
 
 
-async def totals(session: AsyncSession, mission_id: str) -> Totals:
-    """Return how many pings of a mission are stored."""
+async def totals(session: AsyncSession, mission_id: str, *, without: Collection[int] = ()) -> Totals:
+    """Return how many pings of a mission are stored, ``without`` what some logs brought."""
     found = Totals()
     for table in (PingBlockRow, PingChunkRow):
         sums = select(func.sum(table.pings), func.sum(table.beams), func.sum(table.rejected))
-        row = (await session.execute(sums.where(table.mission_id == mission_id))).one()
+        row = (await session.execute(sums.where(table.mission_id == mission_id, _not_of(table, without)))).one()
         found += Totals(*(int(number or 0) for number in row))
     return found
 
@@ -115,13 +132,15 @@ async def newest_block(session: AsyncSession, mission_id: str) -> int:
 
 
 async def oldest_blocks(session: AsyncSession, mission_id: str, vehicle: str, pings: int) -> Sequence[PingBlockRow]:
-    """Return a vehicle's oldest blocks, with so many pings together if there are so many."""
+    """Return a vehicle's oldest blocks, with so many pings together if there are so many; of one log, or of none."""
     table = PingBlockRow
     of_vehicle = (table.mission_id == mission_id, table.vehicle == vehicle)
-    sizes = select(table.id, table.pings + table.rejected).where(*of_vehicle).order_by(table.id).limit(pings)
-    last, gathered = 0, 0
-    for block, size in await session.execute(sizes):
-        last, gathered = block, gathered + size
+    sizes = select(table.id, table.pings + table.rejected, table.log).where(*of_vehicle).order_by(table.id)
+    last, gathered, of_log = 0, 0, None
+    for block, size, log in await session.execute(sizes.limit(pings)):
+        if gathered and log != of_log:
+            break
+        last, gathered, of_log = block, gathered + size, log
         if gathered >= pings:
             break
     return (await session.scalars(select(table).where(*of_vehicle, table.id <= last).order_by(table.id))).all()

@@ -17,22 +17,39 @@ from app.storage.models import BatchRow, ImportRow, MissionRow, ReferenceRow, So
 LOG_KEY = "log-1"
 """What the keys of batches of vehicles' logs begin with."""
 
+TAKEN_BACK = "taken-back"
+"""The verdict on soundings whose log was taken back: their values stay, and whatever comes again takes their place."""
+
 ROWS_AT_ONCE = 200
 
 Identity = tuple[str, float, int]
 """What makes a sounding the same sounding within a mission: vehicle, vehicle's time, beam."""
 
 
-async def insert_new(session: AsyncSession, rows: Sequence[dict[str, Any]]) -> set[Identity]:
-    """Store soundings; those already there are left alone. Returns the identities that were new."""
+IDENTITY = ("mission_id", "vehicle", "time_s", "beam")
+
+
+async def insert_new(
+    session: AsyncSession, rows: Sequence[dict[str, Any]], *, any_taken_back: bool = False
+) -> set[Identity]:
+    """Store soundings; those already there are left alone. Returns the identities that were new.
+
+    ``any_taken_back``: the mission has soundings whose log was taken back; those that come again take their place.
+    """
     if not rows:
         return set()
     insert = sqlite.insert if session.get_bind().dialect.name == "sqlite" else postgresql.insert
-    statement = (
-        insert(SoundingRow)
-        .on_conflict_do_nothing(index_elements=["mission_id", "vehicle", "time_s", "beam"])
-        .returning(SoundingRow.vehicle, SoundingRow.time_s, SoundingRow.beam)
-    )
+    row = insert(SoundingRow)
+    if any_taken_back:
+        # Of two with one identity in a statement PostgreSQL would refuse the second.
+        rows = list({tuple(one[name] for name in IDENTITY): one for one in reversed(rows)}.values())[::-1]
+        values: dict[str, Any] = {name: row.excluded[name] for name in rows[0] if name not in IDENTITY}
+        taken_back = SoundingRow.verdict == TAKEN_BACK
+        values = {"ruling": None, "log": None} | values
+        settled = row.on_conflict_do_update(index_elements=IDENTITY, set_=values, where=taken_back)
+    else:
+        settled = row.on_conflict_do_nothing(index_elements=IDENTITY)
+    statement = settled.returning(SoundingRow.vehicle, SoundingRow.time_s, SoundingRow.beam)
     new: set[Identity] = set()
     # Some at a time: a statement is prepared by the event loop's thread.
     for first in range(0, len(rows), ROWS_AT_ONCE):
@@ -241,14 +258,6 @@ async def window(
 async def answer_to(session: AsyncSession, mission_id: str, key: str) -> BatchRow | None:
     """Return the answer once given to an idempotency key; waits for a transaction that is about to answer."""
     return next(iter(await answers_to(session, mission_id, {key})), None)
-
-
-async def first_log_keys(session: AsyncSession, mission_id: str, digest: str) -> Sequence[str]:
-    """Return the keys of the first batches of a file that was taken in as vehicles' logs; ``digest``: its SHA-256."""
-    query = select(BatchRow.key).where(
-        BatchRow.mission_id == mission_id, BatchRow.digest == digest, BatchRow.key.like(f"{LOG_KEY}-%-0")
-    )
-    return (await session.scalars(query)).all()
 
 
 async def answers_to(session: AsyncSession, mission_id: str, keys: Collection[str]) -> Sequence[BatchRow]:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import delete, func, select
 from sqlalchemy.ext.asyncio import AsyncSession
 
-from app.storage.models import SiteSurveyRow, SoundingRow, StoredMapRow
+from app.storage.models import LogRow, SiteSurveyRow, SoundingRow, StoredMapRow
 
 
 class Stored(NamedTuple):
@@ -26,11 +26,13 @@ async def stored_map(session: AsyncSession, mission_id: str, last_import: int) -
     """Return the stored map and how many soundings there are: only those that came since are counted.
 
     ``last_import`` is the newest log line of an import: logs are written by other processes, too, whose soundings may
-    have earlier ids than others that were stored before. After one everything is counted.
+    have earlier ids than others that were stored before. After one everything is counted, and where a log was taken
+    back: what comes again has the id of what it takes the place of.
     """
     row = await session.get(StoredMapRow, mission_id)
+    taken_back = select(LogRow.id).where(LogRow.mission_id == mission_id, LogRow.taken_back_at.is_not(None)).limit(1)
     query = select(SoundingRow.verdict, func.count().label("n")).where(SoundingRow.mission_id == mission_id)
-    known = row is not None and row.last_import == last_import
+    known = row is not None and row.last_import == last_import and await session.scalar(taken_back) is None
     if row is not None and known:
         query = query.where(SoundingRow.id > row.last_sounding)
     since = {found.verdict: found.n for found in await session.execute(query.group_by(SoundingRow.verdict))}

@@ -22,6 +22,8 @@ from app.storage.database import Database
 from app.storage.models import MissionOwnerRow, MissionRow, ProcessRow
 from app.storage.processes.process_lock import ProcessLock
 from tests.support.api.rest import Tokens, make_client, make_tokens, mission_spec, running, soundings
+from tests.support.imc import log_writer
+from tests.support.waiting import until
 
 
 @dataclass(kw_only=True)
@@ -67,6 +69,32 @@ async def test_everyone_has_there_the_role_that_he_has_here(two: Two) -> None:
     assert any("the operator" in event["message"] for event in events), "his name is in the mission's log"
     audit = (await two.at_other.get("/audit", headers=two.as_("admin"))).json()
     assert ("the operator", "operator") in {(row["actor"], row["role"]) for row in audit}
+
+
+@pytest.mark.slow
+async def test_a_log_is_sent_to_one_process_and_read_by_the_other(two: Two, tmp_path: Path) -> None:
+    content = log_writer.write(tmp_path / "Data.lsf.gz", log_writer.survey(100)).read_bytes()
+    query = {"filename": "Data.lsf.gz", "vehicle": "wrong"}
+    operator = two.as_("operator")
+    sent = await two.at_other.post(f"{two.path}/logs", content=content, params=query, headers=operator)
+    assert sent.status_code == 202, sent.text
+    log = f"{two.path}/logs/{sent.json()['id']}"
+
+    async def done() -> bool:
+        return bool((await two.at_other.get(log, headers=operator)).json()["state"] == "done")
+
+    await until(done, "it is read")
+    assert (await two.at_other.get(two.path, headers=operator)).json()["progress"]["soundings"] == 100
+    again = await two.at_other.post(f"{two.path}/logs", content=content, params={"filename": "a.gz"}, headers=operator)
+    log = f"{two.path}/logs/{again.json()['id']}"
+
+    async def refused() -> bool:
+        return bool((await two.at_other.get(log, headers=operator)).json()["state"] == "failed")
+
+    await until(refused, "it is one vehicle's")
+    taken_back = await two.at_other.delete(f"{two.path}/logs/{sent.json()['id']}", headers=operator)
+    assert (taken_back.status_code, taken_back.json()["taken_back_by"]) == (200, "the operator")
+    assert (await two.at_other.get(two.path, headers=operator)).json()["progress"]["soundings"] == 0
 
 
 async def test_live_views_that_are_sent_on_end_with_their_token(two: Two, monkeypatch: pytest.MonkeyPatch) -> None:

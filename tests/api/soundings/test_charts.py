@@ -8,9 +8,11 @@ import httpx
 import pytest
 
 from app.mapping.readers.enc import HAZARDS
+from app.missions.operations.imports import reader_process
 from tests.support.api.rest import mission_spec
 from tests.support.mapping.enc import Cell
 from tests.support.missions.specs import AREA
+from tests.support.waiting import until
 
 WEST, SOUTH = AREA["coordinates"][0][0]
 EAST, NORTH = AREA["coordinates"][0][2]
@@ -45,6 +47,27 @@ async def test_a_mission_begins_with_a_chart_s_depths(
     assert taken["median_sd_m"] == pytest.approx((0.5 + 0.01 * 10.5) / 1.96, rel=0.01)
     again = await client.post(path, content=cell, params={"filename": "PT426101.000", "source": "ENC"})
     assert again.status_code == 200
+
+
+async def test_a_chart_that_nobody_waits_for_any_more_is_not_read_on(
+    client: httpx.AsyncClient, cell: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended = asyncio.Event(), asyncio.Event()
+
+    async def for_ever(*_: Any) -> Any:
+        begun.set()
+        try:
+            await asyncio.Event().wait()
+        finally:
+            ended.set()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(reader_process, "_run", for_ever)
+        asking = asyncio.create_task(client.post("/chart-zones", content=cell, params=ENDS))
+        await until(begun.is_set, "it is being read")
+        asking.cancel()
+        await until(ended.is_set, "nobody reads it any more")
+    assert (await client.post("/chart-zones", content=cell, params=ENDS)).status_code == 200, "the turn is free"
 
 
 @pytest.mark.slow

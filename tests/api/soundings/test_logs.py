@@ -117,15 +117,20 @@ async def test_the_same_file_again_stores_nothing_and_another_run_lists_what_was
         assert again["result"] == first["result"] | {"known": True}
         assert (await client.get(path)).json()["progress"]["soundings"] == PINGS
         assert len(await lines(client, path)) == 1
+        # It is the same log unpacked.
+        unpacked = gzip.decompress(content)
+        plain = await ended(client, path, await send(client, path, unpacked, filename="Data.lsf"))
+        assert plain["result"] == again["result"] | {"file": "Data.lsf"}
         # The same records in another file are known one by one.
-        plain = await ended(client, path, await send(client, path, gzip.decompress(content), filename="Data.lsf"))
-        assert (plain["result"]["soundings"], plain["result"]["duplicate"]) == (0, PINGS)
+        longer = unpacked + writer.announce(1.0)
+        other = await ended(client, path, await send(client, path, longer, filename="longer.lsf"))
+        assert (other["result"]["soundings"], other["result"]["duplicate"]) == (0, PINGS)
         assert [one["id"] for one in (await client.get(f"{path}/logs")).json()] == [
-            one["id"] for one in (first, again, plain)
+            one["id"] for one in (first, again, plain, other)
         ]
     async with running(settings) as server, make_client(server) as client:
         listed = (await client.get(f"{path}/logs")).json()
-        assert [(one["id"], one["result"]) for one in listed] == [(one["id"], one["result"]) for one in (first, plain)]
+        assert [(one["id"], one["result"]) for one in listed] == [(one["id"], one["result"]) for one in (first, other)]
 
 
 @pytest.mark.slow
@@ -317,8 +322,26 @@ async def test_a_log_is_not_taken_as_two_vehicles(client: httpx.AsyncClient, pat
     assert again["problem"] == "the same file is in the mission as the log of wrong: its soundings would count twice"
     assert again["remedy"]
     assert (await client.get(path)).json()["progress"]["soundings"] == PINGS
+    # Nor unpacked, nor packed otherwise.
+    for other in (gzip.decompress(content), gzip.compress(gzip.decompress(content), 1)):
+        refused = await ended(client, path, await send(client, path, other, vehicle="another"))
+        assert refused["problem"] == again["problem"]
     same = await ended(client, path, await send(client, path, content, vehicle="wrong"))
     assert same["result"]["known"]
+
+
+async def test_a_vehicle_may_be_called_as_the_keys_of_pings_are(
+    client: httpx.AsyncClient, path: str, content: bytes
+) -> None:
+    names = [f"{writer.NAME}-pings", f"{writer.NAME}-pings-0", "0"]
+    other = gzip.decompress(content)
+    for count, name in enumerate(names):
+        # Each has a file of its own.
+        file = other + writer.announce(1.0 + count)
+        log = await ended(client, path, await send(client, path, file, vehicle=name))
+        assert (log["state"], log["result"]["soundings"]) == ("done", PINGS)
+        again = await ended(client, path, await send(client, path, file, vehicle=name))
+        assert (again["problem"], again["result"]) == ("", log["result"] | {"known": True})
 
 
 @pytest.mark.slow
@@ -379,6 +402,12 @@ async def test_only_so_many_logs_wait_and_each_is_read_in_its_turn(
         file = writer.write(tmp_path / f"{count}.lsf", writer.survey(10 * count)).read_bytes()
         sent.append(await send(client, path, file, filename=f"{count}.lsf"))
     assert sent[-1].json()["state"] == "waiting"
+    # One of them sent once more is answered as it was: it is under way.
+    twin = await send(client, path, (tmp_path / "2.lsf").read_bytes(), filename="2.lsf")
+    assert (twin.status_code, twin.json()["id"]) == (202, sent[1].json()["id"])
+    like = (tmp_path / "2.lsf").read_bytes()
+    other = await send(client, path, like[:-1] + bytes([like[-1] ^ 1]), filename="2.lsf")
+    assert other.status_code == 503, "it is as large, and another one"
     refused = await send(client, path, b"x", filename="more.lsf")
     assert (refused.status_code, refused.json()["type"]) == (503, "urn:bathyfleet:problem:import-unavailable")
     assert refused.headers["Retry-After"]

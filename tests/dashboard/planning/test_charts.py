@@ -64,3 +64,25 @@ def test_zones_of_a_chart_are_proposed_and_those_that_are_ticked_are_kept_out_of
     (zone,) = service.get(f"/missions/{newest}")["spec"]["keep_out"]
     (ring,) = zone["coordinates"]
     assert min(lon for lon, _ in ring) < WEST + 1e-3 < max(lon for lon, _ in ring)
+
+
+def test_reading_a_chart_is_cancelled(watched: Watched, cell: bytes) -> None:
+    page = watched.page
+    # It never arrives: what the page does while it waits is what is looked at.
+    page.route("**/chart-zones?*", lambda _route: None)
+    page.goto("/")
+    expect(by_id(page, "map")).to_have_attribute("data-ready", "true")
+    by_id(page, "new-mission").click()
+    area = json.dumps({"type": "Polygon", "coordinates": [RING]}).encode()
+    by_id(page, "area-file").set_input_files(FilePayload(name="a.geojson", mimeType="application/json", buffer=area))
+    chart = FilePayload(name="PT426101.000", mimeType="application/octet-stream", buffer=cell)
+    expect(by_id(page, "chart-cancel")).to_have_count(0)
+    by_id(page, "chart-file").set_input_files(chart)
+    expect(page.get_by_text("The chart is being read…")).to_be_visible()
+    by_id(page, "chart-cancel").click()
+    expect(page.get_by_text("Zones from a chart (ENC)…")).to_be_visible()
+    expect(by_id(page, "chart-cancel")).to_have_count(0)
+    expect(page.locator(".chart-zones").get_by_role("alert")).to_have_count(0)
+    page.unroute_all(behavior="ignoreErrors")
+    by_id(page, "chart-file").set_input_files(chart)
+    expect(by_id(page, "chart-zones")).to_contain_text("2 zones on the chart")

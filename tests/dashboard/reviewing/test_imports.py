@@ -8,6 +8,7 @@ import pytest
 from playwright.sync_api import FilePayload, expect
 
 from app.mapping.coordinates.georeference import LocalFrame
+from tests.support.api.rest import soundings
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, expect_colours, picture, show, violations
@@ -73,6 +74,39 @@ def test_a_log_is_sent_its_counts_are_shown_and_its_soundings_are_on_the_map(
     assert violations(page) == []
     by_id(page, "toggle-imports").click()
     expect_colours(page)
+    assert watched.complaints == []
+
+
+def test_a_log_is_taken_back_after_a_question_and_counts_again_when_it_is_sent_again(
+    watched: Watched, service: Service, tmp_path: Path
+) -> None:
+    page = watched.page
+    mission = mission_over(service, rectangle(-25, 0, 35, 60))
+    content = writer.write(tmp_path / "Data.lsf.gz", writer.survey(PINGS)).read_bytes()
+    service.post(f"/missions/{mission}/measurements", {"items": soundings(5)})
+    show(page, mission)
+    by_id(page, "toggle-imports").click()
+    by_id(page, "log-vehicle").fill("wrong")
+    by_id(page, "log-file").set_input_files(files=[file("Data.lsf.gz", content)])
+    log = by_id(page, "logs").locator("> li")
+    expect(log).to_have_attribute("data-state", "done")
+    expect(by_id(page, "soundings")).to_have_text(str(PINGS + 5))
+    by_id(page, "log-delete").click()
+    expect(by_id(page, "log-delete-really")).to_have_text("Leave all that it brought out of the map")
+    page.get_by_role("button", name="Keep it").click()
+    expect(log).to_have_attribute("data-state", "done")
+    by_id(page, "log-delete").click()
+    by_id(page, "log-delete-really").click()
+    expect(log).to_have_attribute("data-state", "taken-back")
+    expect(by_id(page, "log-taken-back")).to_contain_text("Taken back by local operator")
+    expect(by_id(page, "log-delete")).to_have_count(0)
+    expect(by_id(page, "soundings")).to_have_text("5")
+    by_id(page, "log-vehicle").fill("")
+    by_id(page, "log-file").set_input_files(files=[file("Data.lsf.gz", content)])
+    expect(log).to_have_count(2)
+    expect(log.first).to_contain_text(f"Soundings: {PINGS} accepted")
+    expect(log.first).to_contain_text(writer.NAME)
+    expect(by_id(page, "soundings")).to_have_text(str(PINGS + 5))
     assert watched.complaints == []
 
 

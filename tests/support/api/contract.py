@@ -86,6 +86,7 @@ CONTRACT = {
     "POST /drawings": "readDrawing",
     "GET /missions/{mission_id}/imports": "listImports",
     "DELETE /missions/{mission_id}/imports/{import_id}": "deleteImport",
+    "DELETE /missions/{mission_id}/logs/{import_id}": "deleteLog",
     "POST /missions/{mission_id}/logs": "importLog",
     "GET /missions/{mission_id}/logs": "listLogs",
     "GET /missions/{mission_id}/logs/{import_id}": "getLog",

@@ -15,6 +15,7 @@ from app.storage.models import (
     ConsoleRow,
     EventRow,
     ImportRow,
+    LogRow,
     MissionOwnerRow,
     MissionRow,
     MissionVehicleRow,
@@ -246,6 +247,16 @@ def one_of_each() -> list[list[Any]]:
         [
             SoundingRow(**sounding()),
             PositionRow(**position()),
+            LogRow(
+                mission_id="m1",
+                vehicle="a",
+                digest="e" * 64,
+                altimeter="vertical",
+                file="Data.lsf",
+                created_at=TIME,
+                taken_back_at=TIME,
+                taken_back_by="me",
+            ),
             TargetRangeRow(**target_range()),
             ScanRow(**scan()),
             VehicleOrderRow(

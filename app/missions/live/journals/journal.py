@@ -226,9 +226,9 @@ class Journal(WriteBehind[Noted]):
         return committed
 
     async def take_pings(
-        self, batches: Sequence[JudgedBatch], session: AsyncSession
+        self, batches: Sequence[JudgedBatch], session: AsyncSession, *, log: int | None = None
     ) -> tuple[Sequence[ItemVerdict], Committed]:
-        """Store pings in the caller's transaction; the caller holds ``writing``.
+        """Store pings in the caller's transaction; the caller holds ``writing``. ``log``: that brings them.
 
         Returns
         -------
@@ -236,7 +236,7 @@ class Journal(WriteBehind[Noted]):
         """
         if not batches:
             return [], lambda: None
-        taken = await self._pings.take(batches, self.step, session)
+        taken = await self._pings.take(batches, self.step, session, log=log)
         return taken.verdicts, lambda: self._count_pings(taken)
 
     def _count_pings(self, taken: TakenPings) -> None:
@@ -269,17 +269,22 @@ class Journal(WriteBehind[Noted]):
         return await self._take_scans(reports, self.step, session)
 
     async def take(
-        self, reports: Sequence[SoundingReport], session: AsyncSession, *, gate: Gate | None = None
+        self,
+        reports: Sequence[SoundingReport],
+        session: AsyncSession,
+        *,
+        gate: Gate | None = None,
+        log: int | None = None,
     ) -> tuple[list[ItemVerdict], Committed]:
         """Store soundings in the caller's transaction; the caller holds ``writing``.
 
-        ``gate`` judges them in place of the mission's own.
+        ``gate`` judges them in place of the mission's own; ``log`` is the number of the log that brings them.
 
         Returns
         -------
         The verdicts in the order of the reports, and what to call once the transaction has committed.
         """
-        gated, new = await self._store_soundings(session, reports, gate)
+        gated, new = await self._store_soundings(session, reports, gate, log)
         return await made_of(gated, _verdicts, gated, new), lambda: self._count(gated, new)
 
     async def log(self, level: Level, kind: str, message: str, **data: Any) -> None:
@@ -390,17 +395,23 @@ class Journal(WriteBehind[Noted]):
             self.counts = await read()
 
     async def _store_soundings(
-        self, session: AsyncSession, reports: Sequence[SoundingReport], gate: Gate | None = None
+        self,
+        session: AsyncSession,
+        reports: Sequence[SoundingReport],
+        gate: Gate | None = None,
+        log: int | None = None,
     ) -> tuple[list[PlacedSounding], set[sounding_queries.Identity]]:
-        gated, rows = await made_of(reports, self._gated, reports, gate or self._gate)
-        return gated, await sounding_queries.insert_new(session, rows)
+        gated, rows = await made_of(reports, self._gated, reports, gate or self._gate, log)
+        again = bool(self._pings.taken_back)
+        return gated, await sounding_queries.insert_new(session, rows, any_taken_back=again)
 
     def _gated(
-        self, reports: Sequence[SoundingReport], gate: Gate
+        self, reports: Sequence[SoundingReport], gate: Gate, log: int | None
     ) -> tuple[list[PlacedSounding], list[dict[str, Any]]]:
         """Return soundings as the gate judges them, and how they are stored."""
         gated, received = gate.check(reports), now()
-        return gated, [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
+        rows = [_row(self._mission_id, self.step, received, item) for item in gated if _storable(item)]
+        return gated, [row | {"log": log} for row in rows]
 
     def _count(self, gated: Sequence[PlacedSounding], new: set[sounding_queries.Identity]) -> None:
         first = {_identity(item.report): item for item in reversed(gated) if _storable(item)}
@@ -418,8 +429,8 @@ class Journal(WriteBehind[Noted]):
             self._on_accepted(np.array([(s.east_m, s.north_m, s.depth_m, s.sd_m) for s in accepted]))
 
 
-def position_row(mission_id: str, report: VehicleReport, *, imported: bool = False) -> dict[str, Any]:
-    """Return a point of a vehicle's track as it is stored; ``imported``: a log brought it, it was not heard."""
+def position_row(mission_id: str, report: VehicleReport) -> dict[str, Any]:
+    """Return a point of a vehicle's track as it is stored when it was heard."""
     place = report.position
     return {
         "mission_id": mission_id,
@@ -428,7 +439,7 @@ def position_row(mission_id: str, report: VehicleReport, *, imported: bool = Fal
         "lat_deg": place.lat_deg,
         "lon_deg": place.lon_deg,
         "depth_m": place.depth_m,
-        "imported": imported,
+        "imported": False,
     }
 
 

@@ -133,7 +133,8 @@ async def check_none_applied(live: LiveMission) -> None:
         return
     async with live.database.reading() as session:
         rows = await event_queries.events_of_kind(session, live.id, "import")
-    files = sorted({row.data["file"] for row in rows if row.data.get("pings")})
+    counting = [row.data for row in rows if row.data.get("log") not in live.pings.taken_back]
+    files = sorted({data["file"] for data in counting if data.get("pings")})
     files = [file for file in files if file.lower().endswith(MULTIBEAM)]
     if files:
         raise InvalidRequestError(
@@ -294,7 +295,11 @@ def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gat
     for row, found in zip(rows, corrections.apply([report_of(row) for row in rows]), strict=True):
         change: dict[str, Any] = {"id": row.id, "level_m": found.level_m, "verdict": row.verdict, "reason": row.reason}
         change |= {"east_m": found.east_m, "north_m": found.north_m, "depth_m": found.depth_m}
-        if row.verdict == Verdict.ACCEPTED and found.reason:
+        if row.verdict == sounding_queries.TAKEN_BACK:
+            # Whether it may count shows when its log is sent again; an operator's word on it needs a water level.
+            before = "" if row.reason.startswith(NO_LEVEL) else row.reason
+            change["reason"] = found.reason or before
+        elif row.verdict == Verdict.ACCEPTED and found.reason:
             change |= {"verdict": Verdict.REJECTED, "reason": found.reason}
         elif row.reason.startswith(NO_LEVEL):
             outside = "" if row.ruling == Ruling.RESTORED else gate.outside(found.east_m, found.north_m)

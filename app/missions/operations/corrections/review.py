@@ -50,7 +50,7 @@ async def soundings_page(
     await live.journal.flush()
     async with live.database.reading() as session:
         doubts = await _doubts(live, session)
-        wanted = [SoundingRow.mission_id == live.id, or_(*(_condition(state, doubts) for state in states))]
+        wanted = [*_are_there(live), or_(*(_condition(state, doubts) for state in states))]
         if vehicle is not None:
             await _check_known(live, session, vehicle)
             wanted.append(SoundingRow.vehicle == vehicle)
@@ -62,6 +62,11 @@ async def soundings_page(
         items=[_view(row, doubts) for row in rows[:limit]],
         next_after=rows[limit - 1].id if len(rows) > limit else None,
     )
+
+
+def _are_there(live: LiveMission) -> tuple[ColumnElement[bool], ...]:
+    """Return the conditions of a mission's soundings, but for those whose log was taken back."""
+    return SoundingRow.mission_id == live.id, SoundingRow.verdict != sounding_queries.TAKEN_BACK
 
 
 async def _check_known(live: LiveMission, session: AsyncSession, vehicle: str) -> None:
@@ -164,6 +169,8 @@ async def _store_many(
 
 def _decide(live: LiveMission, row: SoundingRow, ruling: Ruling, reason: str, before: str) -> None:
     """Give a sounding its verdict. Raises ConflictError where it cannot be restored; then it is as it was."""
+    if row.verdict == sounding_queries.TAKEN_BACK:
+        raise ConflictError(f"sounding {row.id} came by a log that was taken back", "send the log again")
     if ruling is Ruling.RESTORED:
         _correct(live, row)
         row.verdict = Verdict.ACCEPTED
@@ -179,13 +186,13 @@ async def sounding_points(live: LiveMission, *, after: int = 0, limit: int) -> S
     await live.journal.flush()
     async with live.database.reading() as session:
         doubts = await _doubts(live, session)
-        whose = SoundingRow.mission_id == live.id
-        total = await session.scalar(select(func.count()).select_from(SoundingRow).where(whose))
+        whose = _are_there(live)
+        total = await session.scalar(select(func.count()).select_from(SoundingRow).where(*whose))
         depth = case((SoundingRow.sd_m > 0, SoundingRow.depth_m), else_=SoundingRow.raw_depth_m)
         columns = (SoundingRow.id, SoundingRow.lon_deg, SoundingRow.lat_deg, depth)
         query = select(*columns, SoundingRow.verdict, SoundingRow.ruling, SoundingRow.vehicle)
         rows = (
-            await session.execute(query.where(whose, SoundingRow.id > after).order_by(SoundingRow.id).limit(limit + 1))
+            await session.execute(query.where(*whose, SoundingRow.id > after).order_by(SoundingRow.id).limit(limit + 1))
         ).all()
     shown = rows[:limit]
     states, vehicles = list(SoundingState), sorted({row.vehicle for row in shown})

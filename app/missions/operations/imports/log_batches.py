@@ -15,7 +15,7 @@ from app.missions.live.journals.journal import TRACK_SPACING_M
 from app.missions.live.watchers.vehicles import local_place
 from app.missions.operations.imports.multibeam_log import MultibeamLog, is_multibeam
 from imc_bridge import Sounding, StateReport, SwathPing
-from imc_bridge.logs import LogContent, LogError, VehicleLog
+from imc_bridge.logs import LogContent, LogError, LogEvent, VehicleLog
 from imc_bridge.settings import BridgeSettings
 
 BATCH = 1000
@@ -88,6 +88,7 @@ class LogBatches:
                 if is_multibeam(content.name)
                 else VehicleLog(content, bridge, vehicle)
             )
+            self.unpacked_sha256 = self._log.file.unpacked_sha256()
         except LogError as error:
             raise InvalidRequestError("log", str(error), error.remedy) from None
         except OSError as error:
@@ -128,7 +129,7 @@ class LogBatches:
     def _reports(self) -> Iterator[Report]:
         """Yield every sounding, and the track near the area thinned like that of live telemetry."""
         last: tuple[float, float] | None = None
-        for event in self._log.events():
+        for event in self._events():
             if isinstance(event, Sounding):
                 yield sounding_report(event)
             elif isinstance(event, SwathPing):
@@ -139,6 +140,12 @@ class LogBatches:
                     last = end
                     if self._is_near(*end):
                         yield vehicle_report(event)
+
+    def _events(self) -> Iterator[LogEvent]:
+        try:
+            yield from self._log.events()
+        except LogError as error:
+            raise InvalidRequestError("log", str(error), error.remedy) from None
 
     def _is_near(self, lat_deg: float, lon_deg: float) -> bool:
         place = local_place(self._frame, Position(lat_deg, lon_deg, 0.0))
@@ -159,10 +166,17 @@ class WantedLog:
 
 @dataclass(frozen=True)
 class OpenedLog:
-    """The first that is read of a log that can be used."""
+    """The first that is read of a log that can be used.
+
+    Attributes
+    ----------
+    unpacked_sha256
+        Of what the file holds, where it is compressed; else empty.
+    """
 
     vehicle: str
     size_bytes: int
+    unpacked_sha256: str = ""
 
 
 @dataclass(frozen=True)
@@ -188,7 +202,7 @@ def read_log(content: LogContent, wanted: WantedLog) -> Iterator[LogItem]:
     """Yield what is in a log, one after the other: that it could be opened, batches, facts; or why it is refused."""
     try:
         batches = LogBatches(content, wanted.vehicle, wanted.bridge, wanted.near)
-        yield OpenedLog(batches.vehicle, batches.size_bytes)
+        yield OpenedLog(batches.vehicle, batches.size_bytes, batches.unpacked_sha256)
         yield from batches
         yield batches.facts()
     except InvalidRequestError as error:

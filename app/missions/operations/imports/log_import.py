@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from pydantic import TypeAdapter, ValidationError
+from sqlalchemy.ext.asyncio import AsyncSession
 
 from app.missions.clock import now
 from app.missions.errors import ConflictError, InvalidRequestError
@@ -25,12 +26,16 @@ from app.missions.spec.base import Name
 from app.missions.views.measurements.soundings import LogImportView, Verdict
 from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
-from app.storage.models import BatchRow
+from app.storage.models import BatchRow, LogRow
+from app.storage.queries import logs as log_queries
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries.soundings import LOG_KEY
 
 HASH_BLOCK_BYTES = 1 << 20
+
+SOUNDINGS, PINGS = "soundings", "pings"
+"""What a batch is of, as keys have it."""
 
 NAME: TypeAdapter[str] = TypeAdapter(Name)
 
@@ -48,12 +53,15 @@ class LogHead:
         Its name.
     digest
         SHA-256 of the file, in hexadecimal digits.
+    content
+        SHA-256 of what is in it, unpacked: the same log is known by that.
     """
 
     file: str
     digest: str
     vehicle: str
     size_bytes: int
+    content: str
 
 
 class LogSource(Protocol):
@@ -137,7 +145,8 @@ async def import_log(
     """
     check_log(live, path.name, vehicle)
     digest, batches = await asyncio.to_thread(_opened, live, settings, path, vehicle)
-    head = LogHead(path.name, digest, batches.vehicle, batches.size_bytes)
+    content = batches.unpacked_sha256 or digest
+    head = LogHead(path.name, digest, batches.vehicle, batches.size_bytes, content)
     return await LogImport(live, settings, head, _ReadHere(batches)).run(actor=actor, progress=progress)
 
 
@@ -162,8 +171,13 @@ def near(live: LiveMission) -> Near:
 class LogImport:
     """The import of one log into one mission.
 
-    A batch is a transaction: its soundings, its part of the track, and the answer under a key made of the file's
-    digest and the batch's number. Begun again after it was killed, what has an answer is read but not written.
+    A batch is a transaction: its soundings, its part of the track, and the answer under a key made of the log's number
+    and the batch's. Begun again after it was killed, what has an answer is read but not written.
+
+    Attributes
+    ----------
+    number
+        Of the log, once something of it is stored; None for one of which an earlier version stored something.
 
     Raises
     ------
@@ -176,7 +190,10 @@ class LogImport:
         self._head = head
         self._source = source
         _check_name(head.vehicle)
-        self._key = f"{LOG_KEY}-{head.digest[:32]}-{settings.imc.altimeter}-{head.vehicle}"
+        self._altimeter = str(settings.imc.altimeter)
+        self.number: int | None = None
+        self._earlier_key = ""
+        """What its keys begin with where an earlier version stored the begin of it."""
         # A gate of its own: the log may lie hours before or after what the vehicle sends now.
         self._gate = live.make_gate()
         self._tally = Tally()
@@ -187,7 +204,7 @@ class LogImport:
         Cancelled, it ends between two batches. ``import_id``: under which it is listed. Raises ConflictError where the
         same file is there as another vehicle's.
         """
-        await self._refuse_another_name()
+        await self._look()
         while (batch := await self._source.next()) is not None:
             pings = [report for report in batch.reports if isinstance(report, PingReport)]
             await to_the_end(self._write_pings(pings) if pings else self._write(batch.reports))
@@ -205,71 +222,122 @@ class LogImport:
                 actor=actor,
                 sha256=self._head.digest,
                 **({"import_id": import_id} if import_id else {}),
+                **({} if self.number is None else {"log": self.number}),
                 **view.model_dump(),
             )
         return view
 
-    async def _refuse_another_name(self) -> None:
-        """Take no file as two vehicles': soundings are known again by vehicle and time. Raises ConflictError."""
+    async def _look(self) -> None:
+        """Look what is stored of the log.
+
+        No content is taken as two vehicles': soundings are known again by vehicle and time. Raises ConflictError.
+        """
+        head = self._head
         async with self._live.database.reading() as session:
-            keys = await sounding_queries.first_log_keys(session, self._live.id, self._head.digest)
-        others = {name for name in map(_vehicle_of, keys) if name != self._head.vehicle}
+            rows = await log_queries.of_content(session, self._live.id, head.content)
+            earlier = [
+                (digest, batch)
+                for digest in sorted({head.digest, head.content})
+                for batch in await log_queries.earlier_batches(session, self._live.id, digest)
+            ]
+        standing = [row for row in rows if row.taken_back_at is None]
+        others = {row.vehicle for row in standing} | {_vehicle_of(batch) for _, batch in earlier}
+        others -= {head.vehicle}
         if others:
             names = ", ".join(sorted(others))
             raise ConflictError(
                 f"the same file is in the mission as the log of {names}: its soundings would count twice",
-                f"leave it at that, or give the name that it has there: --vehicle {names}, by REST vehicle={names}",
+                f"leave it at that, give the name that it has there: --vehicle {names}, by REST vehicle={names}, "
+                f"or take it back: DELETE /api/v1/missions/{self._live.id}/logs/{{import_id}}",
             )
+        self.number = next((row.id for row in standing if row.altimeter == self._altimeter), None)
+        for digest, batch in earlier:
+            begin = f"{LOG_KEY}-{digest[:32]}-{self._altimeter}-{head.vehicle}"
+            if self.number is None and batch.key in (f"{begin}-0", f"{begin}-pings-0"):
+                self._earlier_key = begin
+
+    async def _number(self, session: AsyncSession) -> int | None:
+        """Return the log's number, which it gets with the first that is stored of it. Raises ConflictError."""
+        live, head = self._live, self._head
+        if self._earlier_key:
+            return None
+        # Nobody else numbers one, or takes one back, until the transaction ends.
+        await sounding_queries.answers_to(session, live.id, ())
+        if self.number is not None:
+            known = await log_queries.numbered(session, live.id, self.number)
+            if known is None or known.taken_back_at is not None:
+                raise ConflictError("the log was taken back while it was read", "send it again to have it after all")
+            return self.number
+        row = LogRow(
+            mission_id=live.id,
+            vehicle=head.vehicle,
+            digest=head.content,
+            altimeter=self._altimeter,
+            file=head.file,
+            created_at=now(),
+        )
+        session.add(row)
+        await session.flush()
+        await log_queries.bring_back_rulings(session, row)
+        return row.id
+
+    def _key_of(self, number: int | None, what: str, count: int) -> str:
+        """Return the key of a batch of soundings or pings."""
+        if number is None:
+            return f"{self._earlier_key}-pings-{count}" if what == PINGS else f"{self._earlier_key}-{count}"
+        return f"{log_queries.number_key(number)}{what}:{count}"
 
     async def _write(self, batch: list[Report]) -> None:
         live, tally = self._live, self._tally
         soundings = [report for report in batch if isinstance(report, SoundingReport)]
-        positions = [
-            position_row(live.id, report, imported=True) for report in batch if isinstance(report, VehicleReport)
-        ]
+        positions = [position_row(live.id, report) for report in batch if isinstance(report, VehicleReport)]
         for report in batch:
             tally.span(report.time_s)
-        key = f"{self._key}-{tally.batches}"
         async with live.journal.writing, live.database.writing() as session:
+            number = await self._number(session)
+            key = self._key_of(number, SOUNDINGS, tally.batches)
             known = await sounding_queries.answer_to(session, live.id, key)
             if known is not None:
                 # Read once more all the same: the gate judges jumps from one batch to the next.
                 await made_of(soundings, self._gate.check, soundings)
                 tally.add(known.answer, known=True)
                 return
-            verdicts, committed = await live.journal.take(soundings, session, gate=self._gate)
-            await mission_queries.add_positions(session, positions)
+            verdicts, committed = await live.journal.take(soundings, session, gate=self._gate, log=number)
+            brought = [row | {"imported": True, "log": number} for row in positions]
+            await mission_queries.add_positions(session, brought)
             answer: dict[str, Any] = {
                 "verdicts": Counter(str(item.verdict) for item in verdicts),
                 "reasons": Counter(_general(v.reason) for v in verdicts if v.verdict is Verdict.REJECTED),
             }
-            session.add(
-                BatchRow(mission_id=live.id, key=key, digest=self._head.digest, answer=answer, created_at=now())
-            )
+            session.add(self._answer(key, answer))
         committed()
+        self.number = number
         tally.add(answer, known=False)
 
     async def _write_pings(self, pings: list[PingReport]) -> None:
         live, tally = self._live, self._tally
         for report in pings:
             tally.span(report.time_s)
-        key = f"{self._key}-pings-{tally.ping_batches}"
         judged = await live.pings.judge(pings)
         async with live.journal.writing, live.database.writing() as session:
+            number = await self._number(session)
+            key = self._key_of(number, PINGS, tally.ping_batches)
             known = await sounding_queries.answer_to(session, live.id, key)
             if known is not None:
                 tally.add_pings(known.answer, known=True)
                 return
-            verdicts, committed = await live.journal.take_pings([judged], session)
+            verdicts, committed = await live.journal.take_pings([judged], session, log=number)
             answer: dict[str, Any] = {
                 "pings": Counter(str(item.verdict) for item in verdicts),
                 "reasons": Counter(_general(v.reason) for v in verdicts if v.verdict is Verdict.REJECTED),
             }
-            session.add(
-                BatchRow(mission_id=live.id, key=key, digest=self._head.digest, answer=answer, created_at=now())
-            )
+            session.add(self._answer(key, answer))
         committed()
+        self.number = number
         tally.add_pings(answer, known=False)
+
+    def _answer(self, key: str, answer: dict[str, Any]) -> BatchRow:
+        return BatchRow(mission_id=self._live.id, key=key, digest=self._head.digest, answer=answer, created_at=now())
 
     def _view(self, facts: LogFacts) -> LogImportView:
         tally = self._tally
@@ -295,10 +363,14 @@ class LogImport:
         )
 
 
-def _vehicle_of(key: str) -> str:
-    """Return whose log the key of a first batch is about; see ``LogImport._key``."""
-    _altimeter, _, rest = key.removeprefix(f"{LOG_KEY}-").partition("-")[2].partition("-")
-    return rest.removesuffix("-0").removesuffix("-pings")
+def _vehicle_of(batch: BatchRow) -> str:
+    """Return whose log a first batch is about that has a key of an earlier version.
+
+    Such a key has a digest, the altimeter, the vehicle and, where the batch is one of pings, that word; a vehicle may
+    be called so, too.
+    """
+    _altimeter, _, rest = batch.key.removeprefix(f"{LOG_KEY}-").partition("-")[2].partition("-")
+    return rest.removesuffix("-pings-0" if "pings" in batch.answer else "-0")
 
 
 def _check_name(vehicle: str) -> None:

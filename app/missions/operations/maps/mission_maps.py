@@ -195,7 +195,7 @@ async def surveyed(live: LiveMission) -> Surveyed:
     await live.journal.flush()
     async with live.database.reading() as session:
         extent = await sounding_queries.extent(session, live.id, Verdict.ACCEPTED)
-        period = await ping_queries.period(session, live.id)
+        period = await ping_queries.period(session, live.id, without=live.pings.taken_back)
     if extent is None:
         return Surveyed() if period is None else Surveyed(*period)
     if period is None:

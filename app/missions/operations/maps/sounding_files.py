@@ -84,7 +84,8 @@ async def point_cloud(live: LiveMission, frame: ProjectedFrame) -> FileContent:
     # Whoever sends a first ping from here on is not in it.
     until = await live.pings.newest_block()
     chunks, waiting = await live.pings.contents()
-    names = sorted(sounding | {chunk.vehicle for chunk in chunks} | waiting.keys())
+    pinging = {chunk.vehicle for chunk in chunks if chunk.log not in live.pings.taken_back}
+    names = sorted(sounding | pinging | waiting.keys())
     file = unnamed_file()
     cloud = PointCloudFile(file, frame, names, live.facts.vertical_datum.statement)
     for vehicle in sorted(sounding):

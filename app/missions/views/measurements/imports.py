@@ -77,6 +77,8 @@ class LogState(StrEnum):
     READING = "reading"
     DONE = "done"
     FAILED = "failed"
+    TAKEN_BACK = "taken-back"
+    """Nothing of it counts any more: somebody stopped reading it, or took it back."""
 
 
 class ZoneOptions(BaseModel):
@@ -206,3 +208,5 @@ class LogView(View):
     result: LogImportView | None = Field(default=None, description="What came of it, when it is done")
     problem: str = Field(default="", description="Why it failed; what was stored before stays, and is not stored twice")
     remedy: str = Field(default="", description="What to do about it")
+    taken_back_at: datetime | None = Field(default=None, description="When it was; null: it counts, or never did")
+    taken_back_by: str = Field(default="", description="Who took it back")

@@ -19,12 +19,15 @@ class PingPartView(View):
     rejected: int = Field(description="Pings that are kept but not used; the file says why")
     size_bytes: int | None = Field(description="Of the file")
     sha256: str | None = Field(description="Of the file")
+    taken_back: bool = Field(
+        default=False, description="True: they came by a log that was taken back, and do not count"
+    )
 
 
 class PingsView(View):
     """All pings of a mission, in the order in which they came."""
 
-    pings: int = Field(description="Accepted ones of all parts")
+    pings: int = Field(description="Accepted ones of all parts that were not taken back")
     beams: int
     rejected: int
     parts: list[PingPartView]

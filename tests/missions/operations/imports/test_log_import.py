@@ -97,9 +97,12 @@ async def test_a_log_imported_again_changes_nothing(
     before = stored(database_url, "*"), points(database_url), await events_after(await service.get(mission.id))
     again = await take(service, mission.id, log)
     assert again == first.model_copy(update={"known": True})
-    # The same records in another file: known one by one.
+    # What was packed is the same log unpacked.
     plain = writer.write(tmp_path / "Data.lsf", writer.survey(PINGS))
-    assert (await take(service, mission.id, plain)).duplicate == PINGS
+    assert await take(service, mission.id, plain) == again.model_copy(update={"file": "Data.lsf"})
+    # The same records in another file: known one by one.
+    longer = writer.write(tmp_path / "longer.lsf", [*writer.survey(PINGS), writer.announce(1.0)])
+    assert (await take(service, mission.id, longer)).duplicate == PINGS
     assert stored(database_url, "*") == before[0]
     assert (await view_of(service, mission.id)).progress.soundings == first.soundings
 

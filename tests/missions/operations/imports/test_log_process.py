@@ -1,6 +1,7 @@
 """The process that reads logs is locked in, and nothing that it says is taken for more than a log."""
 
 import dataclasses
+import hashlib
 import math
 import pickle
 from pathlib import Path
@@ -68,7 +69,7 @@ def test_every_kind_of_item_is_understood_as_it_was_meant() -> None:
     state = VehicleReport("a", 1.0, Position(LAT, LON, 9.0), current_mps=(0.1, math.inf))
     bent = sounding(beam_geometry=BeamGeometry(LAT, LON, 1.0), depth_sd_m=0.1, source="É\n")
     for item in (
-        OpenedLog("a", 1),
+        OpenedLog("a", 1, "0" * 64),
         LogBatch([sounding(), state, bent], 5),
         LogFacts(1, 2, 3, True, {"a": 1}, {}, ["note"]),
         RefusedLog("log", "why", "what to do"),
@@ -110,7 +111,8 @@ async def test_batches_of_the_process_are_those_that_are_read_here(tmp_path: Pat
     expected = list(here)
     with path.open("rb") as file:
         async with reading(file, WantedLog("Data.lsf.gz", None, BridgeSettings(), NEAR)) as process:
-            assert process.opened == OpenedLog(writer.NAME, path.stat().st_size)
+            unpacked = hashlib.sha256(b"".join(packets)).hexdigest()
+            assert process.opened == OpenedLog(writer.NAME, path.stat().st_size, unpacked)
             batches = []
             while (batch := await process.next()) is not None:
                 batches.append(batch)

@@ -72,7 +72,7 @@ Level: TypeAlias = Annotated[Literal["info", "warning", "alarm"], Open]
 LinkState: TypeAlias = Annotated[Literal["unknown", "lost", "expected_offline", "heard", "ready", "engaged"], Open]
 """How well a vehicle can be reached, worst to best."""
 
-LogState: TypeAlias = Annotated[Literal["waiting", "reading", "done", "failed"], Open]
+LogState: TypeAlias = Annotated[Literal["waiting", "reading", "done", "failed", "taken-back"], Open]
 """How far the import of a log is."""
 
 MissionKind: TypeAlias = Annotated[Literal["survey", "search"], Open]
@@ -1109,6 +1109,10 @@ class LogView(Model):
     """Why it failed; what was stored before stays, and is not stored twice"""
     remedy: str
     """What to do about it"""
+    taken_back_at: datetime | None
+    """When it was; null: it counts, or never did"""
+    taken_back_by: str
+    """Who took it back"""
 
 
 class MapMessage(Model):
@@ -1413,13 +1417,15 @@ class PingPartView(Model):
     """Of the file"""
     sha256: str | None
     """Of the file"""
+    taken_back: bool
+    """True: they came by a log that was taken back, and do not count"""
 
 
 class PingsView(Model):
     """All pings of a mission, in the order in which they came."""
 
     pings: int
-    """Accepted ones of all parts"""
+    """Accepted ones of all parts that were not taken back"""
     beams: int
     rejected: int
     parts: list[PingPartView]

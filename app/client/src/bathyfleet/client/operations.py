@@ -695,6 +695,14 @@ class Operations(ABC):
             models.LogView,
         ))
 
+    def delete_log(self, mission_id: str, import_id: str) -> models.LogView:
+        """Stop reading a log, or take it back: ``DELETE /missions/{mission_id}/logs/{import_id}``."""
+        return self._call(Call[models.LogView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/logs/{part(import_id)}",
+            models.LogView,
+        ))
+
     def set_reference(
         self,
         mission_id: str,
@@ -2322,6 +2330,14 @@ class AsyncOperations(ABC):
         """See what came of a log, or how far it is: ``GET /missions/{mission_id}/logs/{import_id}``."""
         return await self._call(Call[models.LogView](
             "GET",
+            f"/missions/{part(mission_id)}/logs/{part(import_id)}",
+            models.LogView,
+        ))
+
+    async def delete_log(self, mission_id: str, import_id: str) -> models.LogView:
+        """Stop reading a log, or take it back: ``DELETE /missions/{mission_id}/logs/{import_id}``."""
+        return await self._call(Call[models.LogView](
+            "DELETE",
             f"/missions/{part(mission_id)}/logs/{part(import_id)}",
             models.LogView,
         ))

@@ -346,6 +346,8 @@ export const api = {
   /** `vehicle`: empty where the log says whose it is. */
   sendLog: (id: string, vehicle: string, sending: Sending) =>
     send<LogView>("POST", `${missionPath(id)}/logs`, { vehicle }, sending),
+  deleteLog: (id: string, one: string) =>
+    request<LogView>(`${missionPath(id)}/logs/${encodeURIComponent(one)}`, { method: "DELETE" }, STORED),
   imports: (id: string) => request<ImportView[]>(`${missionPath(id)}/imports`),
   sendImport: (id: string, options: ImportOptions, sending: Sending) =>
     send<ImportView>("POST", `${missionPath(id)}/imports`, options, sending),

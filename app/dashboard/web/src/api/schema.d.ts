@@ -975,7 +975,13 @@ export interface paths {
         get: operations["getLog"];
         put?: never;
         post?: never;
-        delete?: never;
+        /**
+         * Stop reading a log, or take it back
+         * @description Let nothing count of what a log brought: soundings, pings, track; reading it ends.
+         *
+         *     The map is made anew of the rest. What the log brought stays stored, marked; the same file sent again counts again.
+         */
+        delete: operations["deleteLog"];
         options?: never;
         head?: never;
         patch?: never;
@@ -1025,7 +1031,7 @@ export interface paths {
          * @description Return what an ENC cell (S-57, its .000 file) shows in an area to keep out of.
          *
          *     Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
-         *     looks at them and takes those that apply into `keep_out`.
+         *     looks at them and takes those that apply into `keep_out`. Reading ends with the connection.
          */
         post: operations["proposeZones"];
         delete?: never;
@@ -4244,7 +4250,7 @@ export interface components {
          * @description How far the import of a log is.
          * @enum {string}
          */
-        LogState: "waiting" | "reading" | "done" | "failed";
+        LogState: "waiting" | "reading" | "done" | "failed" | "taken-back";
         /**
          * LogView
          * @description A vehicle's own log: what came of it, or how far its import is.
@@ -4303,6 +4309,17 @@ export interface components {
              * @default
              */
             remedy: string;
+            /**
+             * Taken Back At
+             * @description When it was; null: it counts, or never did
+             */
+            taken_back_at: string | null;
+            /**
+             * Taken Back By
+             * @description Who took it back
+             * @default
+             */
+            taken_back_by: string;
         };
         /**
          * MapMessage
@@ -5174,6 +5191,12 @@ export interface components {
              * @description Of the file
              */
             sha256: string | null;
+            /**
+             * Taken Back
+             * @description True: they came by a log that was taken back, and do not count
+             * @default false
+             */
+            taken_back: boolean;
         };
         /**
          * PingsView
@@ -5182,7 +5205,7 @@ export interface components {
         PingsView: {
             /**
              * Pings
-             * @description Accepted ones of all parts
+             * @description Accepted ones of all parts that were not taken back
              */
             pings: number;
             /** Beams */
@@ -14214,6 +14237,85 @@ export interface operations {
             };
             /** @description There is no such mission; there is no such import */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteLog: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The import's id */
+                import_id: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LogView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such import */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };

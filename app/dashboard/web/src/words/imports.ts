@@ -77,6 +77,20 @@ export const IMPORTS = {
     en: "Leave its depths out of the map",
     pt: "Tirar as suas profundidades do mapa",
   },
+  "imports.takeLogBackReally": {
+    en: "Leave all that it brought out of the map",
+    pt: "Tirar do mapa tudo o que trouxe",
+  },
+  "imports.takenBack": {
+    en: "Taken back by {who}, {when}: nothing of it counts. Sent again, it counts again.",
+    pt: "Retirado por {who}, {when}: nada dele conta. Enviado de novo, volta a contar.",
+  },
+  "imports.stop": { en: "Stop", pt: "Parar" },
+  "imports.stopReally": {
+    en: "Stop, and leave what was read out of the map",
+    pt: "Parar, e tirar do mapa o que foi lido",
+  },
+  "imports.readOn": { en: "Read on", pt: "Continuar a ler" },
   "imports.keep": { en: "Keep it", pt: "Manter" },
   "imports.reference": { en: "Reference grid", pt: "Malha de referência" },
   "imports.whatReferencesAre": {

@@ -9,7 +9,7 @@ import { withRings } from "../../state/form/places";
 import { metres } from "../../state/format";
 import { said } from "../../state/session";
 import { say } from "../../words/say";
-import { FilesButton, Trouble } from "../parts/Controls";
+import { Button, FilesButton, Trouble } from "../parts/Controls";
 import { useForm } from "./Fields";
 
 type Zone = ProposedZonesView["zones"][number];
@@ -25,14 +25,17 @@ export function ChartZones() {
   const found = useSignal<ProposedZonesView | null>(null);
   const busy = useSignal(false);
   const fault = useSignal("");
+  const reading = useSignal<AbortController | null>(null);
   const bounds = boundsOf(cornersOf(draft));
   const propose = async ([file]: File[]) => {
     if (!file || !bounds) return;
     const [west, south, east, north] = bounds;
+    const stop = new AbortController();
     busy.value = true;
     fault.value = "";
     found.value = null;
-    const sending: Sending = { file, onBytes: () => {}, gone: new AbortController().signal };
+    reading.value = stop;
+    const sending: Sending = { file, onBytes: () => {}, gone: stop.signal };
     const ends = {
       west_deg: String(west - AROUND_DEG),
       south_deg: String(south - AROUND_DEG),
@@ -42,9 +45,10 @@ export function ChartZones() {
     try {
       found.value = await api.proposeZones(ends, sending);
     } catch (error) {
-      fault.value = said(error);
+      if (!stop.signal.aborted) fault.value = said(error);
     } finally {
       busy.value = false;
+      reading.value = null;
     }
   };
   const taken = new Set(draft.keepOut.map((zone) => zone.join()));
@@ -60,6 +64,11 @@ export function ChartZones() {
       <FilesButton accept=".000" id="chart-file" busy={busy.value} onFiles={(files) => void propose(files)}>
         {say(busy.value ? "area.chartBeingRead" : "area.zonesFromAChart")}
       </FilesButton>
+      {reading.value ? (
+        <Button kind="link-button" id="chart-cancel" onClick={() => reading.value?.abort()}>
+          {say("mission.cancel")}
+        </Button>
+      ) : null}
       <Trouble words={fault.value} />
       {found.value ? (
         <div data-testid="chart-zones">

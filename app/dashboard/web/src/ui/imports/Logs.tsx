@@ -8,7 +8,7 @@ import { said } from "../../state/session";
 import { mission, selectedId } from "../../state/store";
 import { isNameless, queuedOf, sendLogs, underWay } from "../../state/uploads";
 import { say } from "../../words/say";
-import { FilesButton, Trouble, Typed } from "../parts/Controls";
+import { AskedTwice, FilesButton, Trouble, Typed } from "../parts/Controls";
 import { Sendings } from "./Sendings";
 
 /** How often it is asked what became of logs, while one is read and otherwise. */
@@ -24,9 +24,11 @@ export function Logs() {
   const names = useComputed(() => (mission.value?.vehicles ?? []).map(({ name }) => name));
   const id = selectedId.value;
 
-  const look = async () => {
+  /** Change something first, if anything, then look. */
+  const look = async (change?: (id: string) => Promise<unknown>) => {
     if (!id) return;
     try {
+      await change?.(id);
       logs.value = await api.logs(id);
       fault.value = "";
     } catch (error) {
@@ -94,7 +96,7 @@ export function Logs() {
       <ul data-testid="logs">
         {listed.map((log) => (
           <li key={log.id} data-state={log.state}>
-            <Log log={log} />
+            <Log log={log} onTakeBack={() => void look((of) => api.deleteLog(of, log.id))} />
           </li>
         ))}
       </ul>
@@ -103,8 +105,10 @@ export function Logs() {
   );
 }
 
-function Log({ log }: { log: LogView }) {
+function Log({ log, onTakeBack }: { log: LogView; onTakeBack: () => void }) {
   const { file, vehicle, created_at, result, state, problem, remedy, read_bytes, size_bytes } = log;
+  const asked = useSignal(false);
+  const ended = state === "done" || state === "failed";
   return (
     <>
       <b>{file}</b>
@@ -117,7 +121,40 @@ function Log({ log }: { log: LogView }) {
         </p>
       ) : null}
       {state === "failed" ? <Trouble words={[problem, remedy].filter(Boolean).join(". ")} /> : null}
-      {result ? <Result result={result} /> : null}
+      {state === "taken-back" ? (
+        <p data-testid="log-taken-back">
+          {say("imports.takenBack", {
+            who: log.taken_back_by,
+            when: log.taken_back_at ? dayAndTime(new Date(log.taken_back_at)) : "",
+          })}
+        </p>
+      ) : null}
+      {result && state !== "taken-back" ? <Result result={result} /> : null}
+      {whyNotCommand.value || state === "taken-back" || (state === "failed" && !vehicle) ? null : (
+        <p class="row">
+          <AskedTwice
+            asked={asked}
+            first={{
+              id: "log-delete",
+              commands: true,
+              onClick: () => {
+                asked.value = true;
+              },
+              children: say(ended ? "imports.takeBack" : "imports.stop"),
+            }}
+            last={{
+              id: "log-delete-really",
+              commands: true,
+              onClick: () => {
+                asked.value = false;
+                onTakeBack();
+              },
+              children: say(ended ? "imports.takeLogBackReally" : "imports.stopReally"),
+            }}
+            keep={{ children: say(ended ? "imports.keep" : "imports.readOn") }}
+          />
+        </p>
+      )}
     </>
   );
 }
