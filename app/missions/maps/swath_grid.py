@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,14 +18,31 @@ from app.mapping.swath.spikes import spikes
 from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap, Grid, SoundingRows
 
-Place = Callable[[str, Pings], Footprints | None]
-"""Returns where the beams of a vehicle's pings met the bottom, corrected; None where that is nowhere near."""
+
+class PingPlaces(Protocol):
+    """Pings of one vehicle as its sonar's, and where their beams met the bottom."""
+
+    @property
+    def pings(self) -> Pings:
+        """Place and attitude are the sonar's."""
+
+    @property
+    def footprints(self) -> Footprints:
+        """Corrected."""
+
+
+Place = Callable[[str, Pings], PingPlaces | None]
+"""Returns where the beams of a vehicle's pings met the bottom; None where that is nowhere near."""
 
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams that met the bottom, spikes left out: where, and how uncertain that is."""
+    """Beams that met the bottom, spikes left out: whose pings they are of, where, and how uncertain that is.
 
+    Place and attitude of the pings are the sonar's.
+    """
+
+    pings: Pings
     footprints: Footprints
     uncertainty: Uncertainty
 
@@ -36,9 +54,10 @@ class Beams:
 
 def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -> Beams | None:
     """Return the beams of one vehicle's pings whose depth is known; None where they are nowhere near."""
-    beams = place(vehicle, pings)
-    if beams is None:
+    there = place(vehicle, pings)
+    if there is None:
         return None
+    pings, beams = there.pings, there.footprints
     wrong = spikes(pings)
     keep = ~wrong[np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad)] & np.isfinite(beams.depth_m)
     found = beams.take(keep)
@@ -47,7 +66,7 @@ def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -
         down_m=np.abs(found.depth_m - pings.depth_m[found.ping]),
         pitch_rad=pings.pitch_rad[found.ping],
     )
-    return Beams(found, uncertainty(went, errors, pings.position_sd_m[found.ping]))
+    return Beams(pings, found, uncertainty(went, errors, pings.position_sd_m[found.ping]))
 
 
 class SwathGrid:
