@@ -214,7 +214,7 @@ def displaced(beams: BeamVectors, mounting: Mounting) -> Displacement:
     known = np.isfinite(beams.heading_rad)
     heading, pitch, roll = (np.nan_to_num(a) for a in (beams.heading_rad, beams.pitch_rad, beams.roll_rad))
     vehicle = rotation_of(heading, pitch, roll)
-    arm = vehicle.apply(np.broadcast_to(np.array(mounting.offset_m), (len(known), 3)))
+    arm = vehicle.apply(mounting.offset_m)
     aside = beams.range_m * np.sin(beams.off_nadir_rad)
     straight = np.column_stack(
         [
