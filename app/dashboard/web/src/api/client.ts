@@ -25,6 +25,7 @@ import type {
   MissionAction,
   MissionSummary,
   MissionView,
+  MountingSpec,
   NewMission,
   NewSite,
   OrderView,
@@ -200,6 +201,9 @@ function post<T>(path: string, body?: unknown, patience = ORDERED): Promise<T> {
   );
 }
 
+const mountingPath = (id: string, vehicle: string) =>
+  `${missionPath(id)}/mountings/${encodeURIComponent(vehicle)}`;
+
 const castPath = (id: string, name: string) =>
   `${missionPath(id)}/sound-speed/casts/${encodeURIComponent(name)}`;
 
@@ -340,6 +344,10 @@ export const api = {
     request<CorrectionsView>(castPath(id, name), { method: "DELETE" }),
   setCastRule: (id: string, rules: CastRules) =>
     put<CorrectionsView>(`${missionPath(id)}/sound-speed/rule`, rules),
+  setMounting: (id: string, vehicle: string, mounting: MountingSpec) =>
+    put<CorrectionsView>(mountingPath(id, vehicle), mounting),
+  deleteMounting: (id: string, vehicle: string) =>
+    request<CorrectionsView>(mountingPath(id, vehicle), { method: "DELETE" }),
   logs: (id: string) => poll<LogView[]>(`${missionPath(id)}/logs`),
   /** `vehicle`: empty where the log says whose it is. */
   sendLog: (id: string, vehicle: string, sending: Sending) =>
