@@ -129,7 +129,7 @@ async def set_cast_rule(rules: CastRules, operator: Operator, mission: Mission) 
     "/mountings/{name}",
     operation_id="setMounting",
     summary="Correct how a sonar is mounted",
-    responses=_CHANGE,
+    responses=_CHANGE | problems("vehicle-not-found"),
 )
 async def set_mounting(
     name: VehicleName, mounting: MountingSpec, operator: Operator, mission: Mission
@@ -146,7 +146,7 @@ async def set_mounting(
     "/mountings/{name}",
     operation_id="deleteMounting",
     summary="Take a sonar as its vehicle states it is mounted",
-    responses=problems("mission-not-found", "invalid-request"),
+    responses=problems("mission-not-found", "vehicle-not-found", "invalid-request"),
 )
 async def delete_mounting(name: VehicleName, operator: Operator, mission: Mission) -> CorrectionsView:
     """Correct the mounting no more: what the vehicle's description states counts again."""

@@ -16,7 +16,7 @@ from app.mapping.water.tide_files import TideTableError, parse_tid
 from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import VerticalDatum
 from app.missions.clock import now
-from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.errors import ConflictError, InvalidRequestError, VehicleNotFoundError
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
 from app.missions.live.mission import LiveMission
 from app.missions.soundings.adjustment import TrackAdjustment
@@ -170,11 +170,14 @@ async def _multibeam_files(live: LiveMission) -> dict[str, str]:
 
 
 async def set_mounting(live: LiveMission, vehicle: str, mounting: MountingSpec | None, actor: str) -> CorrectionsView:
-    """Change how a vehicle's sonar is mounted; None: as the vehicle states. Raises InvalidRequestError."""
+    """Change how a vehicle's sonar is mounted; None: as the vehicle states.
+
+    Raises VehicleNotFoundError, InvalidRequestError where its beams came placed.
+    """
     known = await _who_sounded(live)
     if vehicle not in known:
         who = ", ".join(sorted(known)) or "none so far"
-        raise InvalidRequestError("vehicle", f"{vehicle!r} takes no part in the mission", f"these do: {who}")
+        raise VehicleNotFoundError(f"vehicle {vehicle!r} takes no part in the mission", f"these do: {who}")
     async with live.correcting:
         applied = live.stated_mountings.get(vehicle, MountingSpec()) if mounting is None else mounting
         if not applied.is_ideal:

@@ -13063,7 +13063,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description There is no such mission */
+            /** @description There is no such vehicle */
             404: {
                 headers: {
                     [name: string]: unknown;
@@ -13169,7 +13169,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description There is no such mission */
+            /** @description There is no such mission; there is no such vehicle */
             404: {
                 headers: {
                     [name: string]: unknown;
