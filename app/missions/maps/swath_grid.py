@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -13,25 +12,13 @@ from app.exploration.core.coverage import Coverage
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map
 from app.mapping.swath.holidays import open_ground, side_of
-from app.mapping.swath.pings import Footprints, Pings
+from app.mapping.swath.pings import Footprints, Pings, PlacedPings
 from app.mapping.swath.spikes import spikes
 from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap, Grid, SoundingRows
 
 
-class PingPlaces(Protocol):
-    """Pings of one vehicle as its sonar's, and where their beams met the bottom."""
-
-    @property
-    def pings(self) -> Pings:
-        """Place and attitude are the sonar's."""
-
-    @property
-    def footprints(self) -> Footprints:
-        """Corrected."""
-
-
-Place = Callable[[str, Pings], PingPlaces | None]
+Place = Callable[[str, Pings], PlacedPings | None]
 """Returns where the beams of a vehicle's pings met the bottom; None where that is nowhere near."""
 
 

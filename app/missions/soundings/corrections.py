@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.mapping.coordinates.georeference import LocalFrame
 from app.mapping.swath.mounting import STRAIGHT, BeamVectors, StatedTrack, displaced, mounted
-from app.mapping.swath.pings import Footprints, Pings, placed
+from app.mapping.swath.pings import Pings, PlacedPings, placed
 from app.mapping.water.casts import CastPlaces, Casts
 from app.mapping.water.sound_speed import SoundSpeedProfile
 from app.mapping.water.tides import TideTable
@@ -71,14 +71,6 @@ class PlacedSounding:
     def accepted(self) -> bool:
         """Whether it may enter the map."""
         return not self.reason
-
-
-@dataclass(frozen=True)
-class PlacedPings:
-    """Pings of one vehicle as its sonar's, mounting taken into account, and where their beams met the bottom."""
-
-    pings: Pings
-    footprints: Footprints
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,8 @@ def way(time_s: FloatArray) -> FloatArray:
 @pytest.mark.parametrize("piece", [1, 7, 100])
 def test_late_positions_are_put_right_however_many_pings_come_together(latency_s: float, piece: int) -> None:
     time_s = np.arange(0.0, 20.0, 0.2)
-    pings = pings_at(time_s, *way(time_s - latency_s).T, (0.0, 0.0, 0.0))
+    east_m, north_m = way(time_s - latency_s).T
+    pings = pings_at(time_s, east_m, north_m, (0.0, 0.0, 0.0))
     track, found = StatedTrack(), []
     for start in range(0, len(pings), piece):
         part = mounted(pings.take(slice(start, start + piece)), Mounting(latency_s=latency_s), FRAME, track)

@@ -34,18 +34,29 @@ def on_plane(slopes: tuple[float, float], east_m: FloatArray, north_m: FloatArra
 
 
 def known(mounting: SonarMounting) -> Mounting:
-    angles = (math.radians(angle) for angle in (mounting.roll_deg, mounting.pitch_deg, mounting.heading_deg))
-    return Mounting(*angles, mounting.latency_s, mounting.offset_m)
+    return Mounting(
+        roll_rad=math.radians(mounting.roll_deg),
+        pitch_rad=math.radians(mounting.pitch_deg),
+        heading_rad=math.radians(mounting.heading_deg),
+        latency_s=mounting.latency_s,
+        offset_m=mounting.offset_m,
+    )
 
 
 def columns(terrain: Terrain, pings: list[SwathPing]) -> Pings:
     lat, lon = np.array([terrain.frame.to_geodetic(p.position.east_m, p.position.north_m) for p in pings]).T
-    attitude = [np.array([getattr(p, name) for p in pings]) for name in ("roll_rad", "pitch_rad", "heading_rad")]
-    beams = [np.array([getattr(p, name) for p in pings], np.float32) for name in ("angles_rad", "ranges_m")]
-    time_s, depth_m = (
-        np.array(column) for column in zip(*((p.time_s, p.position.depth_m) for p in pings), strict=True)
+    return Pings(
+        time_s=np.array([p.time_s for p in pings]),
+        lat_deg=lat,
+        lon_deg=lon,
+        depth_m=np.array([p.position.depth_m for p in pings]),
+        roll_rad=np.array([p.roll_rad for p in pings]),
+        pitch_rad=np.array([p.pitch_rad for p in pings]),
+        heading_rad=np.array([p.heading_rad for p in pings]),
+        position_sd_m=np.full(len(pings), np.nan),
+        angle_rad=np.array([p.angles_rad for p in pings], np.float32),
+        range_m=np.array([p.ranges_m for p in pings], np.float32),
     )
-    return Pings(time_s, lat, lon, depth_m, *attitude, np.full(len(pings), np.nan), *beams)
 
 
 @settings(max_examples=60, deadline=None)
