@@ -17,7 +17,6 @@ from app.mapping.swath.spikes import spikes
 from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap, Grid, SoundingRows
 
-
 Place = Callable[[str, Pings], PlacedPings | None]
 """Returns where the beams of a vehicle's pings met the bottom; None where that is nowhere near."""
 

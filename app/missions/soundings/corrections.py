@@ -381,9 +381,18 @@ _UNKNOWN = BeamGeometry(np.nan, np.nan)
 def _vectors(reports: Sequence[SoundingReport]) -> BeamVectors:
     """Return how the beams of soundings pointed."""
     geometry = [report.beam_geometry or _UNKNOWN for report in reports]
-    names = ("roll_deg", "pitch_deg", "heading_deg", "azimuth_deg", "off_nadir_deg")
-    angles = [np.radians(np.array([getattr(one, name) for one in geometry], dtype=float)) for name in names]
-    return BeamVectors(*angles, np.array([report.range_m for report in reports]))
+
+    def radians(name: str) -> NDArray[np.float64]:
+        return np.radians(np.array([getattr(one, name) for one in geometry], dtype=float))
+
+    return BeamVectors(
+        roll_rad=radians("roll_deg"),
+        pitch_rad=radians("pitch_deg"),
+        heading_rad=radians("heading_deg"),
+        azimuth_rad=radians("azimuth_deg"),
+        off_nadir_rad=radians("off_nadir_deg"),
+        range_m=np.array([report.range_m for report in reports]),
+    )
 
 
 def _casts(sound_speed: SoundSpeed, frame: LocalFrame) -> Casts:
