@@ -383,7 +383,7 @@ def _vectors(reports: Sequence[SoundingReport]) -> BeamVectors:
     geometry = [report.beam_geometry or _UNKNOWN for report in reports]
 
     def radians(name: str) -> NDArray[np.float64]:
-        return np.radians(np.array([getattr(one, name) for one in geometry], dtype=float))
+        return np.asarray(np.radians(np.array([getattr(one, name) for one in geometry], dtype=float)))
 
     return BeamVectors(
         roll_rad=radians("roll_deg"),
