@@ -51,6 +51,7 @@ def test_a_mounting_is_corrected_after_the_patch_test_and_taken_back(
     assert [one for one in violations(page) if "depth-rover" not in one] == []
     one.locator("summary").click()
     by_id(page, "mounting-remove").click()
+    expect(one).not_to_contain_text("patch test")
     expect(one).to_contain_text("along the vehicle")
     assert service.get(corrections)["mountings"][0]["corrected"] is None
 
