@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from simulator.sonars.mounting import STRAIGHT, SonarMounting
 from simulator.sonars.sensors import SensorKind, SonarNoise
 from simulator.sonars.swath import SwathSonar
 from simulator.vehicles.battery import BatterySpec
@@ -24,6 +25,8 @@ class Equipment:
         Simulated time between measurements, and how far they reach, of a sonar that is no swath sonar.
     swath
         What a swath sonar can do.
+    mounting
+        How the sonar really sits in the vehicle, which knows nothing of it.
     drift_m2ps
         Growth of the position variance under water.
     limits
@@ -37,6 +40,7 @@ class Equipment:
     ping_period_s: float = 0.2
     max_range_m: float = 100.0
     swath: SwathSonar = field(default_factory=SwathSonar)
+    mounting: SonarMounting = STRAIGHT
     drift_m2ps: float = 0.0
     limits: VehicleLimits | None = None
     battery: BatterySpec | None = None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,8 @@ import numpy as np
 from simulator.arrays import FloatArray
 from simulator.equipment import Equipment
 from simulator.floors.terrain import Terrain
-from simulator.sonars.sensors import SensorKind, Sonar, to_local_frame
+from simulator.sonars.frames import to_local_frame
+from simulator.sonars.sensors import SensorKind, Sonar
 from simulator.sonars.swath import SwathErrors, SwathSounder
 from simulator.vehicles.battery import Battery
 from simulator.vehicles.navigation import Navigation
@@ -53,6 +55,8 @@ class BeamReturn:
         Its attitude.
     footprint
         Where the beam met the bottom by the vehicle's own estimate; None without a return.
+    beam_rad
+        Azimuth of the beam from the bow and angle from straight down in the vehicle; None: its range is vertical.
     true_position
         Where the vehicle really was.
     """
@@ -68,6 +72,7 @@ class BeamReturn:
     roll_rad: float
     footprint: LocalPosition | None
     true_position: LocalPosition
+    beam_rad: tuple[float, float] | None = None
 
     @property
     def valid(self) -> bool:
@@ -77,14 +82,14 @@ class BeamReturn:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SwathPing:
-    """One ping of a swath sonar, which sits in the middle of its vehicle.
+    """One ping of a swath sonar, which by the vehicle's reckoning sits in its middle.
 
     Attributes
     ----------
     vehicle, time_s, source
         Vehicle, time (the vehicle's clock, seconds), device.
     position
-        Where the vehicle believed to be.
+        Where the vehicle believed to be, by its position's latency earlier.
     heading_rad, pitch_rad, roll_rad
         Its attitude.
     angles_rad : (b,)
@@ -201,7 +206,7 @@ class SimulatedVehicle:
         self.battery = None if carried.battery is None else Battery(carried.battery)
         self.navigation = Navigation(carried.drift_m2ps, navigation_rng)
         self.sonar: Sonar | SwathSounder = (
-            SwathSounder(carried.swath, SwathErrors.of(carried.noise), sonar_rng)
+            SwathSounder(carried.swath, SwathErrors.of(carried.noise), sonar_rng, carried.mounting)
             if carried.sensor == SensorKind.MULTIBEAM
             else Sonar(
                 SensorKind(carried.sensor),
@@ -209,10 +214,14 @@ class SimulatedVehicle:
                 sonar_rng,
                 ping_period_s=carried.ping_period_s,
                 max_range_m=carried.max_range_m,
+                mounting=carried.mounting,
             )
         )
         self.collisions: list[tuple[float, LocalPosition]] = []
         """Time and place of every contact with the bottom (one entry per contact, not per step)."""
+        self._latency_s = carried.mounting.latency_s
+        self._places: deque[tuple[float, float, float]] = deque([(self.time_s, *self.en_m)])
+        """Times and where it believed to be then, as far back as its positions are late."""
         self._arrival_radius_m = 0.0
         self._pass_within_m = -1.0
         self._stops = False
@@ -244,6 +253,21 @@ class SimulatedVehicle:
         """Where it believes to be, east and north: most steps ask for no more."""
         m, (de, dn) = self.vehicle.motion, self.navigation.error_m
         return m.east_m + de, m.north_m + dn
+
+    @property
+    def late_position(self) -> LocalPosition:
+        """Where it believed to be when its position was taken that goes with a ping of now; depth is that of now."""
+        if not self._latency_s:
+            return self.position
+        time_s, east_m, north_m = np.array(self._places).T
+        then_s = self.time_s - self._latency_s
+        east, north = (float(np.interp(then_s, time_s, at_m)) for at_m in (east_m, north_m))
+        return LocalPosition(east, north, self.vehicle.motion.depth_m)
+
+    def _remember_place(self) -> None:
+        self._places.append((self.time_s, *self.en_m))
+        while self._places[1][0] <= self.time_s - self._latency_s:
+            self._places.popleft()
 
     @property
     def bottom_m(self) -> float:
@@ -387,6 +411,8 @@ class SimulatedVehicle:
             )
         self._touching = hit
         self.navigation.step(m.depth_m, STEP_S)
+        if self._latency_s:
+            self._remember_place()
         target = vehicle.target
         if target is not None and self._stops and m.depth_m <= FLOATS_FROM_M:
             self._stop_in_time(target)
@@ -421,7 +447,7 @@ class SimulatedVehicle:
             vehicle=self.name,
             time_s=self.time_s,
             source=SOURCES[self.sonar.kind],
-            position=self.position,
+            position=self.late_position,
             heading_rad=m.heading_rad,
             pitch_rad=m.pitch_rad,
             roll_rad=m.roll_rad,
@@ -435,12 +461,15 @@ class SimulatedVehicle:
         if isinstance(self.sonar, SwathSounder):
             raise ValueError(f"{self.name}: its sonar is multibeam, which measures whole swaths")
         m = self.vehicle.motion
-        here, true = self.position, self.true_position
+        here, true = self.late_position, self.true_position
         if self.sonar.kind is SensorKind.SINGLE:
             ranges, directions = [self.sonar.ping_below(self.terrain, m)], DOWN
+            pointed: list[tuple[float, float] | None] = [None]
         else:
             ranges = self.sonar.ping(self.terrain, m).tolist()
-            directions = to_local_frame(self.sonar.beams.body, m.heading_rad, m.pitch_rad, m.roll_rad).tolist()
+            beams = self.sonar.beams
+            pointed = list(zip(beams.azimuth_rad.tolist(), beams.tilt_rad.tolist(), strict=True))
+            directions = to_local_frame(beams.body, m.heading_rad, m.pitch_rad, m.roll_rad).tolist()
         source = SOURCES[self.sonar.kind]
         out = []
         for beam, (r, (de, dn, dd)) in enumerate(zip(ranges, directions, strict=True)):
@@ -462,6 +491,7 @@ class SimulatedVehicle:
                     roll_rad=m.roll_rad,
                     footprint=footprint,
                     true_position=true,
+                    beam_rad=pointed[beam],
                 )
             )
         return out

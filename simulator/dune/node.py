@@ -27,7 +27,8 @@ from simulator.dune.transport.radio import Radio
 from simulator.dune.transport.rates import DEFAULT_LIMITS_HZ, Periodic, RateLimiter, RateLimiterError, parse_limits
 from simulator.dune.transport.tcp import FIRST_PORT, TcpServer
 from simulator.network import Address, Endpoint, UdpEndpoint
-from simulator.sonars.sensors import SensorKind, cast_rays, to_local_frame
+from simulator.sonars.frames import to_local_frame
+from simulator.sonars.sensors import SensorKind, cast_rays
 from simulator.targets import Ranging
 from simulator.vehicles.navigation import SURFACE_DEPTH_M
 from simulator.vehicles.vehicle import STEP_S

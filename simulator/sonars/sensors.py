@@ -13,6 +13,8 @@ import numpy as np
 
 from simulator.arrays import FloatArray
 from simulator.floors.terrain import Terrain
+from simulator.sonars.frames import to_local_frame
+from simulator.sonars.mounting import STRAIGHT, SonarMounting
 from simulator.sonars.raycasting import march
 from simulator.vehicles.vehicle import Motion
 
@@ -87,17 +89,6 @@ def beams_of(kind: SensorKind) -> Beams:
     raise ValueError(f"sonar: kind is {kind}; it must be single or dvl")
 
 
-def to_local_frame(body: FloatArray, heading_rad: float, pitch_rad: float, roll_rad: float) -> FloatArray:
-    """Turn body vectors (forward, starboard, down) into (east, north, down), shape (n, 3) each."""
-    cr, sr = math.cos(roll_rad), math.sin(roll_rad)
-    cp, sp = math.cos(pitch_rad), math.sin(pitch_rad)
-    ch, sh = math.cos(heading_rad), math.sin(heading_rad)
-    x, y, z = body[:, 0], body[:, 1], body[:, 2]
-    y, z = cr * y - sr * z, sr * y + cr * z
-    x, z = cp * x + sp * z, -sp * x + cp * z
-    return np.column_stack([sh * x + ch * y, ch * x - sh * y, z])
-
-
 def cast_rays(
     terrain: Terrain,
     east_m: float,
@@ -139,6 +130,8 @@ class Sonar:
         Simulated time between two pings.
     max_range_m, min_range_m
         Outside of which nothing is returned.
+    mounting
+        How it really sits in the vehicle.
     """
 
     def __init__(
@@ -150,6 +143,7 @@ class Sonar:
         ping_period_s: float = 0.2,
         max_range_m: float = 100.0,
         min_range_m: float = 0.1,
+        mounting: SonarMounting = STRAIGHT,
     ) -> None:
         if not ping_period_s > 0.0:
             raise ValueError(f"sonar: ping_period_s is {ping_period_s}; it must be positive")
@@ -160,10 +154,12 @@ class Sonar:
         self.max_range_m = max_range_m
         self.min_range_m = min_range_m
         self._rng = rng
-        self._body = self.beams.body
+        self._mounting = mounting
+        self._body = mounting.turned(self.beams.body)
 
     def true_ranges(self, terrain: Terrain, motion: Motion) -> FloatArray:
         """Ranges without any error, shape (n_beams,), NaN for no return."""
+        motion = self._mounting.placed(motion)
         if self.kind is SensorKind.SINGLE:
             return np.array([_altitude_m(terrain, motion)])
         directions = to_local_frame(self._body, motion.heading_rad, motion.pitch_rad, motion.roll_rad)
@@ -174,7 +170,7 @@ class Sonar:
         noise = self.noise
         if noise.outlier_rate > 0.0 or noise.dropout_rate > 0.0:
             return float(self.ping(terrain, motion)[0])
-        measured = _altitude_m(terrain, motion)
+        measured = _altitude_m(terrain, self._mounting.placed(motion))
         if noise.relative_sd > 0.0:
             measured *= 1.0 + noise.relative_sd * self._rng.standard_normal()
         return measured if self.min_range_m <= measured <= self.max_range_m else math.nan

@@ -10,7 +10,9 @@ import numpy as np
 
 from simulator.arrays import FloatArray
 from simulator.floors.terrain import Terrain
-from simulator.sonars.sensors import SensorKind, SonarNoise, cast_rays, to_local_frame
+from simulator.sonars.frames import to_local_frame
+from simulator.sonars.mounting import STRAIGHT, SonarMounting
+from simulator.sonars.sensors import SensorKind, SonarNoise, cast_rays
 from simulator.vehicles.vehicle import Motion
 
 SOUND_SPEED_MPS = 1500.0
@@ -119,11 +121,19 @@ class SwathSounder:
         What it does wrong.
     rng
         Source of the errors.
+    mounting
+        How it really sits in the vehicle.
     """
 
     kind: ClassVar = SensorKind.MULTIBEAM
 
-    def __init__(self, sonar: SwathSonar, errors: SwathErrors, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        sonar: SwathSonar,
+        errors: SwathErrors,
+        rng: np.random.Generator,
+        mounting: SonarMounting = STRAIGHT,
+    ) -> None:
         self.sonar = sonar
         self.errors = errors
         self.angles_rad = sonar.angles_rad
@@ -132,10 +142,11 @@ class SwathSounder:
         self._rng = rng
         self._outwards = (self.angles_rad / OUTER_RAD) ** 2
         self._sd = np.hypot(errors.relative_sd, errors.outer_relative_sd * self._outwards)
-        self._body = self._rays()
+        self._mounting = mounting
+        self._body = mounting.turned(self._rays())
 
     def _rays(self) -> FloatArray:
-        """Where beams really point: unit vectors (rays * beams, 3) forward, starboard, down, ray by ray."""
+        """Where beams really point in the sonar: unit vectors (rays * beams, 3), ray by ray."""
         errors = self.errors
         steered = np.sin(self.angles_rad) * (1.0 + errors.sound_speed_error_mps / SOUND_SPEED_MPS)
         angles = np.arcsin(np.clip(steered, -1.0, 1.0)) + math.radians(errors.roll_offset_deg)
@@ -147,6 +158,7 @@ class SwathSounder:
 
     def ping(self, terrain: Terrain, motion: Motion) -> FloatArray:
         """Measured slant ranges, shape (beams,), NaN where nothing was detected."""
+        motion = self._mounting.placed(motion)
         directions = to_local_frame(self._body, motion.heading_rad, motion.pitch_rad, motion.roll_rad)
         rays = cast_rays(terrain, motion.east_m, motion.north_m, motion.depth_m, directions, self.max_range_m)
         rays = rays.reshape(-1, len(self.angles_rad))

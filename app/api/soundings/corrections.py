@@ -1,4 +1,4 @@
-"""How soundings are corrected: tide, sound speed, systematic errors, and the drift of vehicles."""
+"""How soundings are corrected: mounting, tide, sound speed, systematic errors, and the drift of vehicles."""
 
 from contextlib import suppress
 from typing import Annotated
@@ -9,7 +9,7 @@ from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
 from app.api.http.problems import body_problems, problems
 from app.api.mission import Mission
-from app.api.schemas import API
+from app.api.schemas import API, VehicleName
 from app.api.state import Service
 from app.mapping.s44 import Order
 from app.missions.errors import MapNotReadyError
@@ -18,6 +18,7 @@ from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
 from app.missions.operations.maps.mission_maps import newest_map
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import MOST_NAME, CastDescription, CastRules, NewCasts, SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
@@ -44,7 +45,7 @@ _CHANGE = body_problems("mission-not-found")
     responses=problems("mission-not-found", "invalid-request"),
 )
 async def get_corrections(reader: Reader, mission: Mission) -> CorrectionsView:
-    """Return tide, sound speed and the datum that depths are counted from."""
+    """Return tide, sound speed, mountings of sonars and the datum that depths are counted from."""
     return corrections_view(mission)
 
 
@@ -136,6 +137,34 @@ async def delete_cast(name: CastName, operator: Operator, mission: Mission) -> C
 async def set_cast_rule(rules: CastRules, operator: Operator, mission: Mission) -> CorrectionsView:
     """Set which of several casts corrects a ping, at any time: every sounding is corrected anew."""
     return await casts.set_cast_rule(mission, rules, operator.name)
+
+
+@router.put(
+    "/mountings/{name}",
+    operation_id="setMounting",
+    summary="Correct how a sonar is mounted",
+    responses=_CHANGE | problems("vehicle-not-found"),
+)
+async def set_mounting(
+    name: VehicleName, mounting: MountingSpec, operator: Operator, mission: Mission
+) -> CorrectionsView:
+    """Set how a vehicle's sonar is mounted, as a patch test tells it, at any time, in place of what its vehicle states.
+
+    Every sounding and every beam is placed anew from its raw values. Refused where beams came placed, with a
+    multibeam's own files (GSF, KMALL).
+    """
+    return await recorrection.set_mounting(mission, name, mounting, operator.name)
+
+
+@router.delete(
+    "/mountings/{name}",
+    operation_id="deleteMounting",
+    summary="Take a sonar as its vehicle states it is mounted",
+    responses=problems("mission-not-found", "vehicle-not-found", "invalid-request"),
+)
+async def delete_mounting(name: VehicleName, operator: Operator, mission: Mission) -> CorrectionsView:
+    """Correct the mounting no more: what the vehicle's description states counts again."""
+    return await recorrection.set_mounting(mission, name, None, operator.name)
 
 
 @router.get(

@@ -103,6 +103,14 @@ class Footprints:
         return Footprints(**{column.name: getattr(self, column.name)[rows] for column in fields(self)})
 
 
+@dataclass(frozen=True)
+class PlacedPings:
+    """Pings of one vehicle, place and attitude being the sonar's, and where their beams met the bottom."""
+
+    pings: Pings
+    footprints: Footprints
+
+
 def reach_m(pings: Pings) -> FloatArray:
     """Return how far each ping's beams met the bottom to port and to starboard, level, (n, 2); NaN without any."""
     across = pings.range_m * np.sin(pings.angle_rad - pings.roll_rad[:, None])

@@ -1,12 +1,14 @@
 """The state of a mission as it is stored, and what is read of one before it is taken into memory."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from app.mapping.water.tides import TideTable
 from app.missions.live.journals.journal import Counts
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mounting import MountingSpec
 from app.missions.states import MissionState
 from app.storage.models import MissionRow
 
@@ -56,3 +58,5 @@ class StoredMission:
     """Measured water levels; None: there are none."""
     adjustment: TrackAdjustment | None = None
     """How far tracks are moved; None: they stay as they were reported."""
+    mountings: Mapping[str, MountingSpec] = field(default_factory=dict)
+    """How its vehicles, also those that left, say that their sonars are mounted."""

@@ -72,7 +72,9 @@ async def take_up(
     counts = Counts(stored.accepted, stored.rejected)
     # Which cells lie in the area is quick to tell of hundreds, and holds everyone up of millions.
     builder = await asyncio.to_thread(builder_of, spec)
-    mission = StoredMission(row, spec, counts, table, adjustment)
+    described = [VehicleSpec.model_validate(vehicle.spec) for vehicle in vehicles]
+    mountings = {one.name: one.mounting for one in described}
+    mission = StoredMission(row, spec, counts, table, adjustment, mountings)
     live = LiveMission(database, hub, threads, ping_files, time_scale, mission, search, builder)
     async with database.reading() as session:
         pinged = await live.pings.open(session)
@@ -91,8 +93,8 @@ async def take_up(
     live.journal.travelled_m = live.trails.length_m
     if step is not None:
         live.set_step(step.number, step.objective, step.terms)
-    for vehicle in vehicles:
-        member = live.team.join(VehicleSpec.model_validate(vehicle.spec), vehicle.slot)
+    for vehicle, vehicle_spec in zip(vehicles, described, strict=True):
+        member = live.team.join(vehicle_spec, vehicle.slot)
         ended = live.header.state in ENDED
         level_pct = batteries.get(member.name)
         member.report = _last_report(positions.get(member.name), level_pct if ended else None)

@@ -52,6 +52,7 @@ from app.missions.soundings.gate import Gate
 from app.missions.spec.budget import Budget
 from app.missions.spec.failsafes import Response
 from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.vehicle import Sensor as SensorName
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import ENDED, NOT_STARTED, MissionState
@@ -102,7 +103,9 @@ class LiveMission:
         """Who does heavy work; None: this process alone."""
         self.margin_m = 2 * spec.limits.max_step_m
         """How far outside the area what vehicles measured still belongs to the mission and helps the map's edge."""
-        corrections = Corrections.of(spec, self.frame, stored.tide_table, stored.adjustment)
+        corrections = Corrections.of(spec, self.frame, stored.tide_table, stored.adjustment, stored.mountings)
+        self.stated_mountings = dict(stored.mountings)
+        """How its vehicles, also those that left, say that their sonars are mounted."""
         self.gate = self._gate_with(corrections)
         self.reference_m: FloatArray | None = None
         """Depths of the grid that the map is compared with, at the map's cells."""
@@ -116,7 +119,7 @@ class LiveMission:
         """What a mission of kind search knows of its site."""
         self.pings = PingStore(database, row.id, PingGate(self.frame, self.gate.outside), ping_files)
         """All its pings."""
-        self.builder.swath.place = corrections.beams
+        self.builder.swath.place = corrections.placing()
         self._mates = None if search is None else Mates(self.team, lambda m: hub.info(m.key).report, spec, self.frame)
         take_scans = (
             None
@@ -301,6 +304,17 @@ class LiveMission:
         self.journal.tell_of_missing_level()
         self.revision += 1
 
+    def state_mounting(self, vehicle: str, mounting: MountingSpec) -> None:
+        """Note how the sonar of a vehicle that joins is mounted; nothing was sounded by it under another mounting."""
+        if mounting == self.stated_mountings.get(vehicle, MountingSpec()):
+            return
+        self.stated_mountings[vehicle] = mounting
+        before = self.gate.corrections
+        self.gate.corrections = Corrections.of(
+            self.spec, self.frame, before.table, before.adjustment, self.stated_mountings
+        )
+        self.swath.correct(self.gate.corrections)
+
     def relength(self, budget: Budget, left_m: Mapping[str, float]) -> None:
         """Be of another length from now on; ``left_m``: by vehicle what it may fly yet, metres, as it is stored."""
         self.spec = self.vehicles.spec = self.spec.with_budget(budget)
@@ -474,7 +488,10 @@ class LiveMission:
             self.feed.of_soundings(sum(some.beams for some in pings.values()), self.header.step)
         for vehicle, some in pings.items():
             member, last = self.team.get(vehicle), some.take(slice(-1, None))
-            reached = reach_m(last)
+            try:
+                reached = reach_m(self.gate.corrections.mounted(vehicle, last))
+            except ValueError:
+                continue  # it is nowhere near
             if member is not None and np.isfinite(reached).all():
                 member.swath = Swath(float(last.time_s[0]), *reached[0].tolist())
 

@@ -12,19 +12,23 @@ from app.exploration.core.coverage import Coverage
 from app.mapping.swath.density import DensityGrid
 from app.mapping.swath.gridded import gridded_map
 from app.mapping.swath.holidays import open_ground, side_of
-from app.mapping.swath.pings import Footprints, Pings
+from app.mapping.swath.pings import Footprints, Pings, PlacedPings
 from app.mapping.swath.spikes import spikes
 from app.mapping.tiers import asked_of, by_depth
 from app.mapping.types import BathymetricMap, Grid, SoundingRows
 
-Place = Callable[[str, Pings], Footprints | None]
-"""Returns where the beams of a vehicle's pings met the bottom, corrected; None where that is nowhere near."""
+Place = Callable[[str, Pings], PlacedPings | None]
+"""Returns where the beams of a vehicle's pings met the bottom; None where that is nowhere near."""
 
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams that met the bottom, spikes left out: where, and how uncertain that is."""
+    """Beams that met the bottom, spikes left out: whose pings they are of, where, and how uncertain that is.
 
+    Place and attitude of the pings are the sonar's.
+    """
+
+    pings: Pings
     footprints: Footprints
     uncertainty: Uncertainty
 
@@ -36,9 +40,10 @@ class Beams:
 
 def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -> Beams | None:
     """Return the beams of one vehicle's pings whose depth is known; None where they are nowhere near."""
-    beams = place(vehicle, pings)
-    if beams is None:
+    there = place(vehicle, pings)
+    if there is None:
         return None
+    pings, beams = there.pings, there.footprints
     wrong = spikes(pings)
     keep = ~wrong[np.isfinite(pings.range_m) & np.isfinite(pings.angle_rad)] & np.isfinite(beams.depth_m)
     found = beams.take(keep)
@@ -47,7 +52,7 @@ def beams_of(vehicle: str, pings: Pings, place: Place, errors: SoundingErrors) -
         down_m=np.abs(found.depth_m - pings.depth_m[found.ping]),
         pitch_rad=pings.pitch_rad[found.ping],
     )
-    return Beams(found, uncertainty(went, errors, pings.position_sd_m[found.ping]))
+    return Beams(pings, found, uncertainty(went, errors, pings.position_sd_m[found.ping]))
 
 
 class SwathGrid:

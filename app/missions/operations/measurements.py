@@ -422,7 +422,8 @@ def _footprint(item: Measurement, range_m: float) -> tuple[Position, BeamGeometr
     """Return where a beam met the bottom, and how it pointed."""
     if item.beam_off_nadir_deg is None or item.heading_deg is None:
         below = Position(item.lat_deg, item.lon_deg, item.depth_m + range_m)
-        return below, BeamGeometry(item.lat_deg, item.lon_deg)
+        attitude = () if item.heading_deg is None else (item.roll_deg, item.pitch_deg, item.heading_deg)
+        return below, BeamGeometry(item.lat_deg, item.lon_deg, *attitude)
     state = StateSample(
         item.time_s,
         math.radians(item.lat_deg),

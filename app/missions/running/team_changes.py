@@ -13,12 +13,15 @@ from app.missions.live.mission import LiveMission
 from app.missions.running.admission import check_vehicle
 from app.missions.running.claims import Claims, free_elsewhere
 from app.missions.running.supervisor import PATIENCE_S, MissionSupervisor
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.vehicle import VehicleSpec
 from app.missions.states import AT_SEA, ENDED, MissionState
 from app.missions.team import Member
 from app.missions.views.mission import Level
 from app.storage.models import MissionVehicleRow
 from app.storage.queries import missions as mission_queries
+from app.storage.queries import pings as ping_queries
+from app.storage.queries import soundings as sounding_queries
 
 
 class TeamChanges:
@@ -35,6 +38,7 @@ class TeamChanges:
             refuse_ended(live, "takes no more vehicles")
             live.refuse_ending()
             check_vehicle(vehicle, live.spec, self._hub.kinds)
+            await _refuse_another_mounting(live, vehicle)
             if live.team.get(vehicle.name) is not None:
                 raise ConflictError(
                     f"vehicle {vehicle.name!r} takes part already", "choose another name, or remove the vehicle first"
@@ -47,6 +51,7 @@ class TeamChanges:
                 self._claims.release(live, vehicle)
                 raise
             live.team.join(vehicle, slot)
+            live.state_mounting(vehicle.name, vehicle.mounting)
             if live.header.state is MissionState.DRAFT:
                 await self._supervisor.set_state(live, states.move(MissionState.DRAFT, "complete_draft"), "", actor)
             await live.journal.log(Level.INFO, "vehicle", f"{vehicle.name} joined", vehicle=vehicle.name, actor=actor)
@@ -112,6 +117,21 @@ class TeamChanges:
             await self._supervisor.set_state(live, move, "no vehicle left", actor)
         await live.journal.log(Level.INFO, "vehicle", f"{member.name} left", vehicle=member.name, actor=actor)
         return stops
+
+
+async def _refuse_another_mounting(live: LiveMission, vehicle: VehicleSpec) -> None:
+    """Refuse a vehicle whose sonar is stated to be mounted otherwise than where it sounded before."""
+    if vehicle.mounting == live.stated_mountings.get(vehicle.name, MountingSpec()):
+        return
+    async with live.database.reading() as session:
+        sounded = await sounding_queries.vehicles_of(session, live.id)
+        pinged = await ping_queries.waiting(session, live.id)
+        chunks = await ping_queries.chunks(session, live.id)
+    if vehicle.name in sounded | set(pinged) | {chunk.vehicle for chunk in chunks}:
+        raise ConflictError(
+            f"vehicle {vehicle.name!r} sounded in this mission before, with another mounting stated",
+            f"let it join as it was, and correct that: PUT /api/v1/missions/{live.id}/mountings/{vehicle.name}",
+        )
 
 
 async def _store_joining(live: LiveMission, vehicle: VehicleSpec) -> int:

@@ -1,23 +1,26 @@
-"""From what a sonar reported to a place and a depth below the datum: sound speed, drift, tide, systematic errors.
+"""From what a sonar reported to a place and a depth below the datum: mounting, sound speed, drift, tide, errors.
 
 The report itself stays as it came.
 """
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.swath.pings import Footprints, Pings, placed
+from app.mapping.swath.mounting import STRAIGHT, BeamVectors, StatedTrack, displaced, mounted
+from app.mapping.swath.pings import Pings, PlacedPings, placed
 from app.mapping.water.casts import CastPlaces, Casts
 from app.mapping.water.sound_speed import SoundSpeedProfile
 from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import INSTANTANEOUS_WATER_LEVEL, VerticalDatum
-from app.missions.fleet.interface import Position, SoundingReport
+from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
 from app.missions.soundings.adjustment import TrackAdjustment
 from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import InstrumentErrors, SystematicErrors
 from app.missions.spec.water import Cast, SoundSpeed, Tide
 from imc_bridge.printable import printable
@@ -28,7 +31,18 @@ NO_LEVEL = "tide: "
 ASSUMED_MPS = 1500.0
 """Speed that is set in sonars where nobody says otherwise."""
 
+NAMED_MOUNTINGS = 5
+"""Mountings of more vehicles are counted in products, not described."""
+
 _RIGHT = InstrumentErrors()
+
+Tracks = defaultdict[str, StatedTrack]
+"""By vehicle where it was stated to be, as long as one after the other is corrected."""
+
+
+def no_tracks() -> Tracks:
+    """Return tracks of nobody yet."""
+    return defaultdict(StatedTrack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +73,29 @@ class PlacedSounding:
         return not self.reason
 
 
+@dataclass(frozen=True)
+class _Moved:
+    """By how much mountings move soundings, (n, 3) each: east, north, down."""
+
+    sonar_m: NDArray[np.float64]
+    footprint_m: NDArray[np.float64]
+
+
+class Placing:
+    """Places the pings of a mission, each vehicle's in the order they came; threads may share it."""
+
+    def __init__(self, corrections: "Corrections") -> None:
+        self._corrections = corrections
+        self._tracks = no_tracks()
+
+    def __call__(self, vehicle: str, pings: Pings) -> PlacedPings | None:
+        """Return where the beams met the bottom, depths below the datum; None where the frame has no place for them.
+
+        Depths for whose time there is no water level are NaN.
+        """
+        return self._corrections.beams(vehicle, pings, self._tracks.setdefault(vehicle, StatedTrack()))
+
+
 class Corrections:
     """The corrections of one mission.
 
@@ -72,6 +109,8 @@ class Corrections:
         By how much positions were off; None: they are taken as they came.
     systematic
         What is always wrong with sonars and water levels.
+    mountings
+        How sonars are mounted, by vehicle.
     """
 
     def __init__(
@@ -83,6 +122,7 @@ class Corrections:
         sound_speed: SoundSpeed | None = None,
         adjustment: TrackAdjustment | None = None,
         systematic: SystematicErrors | None = None,
+        mountings: Mapping[str, MountingSpec] | None = None,
     ) -> None:
         self._frame = frame
         self._tide = tide
@@ -92,13 +132,23 @@ class Corrections:
         self._sound_speed = sound_speed
         self._systematic = systematic or SystematicErrors()
         self._residual = np.array(self._systematic.water_level, dtype=float).reshape(-1, 2)
+        self._mountings = {name: one for name, one in (mountings or {}).items() if not one.is_ideal}
+        self._applied = {name: one.mounting for name, one in self._mountings.items()}
         self._assumed_mps = ASSUMED_MPS if sound_speed is None else sound_speed.assumed_mps
 
     @classmethod
     def of(
-        cls, spec: MissionSpec, frame: LocalFrame, table: TideTable | None, adjustment: TrackAdjustment | None
+        cls,
+        spec: MissionSpec,
+        frame: LocalFrame,
+        table: TideTable | None,
+        adjustment: TrackAdjustment | None,
+        stated: Mapping[str, MountingSpec],
     ) -> "Corrections":
-        """Return the corrections that a mission's description states, with its tide table and adjustment."""
+        """Return the corrections that a mission's description states, with its tide table and adjustment.
+
+        ``stated``: how its vehicles say that their sonars are mounted, which the description may correct.
+        """
         return cls(
             frame,
             spec.tide,
@@ -106,6 +156,7 @@ class Corrections:
             sound_speed=spec.sound_speed,
             adjustment=adjustment,
             systematic=spec.systematic_errors,
+            mountings={**stated, **spec.mountings},
         )
 
     @property
@@ -116,6 +167,7 @@ class Corrections:
         sound = ""
         if self._sound_speed is not None:
             sound = f"; sound speed: {printable(self._sound_speed.statement).strip() or 'profile'}"
+        sound += self._mounting_statement
         if self.table is None and not tide.is_applied:
             statement = f"instantaneous water level (tide: {source}{sound})"
             return VerticalDatum(INSTANTANEOUS_WATER_LEVEL, statement)
@@ -129,6 +181,19 @@ class Corrections:
         name = VerticalDatum(tide.datum_epsg, "").crs.name
         return VerticalDatum(tide.datum_epsg, f"EPSG:{tide.datum_epsg} {name}, by {how}{sound})")
 
+    @property
+    def mounted_vehicles(self) -> frozenset[str]:
+        """Return whose sonars are not simply at the vehicle's reference point and along its axes."""
+        return frozenset(self._mountings)
+
+    @property
+    def _mounting_statement(self) -> str:
+        """Return in words how sonars are mounted, after what else is said; empty: none but along their vehicles."""
+        found = self._mountings
+        if len(found) > NAMED_MOUNTINGS:
+            return f"; mountings of {len(found)} sonars corrected"
+        return "".join(f"; mounting of {name}: {one.statement}" for name, one in sorted(found.items()))
+
     def water_level_m(self, time_s: float) -> float:
         """How high the water stands above the datum of corrected depths; the table's lowest where it has no level."""
         level = self._tide.level_m
@@ -138,13 +203,21 @@ class Corrections:
                 level = float(self.table.levels_m.min())
         return level + float(self._residual_m([time_s])[0]) - self._tide.datum_offset_m
 
-    def apply(self, reports: Sequence[SoundingReport]) -> list[PlacedSounding]:
-        """Return one result per report, in their order. Every number in a report is finite."""
+    def apply(self, reports: Sequence[SoundingReport], tracks: Tracks | None = None) -> list[PlacedSounding]:
+        """Return one result per report, in their order. Every number in a report is finite.
+
+        ``tracks``: where vehicles were stated to be before; None: nothing is known of that.
+        """
         if not reports:
             return []
         places = self._places([report.footprint for report in reports])
         raw = np.array([report.footprint.depth_m for report in reports])
-        shift, depth = self._sound_speed_corrected(reports, raw, places)
+        moved = self._moved(reports, places, no_tracks() if tracks is None else tracks)
+        if moved is not None:
+            raw = raw + moved.footprint_m[:, 2]
+        shift, depth = self._sound_speed_corrected(reports, raw, places, moved)
+        if moved is not None:
+            shift = shift + moved.footprint_m[:, :2]
         if self.adjustment is not None:
             shift = shift - self.adjustment.offsets_of(reports)
         depth = depth - [self._errors_of(report.vehicle).depth_m for report in reports]
@@ -163,13 +236,23 @@ class Corrections:
             results.append(PlacedSounding(report, east, north, below, float(level)))
         return results
 
-    def beams(self, vehicle: str, pings: Pings) -> Footprints | None:
+    def mounted(self, vehicle: str, pings: Pings, track: StatedTrack | None = None) -> Pings:
+        """Return a vehicle's pings with place and attitude of its sonar. Raises ValueError far from the frame."""
+        return mounted(pings, self._applied.get(vehicle, STRAIGHT), self._frame, track)
+
+    def placing(self) -> Placing:
+        """Return what places pings one after the other, of which it remembers where vehicles were."""
+        return Placing(self)
+
+    def beams(self, vehicle: str, pings: Pings, track: StatedTrack | None = None) -> PlacedPings | None:
         """Return where the beams of a vehicle's pings met the bottom, depths below the datum.
 
-        None where the frame has no place for them. Depths for whose time there is no water level are NaN.
+        None where the frame has no place for them. Depths for whose time there is no water level are NaN. ``track``:
+        where the vehicle was stated to be before.
         """
         errors = self._errors_of(vehicle)
         try:
+            pings = self.mounted(vehicle, pings, track)
             found = placed(self._steered(pings, errors), self._frame, self.casts)
         except ValueError:
             return None
@@ -177,7 +260,8 @@ class Corrections:
             off = self.adjustment.offsets(vehicle, pings.time_s)[found.ping]
             found = replace(found, east_m=found.east_m - off[:, 0], north_m=found.north_m - off[:, 1])
         levels = self._levels(pings.time_s)
-        return replace(found, depth_m=found.depth_m - errors.depth_m - levels[found.ping] + self._tide.datum_offset_m)
+        depth_m = found.depth_m - errors.depth_m - levels[found.ping] + self._tide.datum_offset_m
+        return PlacedPings(pings, replace(found, depth_m=depth_m))
 
     def _errors_of(self, vehicle: str) -> InstrumentErrors:
         return self._systematic.vehicles.get(vehicle, _RIGHT)
@@ -206,30 +290,61 @@ class Corrections:
         reports: Sequence[SoundingReport],
         raw_m: NDArray[np.float64],
         places: Sequence[tuple[float, float] | str],
+        moved: _Moved | None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return how far each footprint moves, (n, 2) east and north, and the bottom's depth below the water level."""
         shift = np.zeros((len(reports), 2))
         if self.casts is None:
             return shift, raw_m
         sonar = np.array([report.vehicle_depth_m for report in reports])
+        if moved is not None:
+            sonar = sonar + moved.sonar_m[:, 2]
         down = raw_m - sonar
         slant = np.array([report.range_m for report in reports])
         # Where the sonar was is not always known; then the length of the slanted range says how far aside the beam met
         # the bottom, and only the direction is missing.
         across = np.sqrt(np.maximum(slant**2 - down**2, 0.0))
         offsets = np.array([self._offset(report, place) for report, place in zip(reports, places, strict=True)])
+        if moved is not None:
+            offsets = offsets + moved.footprint_m[:, :2] - moved.sonar_m[:, :2]
         seen = np.isfinite(offsets[:, 0])
         across[seen] = np.hypot(*offsets[seen].T)
         beams = down > 0.0
         depth = raw_m.copy()
-        at = np.array([(np.nan, np.nan) if isinstance(place, str) else place for place in places])
+        at = _columns(places)
         cast = self.casts.chosen(np.array([report.time_s for report in reports]), *at.T)
         across_true, down_true = self.casts.trace(cast[beams], sonar[beams], across[beams], down[beams])
         depth[beams] = sonar[beams] + down_true
-        moved = beams & seen & (across > 0.0)
-        stretch = across_true[moved[beams]] / across[moved] - 1.0
-        shift[moved] = offsets[moved] * stretch[:, None]
+        stretched = beams & seen & (across > 0.0)
+        stretch = across_true[stretched[beams]] / across[stretched] - 1.0
+        shift[stretched] = offsets[stretched] * stretch[:, None]
         return shift, depth
+
+    def _moved(
+        self, reports: Sequence[SoundingReport], places: Sequence[tuple[float, float] | str], tracks: Tracks
+    ) -> _Moved | None:
+        """Return by how much mountings move soundings and what they are sent from; None: nobody's sonar is off."""
+        by_vehicle: defaultdict[str, list[int]] = defaultdict(list)
+        for row, report in enumerate(reports):
+            if report.vehicle in self._applied and not isinstance(places[row], str):
+                by_vehicle[report.vehicle].append(row)
+        if not by_vehicle:
+            return None
+        moved = _Moved(np.zeros((len(reports), 3)), np.zeros((len(reports), 3)))
+        for vehicle, rows in by_vehicle.items():
+            mounting = self._applied[vehicle]
+            own = [reports[row] for row in rows]
+            found = displaced(_vectors(own), mounting)
+            moved.sonar_m[rows], moved.footprint_m[rows] = found.sonar_m, found.footprint_m
+            if mounting.latency_s:
+                at = _columns([places[row] for row in rows])
+                from_m = np.nan_to_num([self._offset(reports[row], places[row]) for row in rows])
+                vehicle_m = at - from_m
+                time_s = np.array([report.time_s for report in own])
+                late_m = tracks[vehicle].later(time_s, vehicle_m, mounting.latency_s) - vehicle_m
+                moved.sonar_m[rows, :2] += late_m
+                moved.footprint_m[rows, :2] += late_m
+        return moved
 
     def _offset(self, report: SoundingReport, place: tuple[float, float] | str) -> tuple[float, float]:
         """Return the footprint's place from the sonar's, east and north; NaN where one of them is unknown."""
@@ -253,6 +368,31 @@ class Corrections:
             # One far-away place must not take the others of its batch with it.
             return [place for footprint in footprints for place in self._places([footprint])]
         return list(zip(east.tolist(), north.tolist(), strict=True))
+
+
+def _columns(places: Sequence[tuple[float, float] | str]) -> NDArray[np.float64]:
+    """Return places (n, 2), NaN for those that have none."""
+    return np.array([(np.nan, np.nan) if isinstance(place, str) else place for place in places])
+
+
+_UNKNOWN = BeamGeometry(np.nan, np.nan)
+
+
+def _vectors(reports: Sequence[SoundingReport]) -> BeamVectors:
+    """Return how the beams of soundings pointed."""
+    geometry = [report.beam_geometry or _UNKNOWN for report in reports]
+
+    def radians(name: str) -> NDArray[np.float64]:
+        return np.asarray(np.radians(np.array([getattr(one, name) for one in geometry], dtype=float)))
+
+    return BeamVectors(
+        roll_rad=radians("roll_deg"),
+        pitch_rad=radians("pitch_deg"),
+        heading_rad=radians("heading_deg"),
+        azimuth_rad=radians("azimuth_deg"),
+        off_nadir_rad=radians("off_nadir_deg"),
+        range_m=np.array([report.range_m for report in reports]),
+    )
 
 
 def _casts(sound_speed: SoundSpeed, frame: LocalFrame) -> Casts:

@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from app.missions.fleet.interface import SoundingReport
-from app.missions.soundings.corrections import Corrections, PlacedSounding
+from app.missions.soundings.corrections import Corrections, PlacedSounding, no_tracks
 
 MAX_OCEAN_DEPTH_M = 11_100.0
 MAX_VEHICLE_SPEED_MPS = 6.0
@@ -39,6 +39,7 @@ class Gate:
 
     def __init__(self, corrections: Corrections, area: Polygon, *, margin_m: float, noise: float) -> None:
         self.corrections = corrections
+        self._tracks = no_tracks()
         self._zone = area.buffer(margin_m)
         self._margin_m = margin_m
         self._noise = noise
@@ -49,7 +50,7 @@ class Gate:
     def check(self, reports: Iterable[SoundingReport]) -> list[PlacedSounding]:
         """Return one result per report, in their order; depths are corrected, the report stays raw."""
         listed = [(report, implausible_value(report)) for report in reports]
-        placed = iter(self.corrections.apply([report for report, reason in listed if not reason]))
+        placed = iter(self.corrections.apply([report for report, reason in listed if not reason], self._tracks))
         return [
             PlacedSounding(report, reason=reason) if reason else self._check(next(placed)) for report, reason in listed
         ]

@@ -20,10 +20,11 @@ from app.exploration import DEFAULT_PLANNER
 from app.exploration.planner.options import PlannerOptions
 from app.mapping.coordinates.georeference import MAX_EXTENT_M, LocalFrame
 from app.mapping.s44 import Order, strictest_sd_m
-from app.missions.spec.base import FieldError, Model, PolygonGeometry, ShownName, cell_count
+from app.missions.spec.base import FieldError, Model, Name, PolygonGeometry, ShownName, cell_count
 from app.missions.spec.budget import Allowance, Budget, Steps
 from app.missions.spec.failsafes import Failsafe, Response
 from app.missions.spec.limits import Limits
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.recovery import Homecoming, Recovery
 from app.missions.spec.search import DEFAULTS as SEARCH_DEFAULTS
 from app.missions.spec.search import SearchSpec, filled_in
@@ -190,6 +191,12 @@ class MissionSpec(Model):
     )
     systematic_errors: SystematicErrors = Field(
         default_factory=SystematicErrors, description="What is always wrong with sonars and water levels"
+    )
+    mountings: dict[Name, MountingSpec] = Field(
+        default_factory=dict,
+        max_length=100,
+        description="How sonars are mounted, by vehicle, in place of what their vehicles state: corrected when a patch "
+        "test was evaluated",
     )
     site: SiteId | None = Field(
         default=None, description="The site that it surveys, which keeps what it finds; null: none"

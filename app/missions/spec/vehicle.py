@@ -6,6 +6,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from app.missions.spec.base import Latitude, Longitude, Model, Name
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.swath import SwathSonarSpec
 
 Speed = Annotated[float, Field(gt=0, le=5)]
@@ -49,6 +50,10 @@ class VehicleSpec(Model):
     sensor: Sensor = Sensor.SINGLE_BEAM
     sonar: SwathSonarSpec | None = Field(
         default=None, description="With sensor multibeam: what that sonar can do; null: its defaults"
+    )
+    mounting: MountingSpec = Field(
+        default_factory=MountingSpec,
+        description="How its sonar is mounted, of whichever sensor; corrected later by `mountings` of the mission",
     )
     depth_m: float | None = Field(
         default=None,
@@ -94,11 +99,35 @@ class VehicleSpec(Model):
         default=None,
         description="Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area",
     )
+    simulated_mounting: MountingSpec | None = Field(
+        default=None,
+        description="How the sonar of a simulated vehicle really is mounted, to see what a wrong `mounting` does; "
+        "null: as `mounting` says",
+    )
 
     @model_validator(mode="after")
     def _has_the_sonar_that_is_described(self) -> Self:
         if self.sonar is not None and self.sensor is not Sensor.MULTIBEAM:
             raise ValueError(f"sonar is given but sensor is {self.sensor}: only a multibeam is described by it")
+        return self
+
+    @property
+    def real_mounting(self) -> MountingSpec:
+        """How the sonar of a simulated vehicle really is mounted."""
+        return self.mounting if self.simulated_mounting is None else self.simulated_mounting
+
+    @model_validator(mode="after")
+    def _is_simulated_where_its_mounting_is(self) -> Self:
+        if self.simulated_mounting is not None and self.kind is not VehicleKind.SIM:
+            raise ValueError(
+                f"simulated_mounting is given but kind is {self.kind}: state how a real sonar is mounted in mounting"
+            )
+        if self.kind is VehicleKind.SIM and self.real_mounting.latency_s < 0.0:
+            name = "mounting" if self.simulated_mounting is None else "simulated_mounting"
+            raise ValueError(
+                f"{name}.latency_s is {self.real_mounting.latency_s:g}: simulated positions are late, never "
+                "early; give 0 or more"
+            )
         return self
 
     @model_validator(mode="after")

@@ -31,6 +31,31 @@ def surveyed(service: Service) -> str:
     return mission
 
 
+def test_a_mounting_is_corrected_after_the_patch_test_and_taken_back(
+    watched: Watched, service: Service, surveyed: str
+) -> None:
+    page, corrections = watched.page, f"/missions/{surveyed}/corrections"
+    show(page, surveyed)
+    by_id(page, "toggle-corrections").click()
+    one = by_id(page, "mounting-rover")
+    expect(one).to_contain_text("along the vehicle")
+    one.locator("summary").click()
+    by_id(page, "mounting-roll_deg").fill("-1,5")
+    by_id(page, "mounting-down").fill("0.25")
+    by_id(page, "mounting-source").fill("patch test")
+    by_id(page, "mounting-set").click()
+    expect(one).to_contain_text("roll -1.5°, 0 m forward, 0 m to starboard, 0.25 m down (patch test)")
+    (told,) = service.get(corrections)["mountings"]
+    assert (told["corrected"]["roll_deg"], told["corrected"]["offset_m"]) == (-1.5, [0.0, 0.0, 0.25])
+    # Figures that a vehicle has not renewed for a while are pale.
+    assert [one for one in violations(page) if "depth-rover" not in one] == []
+    one.locator("summary").click()
+    by_id(page, "mounting-remove").click()
+    expect(one).not_to_contain_text("patch test")
+    expect(one).to_contain_text("along the vehicle")
+    assert service.get(corrections)["mountings"][0]["corrected"] is None
+
+
 def text_file(name: str, text: str) -> FilePayload:
     return {"name": name, "mimeType": "text/plain", "buffer": text.encode()}
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.mapping.gaussian_process import surveys
-from app.mapping.swath.pings import Footprints, Pings
+from app.mapping.swath.pings import Footprints, Pings, PlacedPings
 from app.missions.maps import builder as builder_module
 from app.missions.maps.builder import CLAIM_MARGIN, MAX_LANDMARKS, UNSEEN_MARGIN, MapBuilder, make_grid
 from tests.support.missions.maps import AREA, built_of, soundings
@@ -34,7 +34,7 @@ def test_beams_that_all_fell_outside_of_the_area_make_no_map() -> None:
     zeros, angle, range_m = np.zeros(1), np.zeros((1, 1), np.float32), np.full((1, 1), 9.0, np.float32)
     pings = Pings(zeros, zeros, zeros, zeros, zeros, zeros, zeros, zeros, angle, range_m)
     off = Footprints(np.arange(1), np.array([-20.0]), np.array([5.0]), np.array([9.0]), zeros, np.array([9.0]))
-    builder.swath.place = lambda vehicle, pings: off
+    builder.swath.place = lambda vehicle, pings: PlacedPings(pings, off)
     builder.swath.add("rover", pings)
     assert builder.build() is None
     assert builder.own_map() is None

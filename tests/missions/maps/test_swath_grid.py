@@ -5,7 +5,7 @@ import pytest
 
 from app.estimation.uncertainty import SoundingErrors
 from app.exploration.core.coverage import Coverage
-from app.mapping.swath.pings import Footprints, Pings
+from app.mapping.swath.pings import Footprints, Pings, PlacedPings
 from app.mapping.types import Grid
 from app.missions.maps.swath_grid import SwathGrid
 
@@ -24,7 +24,7 @@ def swept(depth_m: float, cell_of_depth: float | None) -> Coverage:
     pings = Pings(time_s, zeros, zeros, zeros, zeros, zeros, zeros, zeros, angle, range_m)
     depth = np.full(number, depth_m)
     beams = Footprints(np.arange(number), east, north, depth, zeros, range_m[:, 0].astype(float))
-    swath.place = lambda vehicle, pings: beams
+    swath.place = lambda vehicle, pings: PlacedPings(pings, beams)
     swath.add("rover", pings)
     return swath.coverage(None)
 

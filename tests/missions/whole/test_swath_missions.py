@@ -17,11 +17,13 @@ from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.decisions.leg import Place
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
+from app.missions.operations.corrections.recorrection import set_mounting
 from app.missions.operations.maps.mission_maps import export, map_at_step, newest_map
 from app.missions.preflight.survey import preflight
 from app.missions.running import vehicle_orders
 from app.missions.settings import ServiceSettings
 from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.orders import GoOrder, OrderState
 from app.missions.spec.water import Tide
 from app.missions.states import ENDED, MissionState
@@ -281,3 +283,27 @@ async def test_the_checklist_warns_of_vehicles_that_are_too_fast(harbour: Harbou
     slow = await harbour.service.create(swath_spec(cell_m=2.0, name="slow"))
     checks = {check.id: check for check in preflight(await harbour.service.get(slow.id)).checks}
     assert checks["density.b"].status is CheckStatus.OK
+
+
+@pytest.mark.usefixtures("simulated_time")
+async def test_a_sonar_that_is_simulated_askew_is_put_right_after_the_mission(harbour: Harbour) -> None:
+    askew = {"roll_deg": 3.0, "pitch_deg": -2.0, "offset_m": [0.5, 0.0, 0.3]}
+    vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0}
+    live = await started(harbour, vehicles=[vehicle | {"simulated_mounting": askew}], sounding_noise=0.0)
+    await ensonified(live, 40.0)
+    await act(harbour.service, live.id, "finish")
+    await until_state(harbour.service, live.id, MissionState.FINISHED)
+
+    async def spread_m() -> float:
+        """How far the cells of a floor that is flat lie apart."""
+        built = await live.build_map()
+        assert built is not None
+        return float(np.nanstd(built.map.depth_m[built.map.sounded]))
+
+    off_m = await spread_m()
+    await set_mounting(live, "a", MountingSpec.model_validate(askew), "Ana")
+    right_m = await spread_m()
+    assert off_m > 0.1
+    assert right_m < 0.02
+    await set_mounting(live, "a", None, "Ana")
+    assert await spread_m() == pytest.approx(off_m, rel=1e-12), "beams are summed up in another order than as they came"

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from app.arrays import FloatArray
 from simulator.floors import seafloors
 from simulator.floors.terrain import Terrain
-from simulator.sonars.sensors import SensorKind, Sonar, SonarNoise, beams_of, cast_rays, to_local_frame
+from simulator.sonars.frames import to_local_frame
+from simulator.sonars.sensors import SensorKind, Sonar, SonarNoise, beams_of, cast_rays
 from simulator.vehicles.vehicle import Motion
 
 FLAT = seafloors.generate("flat", 0)

@@ -59,6 +59,8 @@ CONTRACT = {
     "POST /missions/{mission_id}/adjustment": "adjustTracks",
     "DELETE /missions/{mission_id}/adjustment": "undoAdjustment",
     "GET /missions/{mission_id}/corrections": "getCorrections",
+    "PUT /missions/{mission_id}/mountings/{name}": "setMounting",
+    "DELETE /missions/{mission_id}/mountings/{name}": "deleteMounting",
     "GET /missions/{mission_id}/systematic-errors": "getSystematicErrors",
     "PUT /missions/{mission_id}/systematic-errors": "setSystematicErrors",
     "DELETE /missions/{mission_id}/systematic-errors": "deleteSystematicErrors",

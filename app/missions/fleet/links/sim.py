@@ -37,6 +37,7 @@ from app.missions.spec.vehicle import Sensor
 from simulator.equipment import Equipment
 from simulator.floors.terrain import Terrain, TerrainError
 from simulator.obstacles.scanning import Scanning
+from simulator.sonars.mounting import SonarMounting
 from simulator.sonars.raycasting import warm_up
 from simulator.sonars.sensors import SensorKind, SonarNoise
 from simulator.sonars.swath import SwathSonar
@@ -160,6 +161,7 @@ class SimFleetLink(FleetLink):
             start=(vehicle.start[1], vehicle.start[0]) if vehicle.start is not None else deployment.berth(),
             noise=mission.sounding_noise,
             swath=SwathSonar(**(vehicle.sonar or SwathSonarSpec()).model_dump()),
+            mounting=SonarMounting(**vehicle.real_mounting.model_dump(exclude={"source"})),
             targets=tuple(mission.targets),
             ranging=RangingNoise(
                 relative_sd=mission.tracking.range_noise,
@@ -216,6 +218,7 @@ class SimFleetLink(FleetLink):
                 sensor=SENSORS[launch.sensor],
                 noise=SonarNoise(relative_sd=launch.noise),
                 swath=launch.swath or SwathSonar(),
+                mounting=launch.mounting,
                 drift_m2ps=self._settings.drift_m2ps,
                 limits=_limits_of(launch),
                 battery=launch.battery,

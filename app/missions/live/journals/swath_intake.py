@@ -74,5 +74,5 @@ class SwathIntake:
 
     def correct(self, corrections: Corrections) -> None:
         """Place all pings anew, by other corrections, before the next map."""
-        self._grid.place = corrections.beams
+        self._grid.place = corrections.placing()
         self._forget()

@@ -14,7 +14,6 @@ from app.mapping.quality.survey import SurveyCheck
 from app.mapping.quality.tracks import Tracks
 from app.mapping.s44 import Order
 from app.mapping.swath.density import DensityGrid
-from app.mapping.swath.pings import Pings
 from app.missions.live.mission import LiveMission
 from app.missions.maps.snapshot import MapSnapshot
 from app.missions.maps.swath_grid import Beams, beams_of
@@ -101,7 +100,7 @@ async def survey_check(live: LiveMission) -> SurveyCheck:
     check = await asyncio.to_thread(SurveyCheck.of, tracks)
     if not live.journal.counts.pings or not check.is_crossline.any():
         return check
-    place = live.gate.corrections.beams
+    place = live.gate.corrections.placing()
     main = DensityGrid(live.builder.grid, live.builder.mask)
     async for vehicle, pings in live.pings.all_accepted(until):
         own = pings.take(~check.crossed_at(vehicle, pings.time_s))
@@ -110,6 +109,7 @@ async def survey_check(live: LiveMission) -> SurveyCheck:
             at = beams.footprints
             await asyncio.to_thread(main.add, at.east_m, at.north_m, at.depth_m, beams.sd_m)
     compared = BeamCheck(live.builder.grid, main.depth_m)
+    place = live.gate.corrections.placing()
     async for vehicle, pings in live.pings.all_accepted(until):
         own = pings.take(check.crossed_at(vehicle, pings.time_s))
         beams = await asyncio.to_thread(beams_of, vehicle, own, place, live.spec.uncertainty)
@@ -126,13 +126,13 @@ async def survey_tracks(live: LiveMission, until_block: int | None = None) -> Tr
     """
     await live.journal.flush()
     tables = await _sounding_tables(live)
-    place = live.gate.corrections.beams
+    place = live.gate.corrections.placing()
     spacing_m = SPACING_CELLS * live.spec.cell_m
     nadirs: dict[str, list[FloatArray]] = {}
     async for vehicle, pings in live.pings.all_accepted(until_block):
         beams = await asyncio.to_thread(beams_of, vehicle, pings, place, live.spec.uncertainty)
         if beams is not None:
-            nadirs.setdefault(vehicle, []).append(await asyncio.to_thread(nadir_track, pings, beams, spacing_m))
+            nadirs.setdefault(vehicle, []).append(await asyncio.to_thread(nadir_track, beams, spacing_m))
     tables |= {vehicle: np.concatenate(parts) for vehicle, parts in nadirs.items()}
     return await asyncio.to_thread(Tracks.of, tables)
 
@@ -151,9 +151,9 @@ async def _sounding_tables(live: LiveMission) -> dict[str, FloatArray]:
     return {name: np.concatenate(parts) for name, parts in found.items()}
 
 
-def nadir_track(pings: Pings, beams: Beams, spacing_m: float) -> FloatArray:
+def nadir_track(beams: Beams, spacing_m: float) -> FloatArray:
     """Return the beam of each ping that points most steeply down, (k, 5) as soundings are; none nearer than asked."""
-    at = beams.footprints
+    pings, at = beams.pings, beams.footprints
     order = np.lexsort((np.abs(at.angle_rad - pings.roll_rad[at.ping]), at.ping))
     _, first = np.unique(at.ping[order], return_index=True)
     rows = order[first]

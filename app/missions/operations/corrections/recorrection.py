@@ -16,17 +16,23 @@ from app.mapping.water.tide_files import TideTableError, parse_tid
 from app.mapping.water.tides import TideTable
 from app.mapping.water.vertical import VerticalDatum
 from app.missions.clock import now
-from app.missions.errors import ConflictError, InvalidRequestError
+from app.missions.errors import ConflictError, InvalidRequestError, VehicleNotFoundError
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
 from app.missions.live.mission import LiveMission
 from app.missions.soundings.adjustment import TrackAdjustment
-from app.missions.soundings.corrections import NO_LEVEL, Corrections
+from app.missions.soundings.corrections import NO_LEVEL, Corrections, Tracks, no_tracks
 from app.missions.soundings.gate import Gate
 from app.missions.spec.base import FieldError
 from app.missions.spec.mission import MissionSpec
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import SoundSpeed, Tide
-from app.missions.views.measurements.corrections import CorrectionsView, TideCorrection, TideTableView
+from app.missions.views.measurements.corrections import (
+    CorrectionsView,
+    MountingView,
+    TideCorrection,
+    TideTableView,
+)
 from app.missions.views.measurements.soundings import Ruling, Verdict
 from app.missions.views.mission import Level
 from app.storage.models import ImportRow, MissionRow, SoundingRow, TideTableRow
@@ -39,7 +45,7 @@ AT_ONCE = 10_000
 
 NUMBERS = ("level_m", "east_m", "north_m", "depth_m")
 
-CORRECTIONS = {"tide", "sound_speed", "systematic_errors"}
+CORRECTIONS = {"tide", "sound_speed", "systematic_errors", "mountings"}
 """Fields of a mission's description that say how soundings are corrected."""
 
 
@@ -59,10 +65,22 @@ def corrections_view(live: LiveMission) -> CorrectionsView:
         ),
         sound_speed=live.spec.sound_speed,
         systematic_errors=live.spec.systematic_errors,
+        mountings=_mountings(live),
         vertical_datum=live.facts.vertical_datum.statement,
         accepted=live.journal.counts.accepted,
         rejected=live.journal.counts.rejected,
     )
+
+
+def _mountings(live: LiveMission) -> list[MountingView]:
+    """Return how sonars are mounted, of the vehicles that take part, in their order, then of others by name."""
+    stated, corrected = live.stated_mountings, live.spec.mountings
+    names = [member.name for member in live.team]
+    names += sorted((stated.keys() | corrected.keys()) - set(names))
+    return [
+        MountingView(vehicle=name, stated=stated.get(name, MountingSpec()), corrected=corrected.get(name))
+        for name in names
+    ]
 
 
 async def set_tide(live: LiveMission, tide: TideCorrection, actor: str) -> CorrectionsView:
@@ -131,17 +149,57 @@ async def check_none_applied(live: LiveMission) -> None:
     """
     if live.spec.sound_speed is not None:
         return
-    async with live.database.reading() as session:
-        rows = await event_queries.events_of_kind(session, live.id, "import")
-    counting = [row.data for row in rows if row.data.get("log") not in live.pings.taken_back]
-    files = sorted({data["file"] for data in counting if data.get("pings")})
-    files = [file for file in files if file.lower().endswith(MULTIBEAM)]
+    files = sorted(await _multibeam_files(live))
     if files:
         raise InvalidRequestError(
             "profile",
             f"pings from {', '.join(files)} have the sound speed applied, and it would be applied again",
             "leave this mission without a sound speed: correct them in the multibeam's own processing",
         )
+
+
+async def _multibeam_files(live: LiveMission) -> dict[str, str]:
+    """Return the multibeam's own files that pings were taken in from, with the vehicle of each."""
+    async with live.database.reading() as session:
+        rows = await event_queries.events_of_kind(session, live.id, "import")
+    return {
+        row.data["file"]: row.data["vehicle"]
+        for row in rows
+        if row.data.get("pings")
+        and row.data["file"].lower().endswith(MULTIBEAM)
+        and row.data.get("log") not in live.pings.taken_back
+    }
+
+
+async def set_mounting(live: LiveMission, vehicle: str, mounting: MountingSpec | None, actor: str) -> CorrectionsView:
+    """Change how a vehicle's sonar is mounted; None: as the vehicle states.
+
+    Raises VehicleNotFoundError, InvalidRequestError where its beams came placed.
+    """
+    known = await _who_sounded(live)
+    if vehicle not in known:
+        who = ", ".join(sorted(known)) or "none so far"
+        raise VehicleNotFoundError(f"vehicle {vehicle!r} takes no part in the mission", f"these do: {who}")
+    async with live.correcting:
+        applied = live.stated_mountings.get(vehicle, MountingSpec()) if mounting is None else mounting
+        if not applied.is_ideal:
+            files = sorted(file for file, own in (await _multibeam_files(live)).items() if own == vehicle)
+            if files:
+                raise InvalidRequestError(
+                    "mounting",
+                    f"beams from {', '.join(files)} are placed with the mounting that the multibeam was given, and it "
+                    "would be applied again",
+                    f"leave {vehicle} without a mounting here: correct it in the multibeam's own processing, and "
+                    "import its files anew into another mission",
+                )
+        mountings = {name: one for name, one in live.spec.mountings.items() if name != vehicle}
+        if mounting is not None:
+            mountings[vehicle] = mounting
+        await correct_by(live, live.spec.model_copy(update={"mountings": mountings}))
+    how = "as the vehicle states" if mounting is None else mounting.statement
+    words = f"mounting of {vehicle}'s sonar: {how}, set by {actor}"
+    await live.journal.log(Level.INFO, "corrections", words, vehicle=vehicle, actor=actor)
+    return corrections_view(live)
 
 
 def check_casts(live: LiveMission, sound_speed: SoundSpeed) -> None:
@@ -181,6 +239,8 @@ async def _who_sounded(live: LiveMission) -> set[str]:
     """Return the mission's vehicles, and whose logs were imported."""
     async with live.database.reading() as session:
         sounded = await sounding_queries.vehicles_of(session, live.id)
+    chunks, waiting = await live.pings.contents()
+    sounded |= waiting.keys() | {chunk.vehicle for chunk in chunks}
     return {vehicle.name for vehicle in live.spec.vehicles} | {member.name for member in live.team} | sounded
 
 
@@ -214,7 +274,7 @@ async def recorrect(
     store: Callable[[AsyncSession], Awaitable[None]],
 ) -> None:
     """Correct every stored sounding anew; ``store`` writes what else changes. The caller holds ``correcting``."""
-    corrections = Corrections.of(spec, live.frame, table, adjustment)
+    corrections = Corrections.of(spec, live.frame, table, adjustment, live.stated_mountings)
     async with live.journal.writing:
         # Nothing else changes soundings meanwhile. Computing may have to wait for a thread, and the database's turn is
         # for all missions, whose stops are written, too.
@@ -274,7 +334,7 @@ class _Changed:
 async def _recorrected_pieces(live: LiveMission, corrections: Corrections) -> list[_Changed]:
     """Correct all stored soundings, so many at a time that their rows take little memory."""
     found: list[_Changed] = []
-    after = 0
+    after, tracks = 0, no_tracks()
     while True:
         async with live.database.reading() as session:
             rows = await sounding_queries.soundings_after(session, live.id, after, AT_ONCE)
@@ -282,17 +342,19 @@ async def _recorrected_pieces(live: LiveMission, corrections: Corrections) -> li
             return found
         after = rows[-1].id
         found.append(
-            await live.in_background(lambda rows: _Changed.of(recorrected(rows, corrections, live.gate)), rows)
+            await live.in_background(lambda rows: _Changed.of(recorrected(rows, corrections, live.gate, tracks)), rows)
         )
 
 
-def recorrected(rows: Sequence[SoundingRow], corrections: Corrections, gate: Gate) -> list[dict[str, Any]]:
-    """Return what changes in each row, by its id.
+def recorrected(
+    rows: Sequence[SoundingRow], corrections: Corrections, gate: Gate, tracks: Tracks | None = None
+) -> list[dict[str, Any]]:
+    """Return what changes in each row, by its id; ``tracks``: where vehicles were stated to be before.
 
     Verdicts stay, but for soundings that had no water level and have one now, or the other way round.
     """
     changes = []
-    for row, found in zip(rows, corrections.apply([report_of(row) for row in rows]), strict=True):
+    for row, found in zip(rows, corrections.apply([report_of(row) for row in rows], tracks), strict=True):
         change: dict[str, Any] = {"id": row.id, "level_m": found.level_m, "verdict": row.verdict, "reason": row.reason}
         change |= {"east_m": found.east_m, "north_m": found.north_m, "depth_m": found.depth_m}
         if row.verdict == sounding_queries.TAKEN_BACK:

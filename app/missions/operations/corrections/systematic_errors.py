@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from app.arrays import FloatArray
 from app.estimation.systematic import CrossingDepths, Estimate, LevelErrors, SwathTilt, TiltErrors, level_errors
 from app.mapping.quality.beams import expected_m
 from app.mapping.quality.survey import SurveyCheck
@@ -75,7 +74,7 @@ async def _tilts(live: LiveMission, levels: LevelErrors | None, check: SurveyChe
     until = await live.pings.newest_block()
     below = DensityGrid(live.builder.grid, live.builder.mask)
     offsets = {} if levels is None else {check.names[number]: one.value for number, one in levels.offsets.items()}
-    place, uncertainty = live.gate.corrections.beams, live.spec.uncertainty
+    uncertainty = live.spec.uncertainty
 
     def lay(vehicle: str, beams: Beams) -> None:
         at = beams.footprints
@@ -83,25 +82,28 @@ async def _tilts(live: LiveMission, levels: LevelErrors | None, check: SurveyChe
         depth_m = at.depth_m[near] - offsets.get(vehicle, 0.0)
         below.add(at.east_m[near], at.north_m[near], depth_m, beams.sd_m[near])
 
+    place = live.gate.corrections.placing()
     async for vehicle, pings in live.pings.all_accepted(until):
         beams = await asyncio.to_thread(beams_of, vehicle, pings, place, uncertainty)
         if beams is not None:
             await asyncio.to_thread(lay, vehicle, beams)
     tilt, known_m = SwathTilt(), below.depth_m
 
-    def compare(vehicle: str, beams: Beams, roll_rad: FloatArray, time_s: FloatArray, sonar_m: FloatArray) -> None:
-        every = max(1, len(beams.footprints) // max(1, len(time_s) * MOST_BEAMS))
-        at = beams.footprints
+    def compare(vehicle: str, beams: Beams) -> None:
+        pings, at = beams.pings, beams.footprints
+        every = max(1, len(at) // max(1, len(pings) * MOST_BEAMS))
         rows = np.flatnonzero(np.abs(at.angle_rad) >= ASIDE_RAD)[::every]
         at = at.take(rows)
         off_m = at.depth_m - offsets.get(vehicle, 0.0) - expected_m(live.builder.grid, known_m, at.east_m, at.north_m)
-        block = np.floor(time_s[at.ping] / BLOCK_S).astype(np.int64)
-        tilt.add(vehicle, block, at.angle_rad, roll_rad[at.ping], at.depth_m - sonar_m[at.ping], off_m)
+        block = np.floor(pings.time_s[at.ping] / BLOCK_S).astype(np.int64)
+        height_m = at.depth_m - pings.depth_m[at.ping]
+        tilt.add(vehicle, block, at.angle_rad, pings.roll_rad[at.ping], height_m, off_m)
 
+    place = live.gate.corrections.placing()
     async for vehicle, pings in live.pings.all_accepted(until):
         beams = await asyncio.to_thread(beams_of, vehicle, pings, place, uncertainty)
         if beams is not None:
-            await asyncio.to_thread(compare, vehicle, beams, pings.roll_rad, pings.time_s, pings.depth_m)
+            await asyncio.to_thread(compare, vehicle, beams)
     return {str(vehicle): found for vehicle, found in (await asyncio.to_thread(tilt.errors)).items()}
 
 

@@ -160,6 +160,14 @@ def check_log(live: LiveMission, name: str, vehicle: str | None) -> None:
             f"{name} has depths with the sound speed applied, and the mission's profile would be applied again",
             f"take that away first: DELETE /api/v1/missions/{live.id}/sound-speed",
         )
+    if is_multibeam(name) and vehicle is not None and vehicle in live.gate.corrections.mounted_vehicles:
+        raise InvalidRequestError(
+            "vehicle",
+            f"{name} has its beams placed with the mounting that the multibeam was given, and {vehicle}'s mounting in "
+            "the mission would be applied again",
+            f"set that to nothing first, PUT {{}} to /api/v1/missions/{live.id}/mountings/{vehicle}, or give the file "
+            "another vehicle's name",
+        )
 
 
 def near(live: LiveMission) -> Near:

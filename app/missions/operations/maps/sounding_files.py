@@ -95,7 +95,7 @@ async def point_cloud(live: LiveMission, frame: ProjectedFrame) -> FileContent:
             cloud.add(vehicle, *rows.T)
 
         await read_numbers(live.database, query, take)
-    place, errors = live.gate.corrections.beams, live.spec.uncertainty
+    place, errors = live.gate.corrections.placing(), live.spec.uncertainty
 
     def add_beams(vehicle: str, pings: Pings) -> None:
         beams = beams_of(vehicle, pings, place, errors)

@@ -113,8 +113,30 @@ def _casts(w: Writer) -> list[Block]:
     return blocks
 
 
+def _mountings(w: Writer) -> list[tuple[str, Text]]:
+    """Return how sonars are mounted that are not simply along their vehicles."""
+    facts: list[tuple[str, Text]] = []
+    for index, one in enumerate(w.answers.at("corrections.mountings")):
+        counted = "corrected" if one["corrected"] is not None else "stated"
+        at, mounting = f"corrections.mountings.{index}.{counted}", one[counted]
+        values = [
+            *((name, f"{at}.{name}", mounting[name], 2, "°") for name in ("roll_deg", "pitch_deg", "heading_deg")),
+            ("latency_s", f"{at}.latency_s", mounting["latency_s"], 3, "s"),
+            *(
+                (f"offset_{name}", f"{at}.offset_m.{axis}", mounting["offset_m"][axis], 2, "m")
+                for axis, name in enumerate(("forward", "starboard", "down"))
+            ),
+        ]
+        facts += [
+            (w.t(f"fact_mounting_{name}", vehicle=one["vehicle"]), w.number(source, digits, unit, signed=True))
+            for name, source, value, digits, unit in values
+            if value
+        ]
+    return facts
+
+
 def corrections(w: Writer) -> list[Block]:
-    """Return water level, sound speed, systematic errors, the adjustment of tracks, and imports."""
+    """Return water level, sound speed, systematic errors, mountings, the adjustment of tracks, and imports."""
     t, answers = w.t, w.answers
     tide = "corrections.tide"
     facts: list[tuple[str, Text]] = []
@@ -144,6 +166,7 @@ def corrections(w: Writer) -> list[Block]:
                 facts.append((t(f"fact_{key}", vehicle=name), value))
     if answers.at(f"{systematic}.water_level"):
         facts.append((t("fact_residual"), t("residual", count=t.number(len(answers.at(f"{systematic}.water_level"))))))
+    facts += _mountings(w)
     facts += [
         (t("fact_draught"), t("draught")),
         (t("fact_waterline"), w.number("mission.spec.uncertainty.waterline_m", 3, "m")),

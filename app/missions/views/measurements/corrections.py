@@ -7,6 +7,7 @@ from pydantic import Field
 from app.mapping.s44 import Order
 from app.mapping.water.casts import CastRule
 from app.missions.spec.base import Latitude, Longitude
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import ProfileDepth, ProfileSpeed, SoundSpeed, Tide
 from app.missions.views.base import View
@@ -38,6 +39,14 @@ class TideTableView(View):
     utc_assumed: bool = Field(description="Whether it states no zone for some of its times, which are taken for UTC")
 
 
+class MountingView(View):
+    """How the sonar of one vehicle is mounted."""
+
+    vehicle: str
+    stated: MountingSpec = Field(description="As the vehicle was described when it joined")
+    corrected: MountingSpec | None = Field(description="What counts in place of that; null: what is stated counts")
+
+
 class CorrectionsView(View):
     """How soundings are corrected; their raw values stay beside the corrected ones."""
 
@@ -45,6 +54,7 @@ class CorrectionsView(View):
     tide_table: TideTableView | None = Field(description="Its levels count in place of tide.level_m")
     sound_speed: SoundSpeed | None
     systematic_errors: SystematicErrors
+    mountings: list[MountingView] = Field(description="How sonars are mounted, a line for each vehicle")
     vertical_datum: str = Field(description="What corrected depths are counted from")
     accepted: int = Field(description="Soundings accepted under these corrections")
     rejected: int

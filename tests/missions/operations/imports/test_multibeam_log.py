@@ -66,8 +66,9 @@ async def test_pings_are_below_the_surface_and_on_the_map_once(
     async for vehicle, pings in live.pings.all_accepted():
         assert vehicle == "wam-v"
         np.testing.assert_allclose(pings.depth_m, 1.5, atol=1e-6)
-        beams = live.gate.corrections.beams(vehicle, pings)
-        assert beams is not None
+        found = live.gate.corrections.beams(vehicle, pings)
+        assert found is not None
+        beams = found.footprints
         east, north = (np.array(axis) - shift for axis, shift in ((beams.east_m, 15.0), (beams.north_m, 15.0)))
         np.testing.assert_allclose(beams.depth_m, floor(east, north), atol=0.02)
     built = (await newest_map(live, service.maps)).built

@@ -548,6 +548,8 @@ class CorrectionsView(Model):
     """Its levels count in place of tide.level_m"""
     sound_speed: SoundSpeed | None
     systematic_errors: SystematicErrors
+    mountings: list[MountingView]
+    """How sonars are mounted, a line for each vehicle"""
     vertical_datum: str
     """What corrected depths are counted from"""
     accepted: int
@@ -1263,6 +1265,10 @@ class MissionSpec(Model):
     """Sound speed correction by one cast or several; null: the sonars' own ranges are taken"""
     systematic_errors: SystematicErrors | None = None
     """What is always wrong with sonars and water levels"""
+    mountings: dict[str, Any] | None = None
+    """How sonars are mounted, by vehicle, in place of what their vehicles state: corrected when a patch test was
+    evaluated
+    """
     site: str | None = None
     """The site that it surveys, which keeps what it finds; null: none"""
     site_prior: bool = True
@@ -1327,6 +1333,39 @@ class MissionView(Model):
     """What may be asked of it in this state: ``POST /missions/{id}/start`` and so on."""
     efficiency_pct: float | None
     """Share of all metres flown that led along planned legs; null while nothing was flown."""
+
+
+class MountingSpec(Model):
+    """How a sonar is mounted in its vehicle, in the vehicle's frame: forward, starboard, down, right-handed."""
+
+    roll_deg: float = 0.0
+    """Roll of the sonar in the vehicle, degrees, positive: its starboard side is lower, so that a beam said to point
+    straight down points to port
+    """
+    pitch_deg: float = 0.0
+    """Pitch of the sonar in the vehicle, degrees, positive: its bow side is higher, so that a beam said to point
+    straight down points ahead
+    """
+    heading_deg: float = 0.0
+    """Heading (yaw) of the sonar in the vehicle, degrees, positive: turned clockwise as seen from above"""
+    latency_s: float = 0.0
+    """How late positions are, seconds: one that is stated for a time is where the vehicle was so much earlier. Depth
+    and attitude are taken as they are
+    """
+    offset_m: tuple[float, float, float] | None = None
+    """[forward, starboard, down] from the point that position and depth are stated for to the sonar, metres"""
+    source: str = ""
+    """Where these come from, for example a patch test"""
+
+
+class MountingView(Model):
+    """How the sonar of one vehicle is mounted."""
+
+    vehicle: str
+    stated: MountingSpec
+    """As the vehicle was described when it joined"""
+    corrected: MountingSpec | None
+    """What counts in place of that; null: what is stated counts"""
 
 
 class NewCasts(Model):
@@ -2765,6 +2804,8 @@ class VehicleSpec(Model):
     sensor: Sensor = "single_beam"
     sonar: SwathSonarSpec | None = None
     """With sensor multibeam: what that sonar can do; null: its defaults"""
+    mounting: MountingSpec | None = None
+    """How its sonar is mounted, of whichever sensor; corrected later by `mountings` of the mission"""
     depth_m: float | None = None
     """Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m,
     each further one limits.min_vertical_separation_m deeper
@@ -2791,6 +2832,10 @@ class VehicleSpec(Model):
     """With guidance acoustic: the name that the node with the modem announces"""
     start: tuple[float, float] | None = None
     """Where a simulated vehicle starts, [longitude, latitude]; default: a corner of the area"""
+    simulated_mounting: MountingSpec | None = None
+    """How the sonar of a simulated vehicle really is mounted, to see what a wrong `mounting` does; null: as
+    `mounting` says
+    """
 
 
 class VehicleTelemetry(Model):

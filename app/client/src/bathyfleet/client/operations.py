@@ -544,6 +544,28 @@ class Operations(ABC):
             body=body,
         ))
 
+    def set_mounting(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.MountingSpec | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Correct how a sonar is mounted: ``PUT /missions/{mission_id}/mountings/{name}``."""
+        return self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/mountings/{part(name)}",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    def delete_mounting(self, mission_id: str, name: str) -> models.CorrectionsView:
+        """Take a sonar as its vehicle states it is mounted: ``DELETE /missions/{mission_id}/mountings/{name}``."""
+        return self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/mountings/{part(name)}",
+            models.CorrectionsView,
+        ))
+
     def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
         """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
         return self._call(Call[models.SystematicErrorsView](
@@ -2177,6 +2199,28 @@ class AsyncOperations(ABC):
             f"/missions/{part(mission_id)}/sound-speed/rule",
             models.CorrectionsView,
             body=body,
+        ))
+
+    async def set_mounting(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.MountingSpec | Mapping[str, Any],
+    ) -> models.CorrectionsView:
+        """Correct how a sonar is mounted: ``PUT /missions/{mission_id}/mountings/{name}``."""
+        return await self._call(Call[models.CorrectionsView](
+            "PUT",
+            f"/missions/{part(mission_id)}/mountings/{part(name)}",
+            models.CorrectionsView,
+            body=body,
+        ))
+
+    async def delete_mounting(self, mission_id: str, name: str) -> models.CorrectionsView:
+        """Take a sonar as its vehicle states it is mounted: ``DELETE /missions/{mission_id}/mountings/{name}``."""
+        return await self._call(Call[models.CorrectionsView](
+            "DELETE",
+            f"/missions/{part(mission_id)}/mountings/{part(name)}",
+            models.CorrectionsView,
         ))
 
     async def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:

@@ -25,6 +25,7 @@ import type {
   MissionAction,
   MissionSummary,
   MissionView,
+  MountingSpec,
   NewCasts,
   NewMission,
   NewSite,
@@ -201,6 +202,9 @@ function post<T>(path: string, body?: unknown, patience = ORDERED): Promise<T> {
   );
 }
 
+const mountingPath = (id: string, vehicle: string) =>
+  `${missionPath(id)}/mountings/${encodeURIComponent(vehicle)}`;
+
 const put = <T>(path: string, body: unknown): Promise<T> =>
   request<T>(
     path,
@@ -342,6 +346,10 @@ export const api = {
     }),
   setCastRule: (id: string, rules: CastRules) =>
     put<CorrectionsView>(`${missionPath(id)}/sound-speed/rule`, rules),
+  setMounting: (id: string, vehicle: string, mounting: MountingSpec) =>
+    put<CorrectionsView>(mountingPath(id, vehicle), mounting),
+  deleteMounting: (id: string, vehicle: string) =>
+    request<CorrectionsView>(mountingPath(id, vehicle), { method: "DELETE" }),
   logs: (id: string) => poll<LogView[]>(`${missionPath(id)}/logs`),
   /** `vehicle`: empty where the log says whose it is. */
   sendLog: (id: string, vehicle: string, sending: Sending) =>

@@ -696,7 +696,7 @@ export interface paths {
         };
         /**
          * See how soundings are corrected
-         * @description Return tide, sound speed and the datum that depths are counted from.
+         * @description Return tide, sound speed, mountings of sonars and the datum that depths are counted from.
          */
         get: operations["getCorrections"];
         put?: never;
@@ -820,6 +820,33 @@ export interface paths {
         put: operations["setCastRule"];
         post?: never;
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/missions/{mission_id}/mountings/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Correct how a sonar is mounted
+         * @description Set how a vehicle's sonar is mounted, as a patch test tells it, at any time, in place of what its vehicle states.
+         *
+         *     Every sounding and every beam is placed anew from its raw values. Refused where beams came placed, with a
+         *     multibeam's own files (GSF, KMALL).
+         */
+        put: operations["setMounting"];
+        post?: never;
+        /**
+         * Take a sonar as its vehicle states it is mounted
+         * @description Correct the mounting no more: what the vehicle's description states counts again.
+         */
+        delete: operations["deleteMounting"];
         options?: never;
         head?: never;
         patch?: never;
@@ -3070,6 +3097,11 @@ export interface components {
             sound_speed: components["schemas"]["SoundSpeed"] | null;
             systematic_errors: components["schemas"]["SystematicErrors"];
             /**
+             * Mountings
+             * @description How sonars are mounted, a line for each vehicle
+             */
+            mountings: components["schemas"]["MountingView"][];
+            /**
              * Vertical Datum
              * @description What corrected depths are counted from
              */
@@ -4633,6 +4665,13 @@ export interface components {
             /** @description What is always wrong with sonars and water levels */
             systematic_errors?: components["schemas"]["SystematicErrors"];
             /**
+             * Mountings
+             * @description How sonars are mounted, by vehicle, in place of what their vehicles state: corrected when a patch test was evaluated
+             */
+            mountings?: {
+                [key: string]: components["schemas"]["MountingSpec"];
+            };
+            /**
              * Site
              * @description The site that it surveys, which keeps what it finds; null: none
              */
@@ -4852,6 +4891,13 @@ export interface components {
                 /** @description What is always wrong with sonars and water levels */
                 systematic_errors?: components["schemas"]["SystematicErrors"];
                 /**
+                 * Mountings
+                 * @description How sonars are mounted, by vehicle, in place of what their vehicles state: corrected when a patch test was evaluated
+                 */
+                mountings?: {
+                    [key: string]: components["schemas"]["MountingSpec"];
+                };
+                /**
                  * Site
                  * @description The site that it surveys, which keeps what it finds; null: none
                  */
@@ -4912,6 +4958,68 @@ export interface components {
              * @description Share of all metres flown that led along planned legs; null while nothing was flown.
              */
             readonly efficiency_pct: number | null;
+        };
+        /**
+         * MountingSpec
+         * @description How a sonar is mounted in its vehicle, in the vehicle's frame: forward, starboard, down, right-handed.
+         */
+        MountingSpec: {
+            /**
+             * Roll Deg
+             * @description Roll of the sonar in the vehicle, degrees, positive: its starboard side is lower, so that a beam said to point straight down points to port
+             * @default 0
+             */
+            roll_deg: number;
+            /**
+             * Pitch Deg
+             * @description Pitch of the sonar in the vehicle, degrees, positive: its bow side is higher, so that a beam said to point straight down points ahead
+             * @default 0
+             */
+            pitch_deg: number;
+            /**
+             * Heading Deg
+             * @description Heading (yaw) of the sonar in the vehicle, degrees, positive: turned clockwise as seen from above
+             * @default 0
+             */
+            heading_deg: number;
+            /**
+             * Latency S
+             * @description How late positions are, seconds: one that is stated for a time is where the vehicle was so much earlier. Depth and attitude are taken as they are
+             * @default 0
+             */
+            latency_s: number;
+            /**
+             * Offset M
+             * @description [forward, starboard, down] from the point that position and depth are stated for to the sonar, metres
+             * @default [
+             *       0,
+             *       0,
+             *       0
+             *     ]
+             */
+            offset_m: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Source
+             * @description Where these come from, for example a patch test
+             * @default
+             */
+            source: string;
+        };
+        /**
+         * MountingView
+         * @description How the sonar of one vehicle is mounted.
+         */
+        MountingView: {
+            /** Vehicle */
+            vehicle: string;
+            /** @description As the vehicle was described when it joined */
+            stated: components["schemas"]["MountingSpec"];
+            /** @description What counts in place of that; null: what is stated counts */
+            corrected: components["schemas"]["MountingSpec"] | null;
         };
         /**
          * NewCasts
@@ -8154,6 +8262,8 @@ export interface components {
             sensor: components["schemas"]["Sensor"];
             /** @description With sensor multibeam: what that sonar can do; null: its defaults */
             sonar?: components["schemas"]["SwathSonarSpec"] | null;
+            /** @description How its sonar is mounted, of whichever sensor; corrected later by `mountings` of the mission */
+            mounting?: components["schemas"]["MountingSpec"];
             /**
              * Depth M
              * @description Depth it travels at where the bottom leaves room; null: the first vehicle of a mission at limits.min_depth_m, each further one limits.min_vertical_separation_m deeper
@@ -8205,6 +8315,8 @@ export interface components {
                 number,
                 number
             ] | null;
+            /** @description How the sonar of a simulated vehicle really is mounted, to see what a wrong `mounting` does; null: as `mounting` says */
+            simulated_mounting?: components["schemas"]["MountingSpec"] | null;
         };
         /**
          * VehicleTelemetry
@@ -13183,6 +13295,195 @@ export interface operations {
             };
             /** @description Too much is under way */
             503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    setMounting: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The vehicle's name */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MountingSpec"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description The body cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteMounting: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The vehicle's name */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CorrectionsView"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many requests */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };

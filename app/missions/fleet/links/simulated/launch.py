@@ -12,6 +12,7 @@ from simulator.floors.seafloors import generate
 from simulator.floors.terrain import Terrain, TerrainError
 from simulator.floors.terrain_files import load_terrain
 from simulator.obstacles.obstacles import ObstacleWorld
+from simulator.sonars.mounting import SonarMounting
 from simulator.sonars.swath import SwathSonar
 from simulator.targets import RangingNoise
 from simulator.targets import TargetSpec as SimulatedTarget
@@ -59,6 +60,8 @@ class Launch:
         Standard deviation of a range as a fraction of it; 0: without any error.
     swath
         What its sonar can do when that is a multibeam.
+    mounting
+        How its sonar really is mounted.
     targets, ranging
         What moves about there, and how well it ranges to that.
     lookout
@@ -77,6 +80,7 @@ class Launch:
     start: tuple[float, float] | None
     noise: float
     swath: SwathSonar = SwathSonar()  # noqa: RUF009 - frozen
+    mounting: SonarMounting = SonarMounting()  # noqa: RUF009 - frozen
     targets: tuple[TargetSpec, ...] = ()
     ranging: RangingNoise = RangingNoise()  # noqa: RUF009 - frozen
     lookout: Lookout | None = None

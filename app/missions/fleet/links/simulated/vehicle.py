@@ -182,8 +182,15 @@ def _sounding(deployed: DeployedVehicle, measurement: BeamReturn) -> SoundingRep
         source=measurement.source,
         beam=measurement.beam,
         position_sd_m=math.sqrt(deployed.body.state.position_variance_m2),
-        beam_geometry=BeamGeometry(sonar.lat_deg, sonar.lon_deg),
+        beam_geometry=BeamGeometry(sonar.lat_deg, sonar.lon_deg, *_angles_deg(measurement)),
     )
+
+
+def _angles_deg(measurement: BeamReturn) -> tuple[float | None, ...]:
+    """Return roll, pitch and heading, and the beam's azimuth and angle from straight down where its range is slant."""
+    attitude = (measurement.roll_rad, measurement.pitch_rad, measurement.heading_rad)
+    beam = () if measurement.beam_rad is None else measurement.beam_rad
+    return tuple(math.degrees(angle) for angle in (*attitude, *beam))
 
 
 def _ping(deployed: DeployedVehicle, ping: SwathPing) -> PingReport:

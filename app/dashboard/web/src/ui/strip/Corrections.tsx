@@ -14,6 +14,7 @@ import { say } from "../../words/say";
 import { Button, FileButton, Trouble, Typed } from "../parts/Controls";
 import { Casts, RULES } from "./Casts";
 import { type Change, numberOf, type PartProps } from "./correctionParts";
+import { Mountings } from "./Mountings";
 
 /** How soundings are corrected for tide and sound speed, and how that is changed, also when all was flown long ago. */
 export function Corrections() {
@@ -74,6 +75,7 @@ export function Corrections() {
           <div class="parts" key={selectedId.value}>
             <WaterLevel found={found} busy={busy} change={change} fault={fault} />
             <SoundSpeed found={found} busy={busy} change={change} fault={fault} />
+            <Mountings found={found} busy={busy} change={change} fault={fault} />
           </div>
           <p class="hint">{say("corrections.everySoundingAnew")}</p>
         </>
