@@ -269,7 +269,10 @@ async def test_an_option_that_there_is_none_of_names_those_of_its_planner(client
     answer = await client.post("/missions", json=mission_spec(planner={"name": "lawnmower", "options": {"gap_m": 5}}))
     [error] = assert_problem(answer, 422, "invalid-request")["errors"]
     assert (error["field"], error["value"]) == ("planner.options.gap_m", 5)
-    assert error["expected"] == "its options are cruise_depth_m, line_heading_deg, line_spacing_m, turn_radius_m"
+    assert (
+        error["expected"]
+        == "its options are cruise_depth_m, keep_line_order, line_heading_deg, line_spacing_m, turn_radius_m"
+    )
 
 
 async def test_a_move_that_is_not_allowed_says_what_to_do(client: httpx.AsyncClient, mission: dict[str, Any]) -> None:

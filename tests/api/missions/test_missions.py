@@ -109,7 +109,7 @@ async def test_vehicles_and_planners_are_listed(client: httpx.AsyncClient, missi
     planners = {p["name"]: p for p in (await client.get("/planners")).json()}
     assert {"cao", "random", "lawnmower"} <= set(planners)
     assert planners["cao"]["options"]["type"] == "object"
-    of_lines = {"cruise_depth_m", "turn_radius_m", "line_spacing_m", "line_heading_deg"}
+    of_lines = {"cruise_depth_m", "turn_radius_m", "line_spacing_m", "line_heading_deg", "keep_line_order"}
     assert set(planners["lawnmower"]["options"]["properties"]) == of_lines
     assert "rollouts" in planners["rollout"]["options"]["properties"]
     assert "rollouts" not in planners["cao"]["options"]["properties"]
