@@ -126,7 +126,7 @@ class LinePlan:
         numbers = self.numbers_of(legs_m)
         on = numbers >= 0
         length_m = np.hypot(*(legs_m[on, 1] - legs_m[on, 0]).T)
-        sums = self._shared_out(np.bincount(numbers[on], length_m, len(self.lines)))
+        sums = self._shared_out(np.asarray(np.bincount(numbers[on], length_m, len(self.lines)), np.float64))
         return {line.name: min(float(m), line.length_m) for line, m in zip(self.lines, sums, strict=True) if m > 0.0}
 
     def _shared_out(self, metres: FloatArray) -> FloatArray:

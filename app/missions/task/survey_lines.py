@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Mapping
 
 import shapely
+from shapely import LineString
 
 from app.exploration.core.routes import free_region
 from app.exploration.lines.given_lines import GivenLine
@@ -29,7 +30,7 @@ def not_flyable_m(spec: MissionSpec) -> dict[str, float]:
     found = {}
     lines = given_lines(spec)
     # Most lie inside as a whole, which is quick to tell of all at once.
-    inside = shapely.covers(free, [shapely.linestrings(line.en_m) for line in lines])
+    inside = shapely.covers(free, [LineString(line.en_m) for line in lines])
     for line in itertools.compress(lines, ~inside):
         inside_m = sum(GivenLine(line.name, piece).length_m for piece in line.within(free))
         if line.length_m - inside_m > LEAST_TOLD_M:

@@ -211,7 +211,7 @@ def test_a_file_of_more_folders_than_are_read_is_refused_rather_than_cut() -> No
 
 
 def test_what_is_left_out_of_many_shapefiles_is_said_once(tmp_path: Path) -> None:
-    files = {}
+    files: dict[str, bytes] = {}
     for k in range(15):
         folder = tmp_path / str(k)
         folder.mkdir()
