@@ -306,7 +306,8 @@ class MissionService:
         InvalidRequestError, ConflictError, NotAMemberError
             Nothing is stored then.
         """
-        check_spec(spec, self.hub.kinds)
+        # Of thousands of lines that takes a while.
+        await asyncio.to_thread(check_spec, spec, self.hub.kinds)
         await self.sites.check(spec)
         await self._succession.check(spec)
         row = _new_row(spec)
@@ -319,8 +320,7 @@ class MissionService:
             await self._registry.own(session, row.id)
         live = await self.get(row.id)
         await live.journal.log(Level.INFO, "state", f"created by {actor}", state=row.state, actor=actor)
-        for remark in line_remarks(spec):
-            await live.journal.log(Level.WARNING, "lines", remark)
+        await _tell_of_lines(live)
         await self.sites.begin(live)
         return mission_view(live)
 
@@ -470,7 +470,7 @@ class MissionService:
 
     async def describe_anew(self, live: LiveMission, spec: MissionSpec, *, actor: str = "operator") -> MissionView:
         """Describe a mission anew that has not started. Raises InvalidRequestError, ConflictError."""
-        check_spec(spec, self.hub.kinds)
+        await asyncio.to_thread(check_spec, spec, self.hub.kinds)
         await self.sites.check(spec)
         await self._succession.check(spec, live.id, live.spec.after)
         await self._registry.try_out(_new_row(spec))
@@ -478,6 +478,7 @@ class MissionService:
             await describe_anew(live, spec, actor)
             await self._registry.forget(live, "the mission was described anew")
         live = await self.get(live.id)
+        await _tell_of_lines(live)
         await self.sites.begin(live)
         return mission_view(live)
 
@@ -517,6 +518,12 @@ class MissionService:
             member = None if mission_id is None else (await self.get(mission_id)).vehicles.of(info)
             views.append(member or idle_vehicle_view(info))
         return views
+
+
+async def _tell_of_lines(live: LiveMission) -> None:
+    """Log what is to be known of a mission's line plan before it is flown."""
+    for remark in await asyncio.to_thread(line_remarks, live.spec):
+        await live.journal.log(Level.WARNING, "lines", remark)
 
 
 def _new_row(spec: MissionSpec) -> MissionRow:

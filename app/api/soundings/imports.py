@@ -1,8 +1,8 @@
 """Files from elsewhere: vehicles' own logs, soundings and maps to begin with, and a grid to compare the map with."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
@@ -27,6 +27,8 @@ from app.missions.views.measurements.imports import (
     ReferenceView,
     ZoneOptions,
 )
+
+Found = TypeVar("Found")
 
 router = APIRouter(
     prefix=f"{API}/missions/{{mission_id}}", tags=["imports"], responses=problems("unauthenticated", "forbidden")
@@ -108,25 +110,8 @@ async def propose_zones(
     Land, obstructions, wrecks, rocks and restricted areas. Nothing is stored and no mission changes: who creates one
     looks at them and takes those that apply into `keep_out`. Reading ends with the connection.
     """
-    found: list[ProposedZonesView] = []
-
-    async def left() -> None:
-        while (await request.receive())["type"] != "http.disconnect":
-            pass
-
-    try:
-        async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
-
-            async def read() -> None:
-                found.append(await state.service.imports.propose_zones(upload, options))
-
-            # Nobody else's file waits for one that nobody waits for any more.
-            await first_of(read(), left())
-    except ClientDisconnect:
-        found.clear()
-    if not found:
-        raise ProblemError("malformed-body", "the connection ended before the file did, or before it was read")
-    return found[0]
+    imports = state.service.imports
+    return await _read_for(request, state, lambda upload: imports.propose_zones(upload, options))
 
 
 @charts_router.post(
@@ -142,13 +127,32 @@ async def read_drawing(
     """Return lines for a mission's `survey_lines` and polygons for its `area` and `keep_out`, as a file has them.
 
     Line plans and areas from GIS, survey programs and drawings: GeoJSON, KML, GPX, DXF, shapefiles, tables, Hypack.
-    Nothing is stored and no mission changes.
+    Nothing is stored and no mission changes. Reading ends with the connection.
     """
+    imports = state.service.imports
+    return await _read_for(request, state, lambda upload: imports.read_drawing(upload, options))
+
+
+async def _read_for(request: Request, state: State, read: Callable[[Upload], Awaitable[Found]]) -> Found:
+    """Return what a request's file holds; nobody else's file waits for one that nobody waits for any more."""
+    found: list[Found] = []
+
+    async def left() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+
     try:
         async with state.service.uploads.receive(request.stream(), state.settings.max_import_bytes) as upload:
-            return await state.service.imports.read_drawing(upload, options)
+
+            async def reading() -> None:
+                found.append(await read(upload))
+
+            await first_of(reading(), left())
     except ClientDisconnect:
-        raise ProblemError("malformed-body", "the connection ended before the file did") from None
+        found.clear()
+    if not found:
+        raise ProblemError("malformed-body", "the connection ended before the file did, or before it was read")
+    return found[0]
 
 
 @router.get(

@@ -126,8 +126,19 @@ class LinePlan:
         numbers = self.numbers_of(legs_m)
         on = numbers >= 0
         length_m = np.hypot(*(legs_m[on, 1] - legs_m[on, 0]).T)
-        sums = np.bincount(numbers[on], length_m, len(self.lines))
+        sums = self._shared_out(np.asarray(np.bincount(numbers[on], length_m, len(self.lines)), np.float64))
         return {line.name: min(float(m), line.length_m) for line, m in zip(self.lines, sums, strict=True) if m > 0.0}
+
+    def _shared_out(self, metres: FloatArray) -> FloatArray:
+        """Return how much of each line is flown where some lie on each other: what is too much for one is another's."""
+        metres = metres.copy()
+        for i in np.flatnonzero(metres > [line.length_m + ON_LINE_M for line in self.lines]):
+            for k in self._tree.query(self._shapes[i]):
+                room_m = min(metres[i] - self.lines[i].length_m, self.lines[k].length_m - metres[k])
+                if room_m > 0.0 and shapely.hausdorff_distance(self._shapes[i], self._shapes[k]) <= ON_LINE_M:
+                    metres[k] += room_m
+                    metres[i] -= room_m
+        return metres
 
     def after_line(self, begin_m: FloatArray, here_m: FloatArray, route: FloatArray) -> FloatArray | None:
         """Return what is left of a route (k, 2) without the line that is flown now, or the next where none is.
@@ -152,6 +163,10 @@ class LinePlan:
         flown = int(numbers[np.argmax(numbers >= 0)])
         others = np.flatnonzero((numbers >= 0) & (numbers != flown))
         mine = np.flatnonzero(numbers[: others[0] if len(others) else len(numbers)] == flown)
+        # Another one may lie on it: no line is longer than itself.
+        corners[0] = begin_m if numbers[0] == flown else here_m
+        flown_m = np.cumsum(np.hypot(*np.diff(corners, axis=0).T)[mine])
+        mine = mine[(flown_m <= self.lines[flown].length_m + ON_LINE_M) | (mine == mine[0])]
         return route[int(mine[-1]) + 1 :]
 
 

@@ -36,6 +36,8 @@ NAME_COLUMNS = ("name", "line_name", "linename", "line", "label", "title", "text
 LONGEST_NAME = 56
 SHAPE_PARTS = (".shp", ".shx", ".dbf", ".prj", ".cpg")
 WGS84 = "EPSG:4326"
+DEGREES = (WGS84, "EPSG:4979", "OGC:CRS84")
+"""What GeoJSON is in that states nothing."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,21 @@ class _Drawn:
     names: list[str]
     shapes: list[shapely.Geometry]
     crs: str | None
+
+
+@dataclass
+class _LeftOut:
+    """What is not taken of a file, and whether it is in the system that was given with it."""
+
+    points: int = 0
+    holes: int = 0
+    used_crs: bool = False
+
+    @property
+    def notes(self) -> list[str]:
+        """The same in words, however many parts the file has."""
+        words = [f"{self.points} points are left out"] if self.points else []
+        return words + ([f"{self.holes} holes in areas are left out"] if self.holes else [])
 
 
 def read_drawings(content: bytes, kind: str, crs: str | None) -> tuple[list[Drawing], list[str]]:
@@ -82,10 +99,11 @@ def read_drawings(content: bytes, kind: str, crs: str | None) -> tuple[list[Draw
         drawn = [_of_layers(one) for one in _shapefiles(content)]
     else:
         drawn = [_of_layers(_checked(_unpacked_kml(content) if kind == KMZ else content, kind))]
-    notes: list[str] = []
-    if crs is not None and all(one.crs is not None for one in drawn):
+    left_out = _LeftOut()
+    found = [drawing for one in drawn for drawing in _drawings(one, crs, left_out)]
+    notes = left_out.notes
+    if crs is not None and not left_out.used_crs:
         notes.append("the file states its own coordinate reference system; crs is not used")
-    found = [drawing for one in drawn for drawing in _drawings(one, crs, notes)]
     if not found:
         raise ReadError("file", "it has neither lines nor areas", "send one with lines, polylines or polygons")
     if len(found) > MAX_DRAWINGS or sum(len(one.places) for one in found) > MAX_DRAWN_CORNERS:
@@ -104,6 +122,8 @@ def _of_text(content: bytes, kind: str, crs: str | None) -> _Drawn:
         lines, degrees = read_table(content)
     lines = [(name, places) for name, places in lines if len(places) > 1]
     shapes: list[shapely.Geometry] = [shapely.LineString(places) for _, places in lines]
+    if degrees and crs is not None and not _system(crs).is_geographic:
+        raise ReadError("crs", "the header of the file says that its positions are degrees", "leave crs out")
     return _Drawn([name for name, _ in lines], shapes, WGS84 if degrees and crs is None else None)
 
 
@@ -121,7 +141,8 @@ def _shapefiles(content: bytes) -> Iterator[bytes]:
     stems = [name.removesuffix(".shp") for name in members if name.endswith(".shp")]
     if not stems:
         raise ReadError("file", "the archive holds no .shp", "pack .shp, .shx, .dbf and .prj into one .zip")
-    for stem in stems[:MAX_LAYERS]:
+    _check_layers(len(stems))
+    for stem in stems:
         if f"{stem}.shx" not in members:
             raise ReadError("file", "a .shp comes without its .shx", "pack .shp, .shx, .dbf and .prj into one .zip")
         packed = io.BytesIO()
@@ -158,7 +179,8 @@ def _members(content: bytes) -> Iterator[tuple[str, Callable[[], bytes]]]:
         return found
 
     for info in archive.infolist():
-        if not info.is_dir():
+        # macOS packs a file ``._name`` beside each one, which says how its windows look.
+        if not info.is_dir() and not info.filename.rpartition("/")[2].startswith("._"):
             yield info.filename, partial(unpack, info)
 
 
@@ -180,13 +202,19 @@ def _checked(content: bytes, kind: str) -> bytes:
     return content
 
 
+def _check_layers(count: int) -> None:
+    if count > MAX_LAYERS:
+        raise ReadError("file", f"it has {count} layers or folders", f"divide it: at most {MAX_LAYERS} are read")
+
+
 def _of_layers(content: bytes) -> _Drawn:
     """Return what is in all layers of a file that GDAL reads."""
     names: list[str] = []
     shapes: list[shapely.Geometry] = []
     crs: str | None = None
     try:
-        layers = pyogrio.list_layers(content)[:MAX_LAYERS, 0]
+        layers = pyogrio.list_layers(content)[:, 0]
+        _check_layers(len(layers))
         for number, layer in enumerate(layers):
             if str(layer) in ("waypoints", "route_points", "track_points"):
                 continue
@@ -223,29 +251,34 @@ def _text(value: Any) -> str:
     return "".join(c for c in str(value) if c.isprintable()).strip()[:LONGEST_NAME]
 
 
-def _drawings(drawn: _Drawn, crs: str | None, notes: list[str]) -> Iterator[Drawing]:
-    """Yield the lines and areas of what a file has; what is nothing of that is noted."""
-    points = holes = 0
+def _drawings(drawn: _Drawn, crs: str | None, left_out: _LeftOut) -> Iterator[Drawing]:
+    """Yield the lines and areas of what a file has; what is nothing of that is counted."""
     kept: list[tuple[Literal["line", "area"], str, FloatArray]] = []
     for name, shape in zip(drawn.names, drawn.shapes, strict=True):
         for part in _parts(shape):
             if isinstance(part, shapely.Polygon) and not part.is_empty:
-                holes += len(part.interiors)
+                left_out.holes += len(part.interiors)
                 kept.append(("area", name, shapely.get_coordinates(part.exterior)[:-1]))
             elif isinstance(part, shapely.LineString) and part.length > 0.0:
                 places = shapely.get_coordinates(part)
                 closed = part.is_closed and len(places) > 3
                 kept.append(("area", name, places[:-1]) if closed else ("line", name, places))
             elif isinstance(part, shapely.Point):
-                points += 1
-    notes += [f"{points} points are left out"] if points else []
-    notes += [f"{holes} holes in areas are left out"] if holes else []
+                left_out.points += 1
     if not kept:
         return
-    lonlat = _to_degrees(np.concatenate([places for *_, places in kept]), drawn.crs or crs)
+    xy = np.concatenate([places for *_, places in kept])
+    # GeoJSON is in degrees unless it says otherwise, which those who draw in metres forget.
+    uses_given = crs is not None and (drawn.crs is None or (drawn.crs in DEGREES and not _are_degrees(xy)))
+    left_out.used_crs |= uses_given
+    lonlat = _to_degrees(xy, crs if uses_given else drawn.crs)
     ends = np.cumsum([len(places) for *_, places in kept])[:-1]
     for (kind, name, _), places in zip(kept, np.split(lonlat, ends), strict=True):
         yield Drawing(kind, _text(name), _simplified(kind, name, places))
+
+
+def _are_degrees(xy: FloatArray) -> bool:
+    return bool((np.abs(xy) <= (180.0, 90.0)).all())
 
 
 def _parts(shape: shapely.Geometry | None) -> Iterator[shapely.Geometry]:
@@ -267,25 +300,37 @@ def _to_degrees(xy: FloatArray, crs: str | None) -> FloatArray:
             "crs", "the file does not say what its positions are in", "give crs, for example EPSG:32629 or EPSG:4326"
         )
     try:
-        system = pyproj.CRS.from_user_input(crs)
-        change = pyproj.Transformer.from_crs(system, WGS84, always_xy=True)
+        change = pyproj.Transformer.from_crs(_system(crs), WGS84, always_xy=True)
         lon, lat = change.transform(xy[:, 0], xy[:, 1])
     except (CRSError, ProjError):
-        raise ReadError("crs", "it is no coordinate reference system that is known", "give EPSG:… or WKT") from None
+        raise _unknown_system() from None
     lonlat = np.column_stack([lon, lat])
-    if not (np.isfinite(lonlat).all() and (np.abs(lonlat) <= (180.0, 90.0)).all()):
+    if not (np.isfinite(lonlat).all() and _are_degrees(lonlat)):
         raise ReadError(
             "crs", "positions lie nowhere on earth in that coordinate reference system", "give the one they are in"
         )
     return lonlat
 
 
+def _system(crs: str) -> pyproj.CRS:
+    try:
+        return pyproj.CRS.from_user_input(crs)
+    except CRSError:
+        raise _unknown_system() from None
+
+
+def _unknown_system() -> ReadError:
+    return ReadError("crs", "it is no coordinate reference system that is known", "give EPSG:… or WKT")
+
+
 def _simplified(kind: str, name: str, places: FloatArray) -> FloatArray:
-    if len(places) <= MOST_CORNERS:
+    # The outline of an area ends where it began, which is one more.
+    most = MOST_CORNERS - (kind == "area")
+    if len(places) <= most:
         return places
     fewer = shapely.get_coordinates(shapely.simplify(shapely.LineString(places), DETAIL_DEG))
-    if len(fewer) > MOST_CORNERS:
-        raise ReadError("file", f"one {kind} has {len(fewer)} positions", f"simplify it to {MOST_CORNERS}")
+    if len(fewer) > most:
+        raise ReadError("file", f"one {kind} has {len(fewer)} positions", f"simplify it to {most}")
     return fewer
 
 

@@ -37,8 +37,13 @@ def read_table(content: bytes) -> tuple[NamedLines, bool]:
         When it is no such table.
     """
     text = decoded(content)
-    rows = [row for row in csv.reader(text.splitlines(), delimiter=_delimiter(text), skipinitialspace=True) if row]
-    rows = [row for row in rows if any(cell.strip() for cell in row) and not row[0].startswith("#")]
+    try:
+        rows = [
+            _filled(row) for row in csv.reader(text.splitlines(), delimiter=_delimiter(text), skipinitialspace=True)
+        ]
+    except csv.Error as error:
+        raise ReadError("file", f"it is no table: {error}", "give rows of a name and a position") from None
+    rows = [row for row in rows if row and not row[0].startswith("#")]
     if not rows or len(rows) > MAX_ROWS:
         raise ReadError("file", f"it has {len(rows) or 'no'} rows", f"give at least one and at most {MAX_ROWS}")
     header = [cell.strip().lower() for cell in rows[0]]
@@ -101,6 +106,12 @@ def read_lnw(content: bytes) -> NamedLines:
                 found.append((name, places))
             places, name = [], ""
     return [*found, (name, places)] if places else found
+
+
+def _filled(row: list[str]) -> list[str]:
+    """Return a row without the empty cells at its end, which blanks and spreadsheets leave there."""
+    count = max((k for k, cell in enumerate(row, 1) if cell.strip()), default=0)
+    return row[:count]
 
 
 def _delimiter(text: str) -> str:

@@ -21,6 +21,9 @@ GAP_S = 5.0
 SAME_S = 1e-3
 """Positions no farther apart in time than this are one: they tell no speed."""
 
+STEADY_S = 0.5
+"""Beyond the last position a vehicle goes on as it went for so long: one jump would be carried far."""
+
 KEPT_S = 10.0
 """Positions are kept that are no farther in time from those asked for last than this and twice the latency."""
 
@@ -115,13 +118,17 @@ class StatedTrack:
             return en_m
         own = _row_at(known_s, time_s)
         first, last = _runs(known_s)
+        later_s, latest = time_s + latency_s, np.maximum(last[own] - 1, first[own])
         # The piece of the track that the later time lies in, or the nearest one of the same run.
-        begin = np.clip(_row_at(known_s, time_s + latency_s), first[own], np.maximum(last[own] - 1, first[own]))
+        begin = np.clip(_row_at(known_s, later_s), first[own], latest)
         end = np.minimum(begin + 1, last[own])
+        onwards = later_s > known_s[last[own]]
+        steady = np.searchsorted(known_s, known_s[last[own]] - STEADY_S, side="left")
+        begin = np.where(onwards, np.clip(steady, first[own], latest), begin)
         alone = begin == end
         span_s = np.where(alone, 1.0, known_s[end] - known_s[begin])
         speed_mps = (known_m[end] - known_m[begin]) / span_s[:, None]
-        there = known_m[begin] + speed_mps * (time_s + latency_s - known_s[begin])[:, None]
+        there = known_m[end] + speed_mps * (later_s - known_s[end])[:, None]
         return np.where(alone[:, None], en_m, there)
 
 

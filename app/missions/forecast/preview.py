@@ -100,7 +100,7 @@ class PlanPreviews:
         InvalidRequestError
             When there can be no plan: no vehicle, no such planner, a search.
         """
-        check_spec(spec, self._hub.kinds)
+        await asyncio.to_thread(check_spec, spec, self._hub.kinds)
         if spec.kind is MissionKind.SEARCH:
             raise InvalidRequestError("kind", NO_PLAN, "plan missions of kind survey")
         frame = spec.frame()
@@ -122,7 +122,7 @@ class PlanPreviews:
                 found, where = await asyncio.get_running_loop().run_in_executor(self._executor, work)
         finally:
             gone.set()
-        return _view(spec, found, where, guessed=floor_depth_m is None)
+        return await asyncio.to_thread(_view, spec, found, where, guessed=floor_depth_m is None)
 
 
 def any_set(*events: threading.Event) -> bool:

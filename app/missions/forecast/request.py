@@ -111,7 +111,7 @@ class Forecaster:
 
     async def of_description(self, spec: MissionSpec, floor_depth_m: float | None = None) -> ForecastView:
         """Return what is to be expected of a mission as it is described. Raises InvalidRequestError."""
-        check_spec(spec, self._hub.kinds)
+        await asyncio.to_thread(check_spec, spec, self._hub.kinds)
         if spec.kind is MissionKind.SEARCH:
             raise InvalidRequestError("kind", NO_FORECAST, "forecast missions of kind survey")
         return await self.make(spec, floor_depth_m=floor_depth_m)

@@ -49,8 +49,9 @@ async def test_a_mission_begins_with_a_chart_s_depths(
     assert again.status_code == 200
 
 
-async def test_a_chart_that_nobody_waits_for_any_more_is_not_read_on(
-    client: httpx.AsyncClient, cell: bytes, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("path", "params"), [("/chart-zones", ENDS), ("/drawings", {"filename": "plan.kml"})])
+async def test_a_file_that_nobody_waits_for_any_more_is_not_read_on(
+    client: httpx.AsyncClient, cell: bytes, monkeypatch: pytest.MonkeyPatch, path: str, params: dict[str, Any]
 ) -> None:
     begun, ended = asyncio.Event(), asyncio.Event()
 
@@ -63,7 +64,7 @@ async def test_a_chart_that_nobody_waits_for_any_more_is_not_read_on(
 
     with monkeypatch.context() as patch:
         patch.setattr(reader_process, "_run", for_ever)
-        asking = asyncio.create_task(client.post("/chart-zones", content=cell, params=ENDS))
+        asking = asyncio.create_task(client.post(path, content=cell, params=params))
         await until(begun.is_set, "it is being read")
         asking.cancel()
         await until(ended.is_set, "nobody reads it any more")

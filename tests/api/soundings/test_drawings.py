@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.spec.survey_lines import MOST_LINES
 from tests.support.api.rest import mission_spec
 from tests.support.mapping import line_files
 from tests.support.mapping.line_files import UTM
@@ -87,6 +88,14 @@ async def test_the_area_around_the_lines_has_few_corners_and_room_beyond_all_of_
     assert (await read(client, line_files.kml(far), "a.kml")).json()["around"] is None
     only_area = await read(client, line_files.kml({}, {"Basin": RING}), "a.kml")
     assert only_area.json()["around"] is None
+
+
+@pytest.mark.slow
+async def test_as_many_lines_as_a_mission_takes_may_have_names_in_any_script(client: httpx.AsyncClient) -> None:
+    lines = {f"測線 {k} " + 40 * "海": [(-8.705, 41.185), (-8.704, 41.185)] for k in range(MOST_LINES)}
+    answer = await read(client, line_files.geojson(lines), "plan.geojson")
+    assert answer.status_code == 200, answer.text
+    assert [one["name"] for one in answer.json()["lines"]] == list(lines)
 
 
 @pytest.mark.slow

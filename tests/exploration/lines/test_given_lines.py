@@ -273,6 +273,16 @@ def test_a_line_is_left_out_by_an_order_with_all_its_bends() -> None:
     assert not planner.skip_line("a", np.array([10.0, 100.0]), np.array([10.0, 100.0]))
 
 
+def test_of_two_lines_that_lie_on_each_other_each_is_flown_and_left_out_by_itself() -> None:
+    lines = [line("slow", (50.0, 20.0), (50.0, 280.0)), line("fast", (50.0, 20.0), (50.0, 280.0))]
+    plan = LinePlan([*lines, line("next", (80.0, 20.0), (80.0, 280.0))])
+    way = np.array([[50.0, 20.0], [50.0, 280.0], [50.0, 20.0], [80.0, 20.0], [80.0, 280.0]])
+    assert plan.metres_on([way]) == pytest.approx({"slow": 260.0, "fast": 260.0, "next": 260.0})
+    rest = plan.after_line(way[0], np.array([50.0, 100.0]), way[1:])
+    assert rest is not None
+    np.testing.assert_array_equal(rest, way[2:])
+
+
 def test_a_newcomer_takes_half_of_what_is_left() -> None:
     planner = planner_of(numbered(8))
     rng = np.random.default_rng(0)

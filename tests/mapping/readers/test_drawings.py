@@ -7,11 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyogrio
+import pyogrio.raw
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.mapping.readers.drawings import MAX_UNPACKED_BYTES, Drawing, read_drawings
+from app.mapping.readers.drawings import MAX_LAYERS, MAX_UNPACKED_BYTES, MOST_CORNERS, Drawing, read_drawings
 from app.mapping.readers.file_extensions import DRAWINGS, drawing_ending
 from app.mapping.readers.types import MAX_DRAWINGS, ReadError
 from tests.support.mapping import line_files
@@ -188,3 +191,85 @@ def test_endings_are_told_by_name() -> None:
     assert drawing_ending("Plan.LNW") == ".lnw"
     with pytest.raises(ReadError, match="no ending that is read"):
         drawing_ending("plan.dwg")
+
+
+def test_what_macos_packs_beside_a_shapefile_is_passed_over(tmp_path: Path) -> None:
+    with zipfile.ZipFile(io.BytesIO(line_files.shapefile(PLAN, tmp_path))) as packed:
+        files = {name: packed.read(name) for name in packed.namelist()}
+    beside = {f"__MACOSX/._{name}": b"\0\5\x16\7" + bytes(60) for name in files}
+    same_plan(read_drawings(zipped(beside | files), ".zip", None)[0])
+
+
+def test_a_file_of_more_folders_than_are_read_is_refused_rather_than_cut() -> None:
+    lines = "".join(
+        f"<Folder><name>f{k}</name><Placemark><LineString><coordinates>1,2 1.1,2</coordinates></LineString></Placemark>"
+        "</Folder>"
+        for k in range(MAX_LAYERS + 1)
+    )
+    with pytest.raises(ReadError, match=f"{MAX_LAYERS + 1} layers or folders"):
+        read_drawings(f"<kml><Document>{lines}</Document></kml>".encode(), ".kml", None)
+
+
+def test_what_is_left_out_of_many_shapefiles_is_said_once(tmp_path: Path) -> None:
+    files: dict[str, bytes] = {}
+    for k in range(15):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        with zipfile.ZipFile(io.BytesIO(line_files.shapefile({f"{k}": PLAN["101"]}, folder))) as packed:
+            files |= {f"{k}_{name}": packed.read(name) for name in packed.namelist()}
+        pyogrio_points(folder / "points.shp")
+        files |= {f"p{k}{one.suffix}": one.read_bytes() for one in folder.glob("points.*")}
+    found, notes = read_drawings(zipped(files), ".zip", None)
+    assert len(found) == 15
+    assert notes == ["15 points are left out"]
+
+
+def pyogrio_points(path: Path) -> None:
+    points = shapely.to_wkb(np.array([shapely.Point(-8.7, 41.2)]))
+    pyogrio.raw.write(path, points, [], [], geometry_type="Point", crs="EPSG:4326", driver="ESRI Shapefile")
+
+
+def test_metres_in_geojson_that_says_nothing_are_in_the_system_that_is_given() -> None:
+    places = [line_files.in_utm(line) for line in PLAN.values()]
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": name},
+            "geometry": {"type": "LineString", "coordinates": [list(place) for place in line]},
+        }
+        for name, line in zip(PLAN, places, strict=True)
+    ]
+    content = json.dumps({"type": "FeatureCollection", "features": features}).encode()
+    with pytest.raises(ReadError, match="nowhere on earth"):
+        read_drawings(content, ".geojson", None)
+    found, notes = read_drawings(content, ".geojson", UTM)
+    same_plan(found)
+    assert notes == []
+
+
+@pytest.mark.parametrize("text", ["1 -8.7 41.1 \n1 -8.7 41.2 \n", "1,-8.7,41.1,,\n1,-8.7,41.2,,\n"])
+def test_nothing_at_the_ends_of_rows_is_no_column(text: str) -> None:
+    [one], _ = read_drawings(text.encode(), ".csv", "EPSG:4326")
+    assert one.places == pytest.approx(np.array([(-8.7, 41.1), (-8.7, 41.2)]))
+
+
+def test_a_table_with_a_cell_beyond_all_measure_is_refused() -> None:
+    with pytest.raises(ReadError, match="no table"):
+        read_drawings(b"name,lon,lat\n" + 200_000 * b"a" + b",1,2\n", ".csv", None)
+
+
+def test_degrees_are_not_taken_for_metres() -> None:
+    with pytest.raises(ReadError, match="degrees") as refused:
+        read_drawings(line_files.table(PLAN), ".csv", UTM)
+    assert refused.value.field == "crs"
+    found, _ = read_drawings(line_files.table(PLAN), ".csv", "EPSG:4258")
+    same_plan(found)
+
+
+def test_an_outline_has_as_many_corners_as_an_area_takes() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, MOST_CORNERS + 1)
+    away = np.where(np.arange(MOST_CORNERS) % 2, 0.1, 0.101)
+    ring = [(1.0 + r * np.cos(a), 2.0 + r * np.sin(a)) for a, r in zip(turn[:-1], away, strict=True)]
+    content = json.dumps({"type": "LineString", "coordinates": [*ring, ring[0]]}).encode()
+    with pytest.raises(ReadError, match="one area has"):
+        read_drawings(content, ".json", None)

@@ -161,6 +161,14 @@ def test_a_latency_is_not_read_across_gaps_of_the_track() -> None:
     assert other[0] - one[-1] > GAP_S
 
 
+def test_a_jump_of_the_last_position_is_not_carried_far() -> None:
+    time_s = np.arange(0.0, 4.01, 0.05)
+    at = np.column_stack([1.5 * time_s, np.where(time_s > 3.99, 2.0, 0.0)])
+    found = StatedTrack().later(time_s, at, 0.5)
+    assert abs(found[-1, 1] - 2.0) <= 2.1, "as it went for half a second, not as it jumped in a twentieth"
+    np.testing.assert_allclose(found[:, 0], 1.5 * (time_s + 0.5), atol=1e-9)
+
+
 def test_a_position_alone_stays_and_two_of_one_time_tell_no_speed() -> None:
     at = np.array([[3.0, 4.0]])
     np.testing.assert_array_equal(StatedTrack().later(np.array([7.0]), at, 0.5), at)

@@ -121,6 +121,15 @@ async def test_parts_that_are_not_flown_are_told_in_the_plan_and_in_the_log(serv
     assert told[1:-1] in " ".join(event.message for event in await events_after(live))
 
 
+async def test_the_log_says_it_of_lines_that_are_described_anew(service: MissionService) -> None:
+    live = await service.get((await service.create(MissionSpec.model_validate(described(LINES)))).id)
+    lines = [*LINES, line("beyond", (90.0, 50.0), (150.0, 50.0))]
+    await service.describe_anew(live, MissionSpec.model_validate(described(lines)))
+    live = await service.get(live.id)
+    told = [event.message for event in await events_after(live) if "not flown" in event.message]
+    assert told == ["parts of 1 line lie outside the area or in keep-out zones and are not flown: beyond (50 m)"]
+
+
 async def test_the_plan_is_drawn_over_the_lines_with_what_all_of_them_take(service: MissionService) -> None:
     view = await service.previews.of(MissionSpec.model_validate(described(LINES)))
     assert view.whole_survey is not None

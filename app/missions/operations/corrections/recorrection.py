@@ -288,7 +288,8 @@ async def recorrect(
             await session.flush()
             await stored_maps.forget(session, live.id)
             counted = await sounding_queries.counts(session, live.id)
-        # Committed: from here on nothing waits until all of it holds.
+        # Committed: from here on nothing waits until all of it holds. Who joined meanwhile has sounded nothing yet.
+        corrections = Corrections.of(spec, live.frame, table, adjustment, live.stated_mountings)
         counts = live.journal.counts.of_soundings(counted.get("accepted", 0), counted.get("rejected", 0))
         live.recorrect(spec, corrections, counts)
     live.changed.set()

@@ -47,7 +47,8 @@ READING_TIMEOUT_S = 180.0
 WAITING_TIMEOUT_S = 60.0
 AT_ONCE = 1
 """Each takes a core and memory, which vehicles' decisions need."""
-MAX_ANSWER_BYTES = 1 << 18
+MAX_ANSWER_BYTES = 1 << 21
+"""Names of as many lines as are read, each of their characters escaped, take so much."""
 FEWEST_CORNERS = 3
 FEWEST_ON_LINE = 2
 

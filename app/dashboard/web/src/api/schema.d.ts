@@ -1081,7 +1081,7 @@ export interface paths {
          * @description Return lines for a mission's `survey_lines` and polygons for its `area` and `keep_out`, as a file has them.
          *
          *     Line plans and areas from GIS, survey programs and drawings: GeoJSON, KML, GPX, DXF, shapefiles, tables, Hypack.
-         *     Nothing is stored and no mission changes.
+         *     Nothing is stored and no mission changes. Reading ends with the connection.
          */
         post: operations["readDrawing"];
         delete?: never;

@@ -78,6 +78,10 @@ export const shownOptions = (draft: Draft, planners: readonly PlannerView[]): st
       : linesOf(draft).length === 0 || !LINES_LIE.includes(name),
   );
 
+/** Those of them that do not stand beside the choice of the planner, or the lines of a plan. */
+export const expertOptions = (draft: Draft, planners: readonly PlannerView[]): string[] =>
+  shownOptions(draft, planners).filter((name) => name !== LINE_HEADING && name !== KEEP_ORDER);
+
 /** Another planner, with the settings that it reads, too: others it would refuse. */
 export function withPlanner(
   planner: string,

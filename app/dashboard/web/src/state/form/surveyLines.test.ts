@@ -1,10 +1,10 @@
 import { describe, expect, it } from "vitest";
 import SPEC from "../../api/mission.json";
-import type { LngLat, SurveyLine } from "../../api/types";
+import type { LngLat, PlannerView, SurveyLine } from "../../api/types";
 import { flownBlocks, toMissions, withAreas } from "./blocks";
 import { copyOf, type Draft, emptyDraft, faultsOf, lengthChoiceOf, toMission, withLength } from "./draft";
 import { draftIn, missionFile, withTemplate } from "./missionFile";
-import { endsWithLines, fliesCrosslines, linesOf } from "./plannerOptions";
+import { endsWithLines, expertOptions, fliesCrosslines, linesOf, shownOptions } from "./plannerOptions";
 import { lengthOf, liesElsewhere, linesIn, wayForPlan, withLines, withoutLines } from "./surveyLines";
 
 const WEST = -8.705;
@@ -63,6 +63,14 @@ describe("lines of a plan", () => {
     const mission = toMission({ ...draft, options });
     expect(mission.planner?.options).toEqual({ keep_line_order: true });
     expect(mission.coverage?.crosslines_pct).toBe(0);
+  });
+
+  it("have their settings beside them, and not once more among the planner's own", () => {
+    const properties = { keep_line_order: {}, line_heading_deg: {}, line_spacing_m: {}, turn_radius_m: {} };
+    const planners = [{ name: "lawnmower", options: { properties } }] as unknown as PlannerView[];
+    expect(shownOptions(planned(), planners)).toContain("keep_line_order");
+    expect(expertOptions(planned(), planners)).not.toContain("keep_line_order");
+    expect(expertOptions(surveyed({ planner: "lawnmower" }), planners)).toContain("line_spacing_m");
   });
 
   it("are of no concern to other planners, and to searches", () => {

@@ -1,4 +1,4 @@
-import { LINE_HEADING, shownOptions, withPlanner } from "../../state/form/plannerOptions";
+import { expertOptions, withPlanner } from "../../state/form/plannerOptions";
 import { say } from "../../words/say";
 import { Choice, same } from "../parts/Controls";
 import { Part, useForm } from "./Fields";
@@ -54,7 +54,7 @@ function Algorithm({ fault }: { fault: string }) {
           {say("expert.ofCannotBeUsed", { p: p.name, package: p.package, problem: p.problem })}
         </small>
       ))}
-      <PlannerOptionFields names={shownOptions(draft, planners).filter((name) => name !== LINE_HEADING)} />
+      <PlannerOptionFields names={expertOptions(draft, planners)} />
       {fault ? <span class="fault">▲ {fault}</span> : null}
     </>
   );
