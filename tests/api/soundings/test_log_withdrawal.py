@@ -212,6 +212,7 @@ async def test_a_log_that_waits_or_is_read_is_stopped(
     assert await count(client, path) == log["result"]["soundings"]
 
 
+@pytest.mark.slow
 async def test_what_is_no_log_of_the_mission_cannot_be_taken_back(client: httpx.AsyncClient, path: str) -> None:
     assert (await client.delete(f"{path}/logs/nothing")).status_code == 404
     log = await ended(client, path, await send(client, path, b"no log", filename="Data.lsf"))

@@ -236,6 +236,7 @@ async def test_pings_would_be_corrected_twice_in_a_mission_with_a_sound_speed(
     assert (await client.get(f"{path}/logs/nothing")).status_code == 404
 
 
+@pytest.mark.slow
 async def test_a_running_mission_and_one_that_ended_take_what_was_recorded_on_board(
     client: httpx.AsyncClient, path: str, content: bytes, tmp_path: Path
 ) -> None:
@@ -314,6 +315,7 @@ async def test_what_a_log_gave_before_its_reading_broke_off_is_on_the_map_of_a_m
     await mapped(client, path, stored)
 
 
+@pytest.mark.slow
 async def test_a_log_is_not_taken_as_two_vehicles(client: httpx.AsyncClient, path: str, content: bytes) -> None:
     log = await ended(client, path, await send(client, path, content, vehicle="wrong"))
     assert (log["vehicle"], log["result"]["soundings"]) == ("wrong", PINGS)
@@ -330,6 +332,7 @@ async def test_a_log_is_not_taken_as_two_vehicles(client: httpx.AsyncClient, pat
     assert same["result"]["known"]
 
 
+@pytest.mark.slow
 async def test_a_vehicle_may_be_called_as_the_keys_of_pings_are(
     client: httpx.AsyncClient, path: str, content: bytes
 ) -> None:

@@ -61,6 +61,7 @@ def flyable_m(lines: list[GivenLine], zones: tuple[FloatArray, ...] = ()) -> dic
 places = st.tuples(st.floats(-40.0, 160.0), st.floats(-40.0, 340.0))
 
 
+@pytest.mark.slow
 @given(
     corners=st.lists(st.lists(places, min_size=2, max_size=5), min_size=1, max_size=14),
     count=st.integers(1, 3),

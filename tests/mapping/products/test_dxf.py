@@ -41,6 +41,7 @@ def groups_of(content: bytes) -> list[tuple[int, str]]:
     return [(int(code), value) for code, value in zip(lines[::2], lines[1::2], strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", [FRAME, UTM], ids=["own", "utm"])
 def test_gdal_reads_lines_at_their_elevation(bathymetry: BathymetricMap, frame: Frame, tmp_path: Path) -> None:
     (path := tmp_path / "contours.dxf").write_bytes(made(bathymetry, frame))
