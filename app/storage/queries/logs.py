@@ -72,6 +72,25 @@ async def take_back(session: AsyncSession, row: LogRow, at: datetime, actor: str
     return Brought(soundings, pings)
 
 
+async def with_doubles(session: AsyncSession, row: LogRow) -> list[str]:
+    """Return the names of the vehicle's other logs of which some was known already, and not stored, as in ``row``."""
+    others = select(LogRow).where(
+        LogRow.mission_id == row.mission_id,
+        LogRow.vehicle == row.vehicle,
+        LogRow.id != row.id,
+        LogRow.taken_back_at.is_(None),
+    )
+    found = []
+    for other in (await session.scalars(others.order_by(LogRow.id))).all():
+        answers = select(BatchRow.answer).where(
+            BatchRow.mission_id == row.mission_id, BatchRow.key.like(f"{number_key(other.id)}%")
+        )
+        counted = [answer.get("verdicts", answer.get("pings", {})) for answer in await session.scalars(answers)]
+        if any(verdicts.get("duplicate") for verdicts in counted):
+            found.append(other.file)
+    return found
+
+
 async def bring_back_rulings(session: AsyncSession, row: LogRow) -> None:
     """Let the soundings that operators had decided about count as decided, when their log was sent again.
 

@@ -96,8 +96,11 @@ async def test_a_log_that_was_taken_back_counts_again_when_it_is_sent_again(
     assert (await client.post(f"{path}/soundings/reject", json={"ids": rows[:3]})).status_code == 200
     before = stored(database_url, "vehicle, time_s, depth_m, verdict, reason, ruling")
     track = query(database_url, "select vehicle, time_s from positions order by id")
+    await mapped(client, path, PINGS - 3)
+    assert (await client.get(f"{path}/map/tiles")).status_code == 200
     await take_back(client, path, first)
     assert await count(client, path) == 0
+    assert (await client.get(f"{path}/map/tiles")).status_code == 404, "not the old map while the new one is made"
     # Corrected meanwhile as all others are.
     assert (await client.put(f"{path}/tide", json={"level_m": 1.0})).status_code == 200
     again = await ended(client, path, await send(client, path, gzip.decompress(content), filename="Data.lsf"))
@@ -135,6 +138,24 @@ async def test_what_comes_from_elsewhere_counts_where_a_log_was_taken_back(
     await mapped(client, path, PINGS)
     await take_back(client, path, other)
     assert await count(client, path) == 0
+
+
+@pytest.mark.slow
+async def test_which_logs_lost_records_with_one_that_is_taken_back_is_said(
+    client: httpx.AsyncClient, path: str, content: bytes
+) -> None:
+    first = await ended(client, path, await send(client, path, content))
+    longer = gzip.decompress(content) + writer.announce(1.0)
+    other = await ended(client, path, await send(client, path, longer, filename="longer.lsf"))
+    assert other["result"]["duplicate"] == PINGS
+    await take_back(client, path, first)
+    assert "What longer.lsf had of them, too, is gone with them" in (await lines(client, path))[-1]["message"]
+    # As the line says: the other one brings them when it is sent once more.
+    await take_back(client, path, other)
+    assert "gone with them" not in (await lines(client, path))[-1]["message"]
+    again = await ended(client, path, await send(client, path, longer, filename="longer.lsf"))
+    assert (again["result"]["soundings"], again["result"]["duplicate"]) == (PINGS, 0)
+    assert await count(client, path) == PINGS
 
 
 @pytest.mark.slow

@@ -110,6 +110,24 @@ def test_a_log_is_taken_back_after_a_question_and_counts_again_when_it_is_sent_a
     assert watched.complaints == []
 
 
+def test_the_map_is_gone_with_the_last_sounding_that_is_taken_back(
+    watched: Watched, service: Service, tmp_path: Path
+) -> None:
+    page = watched.page
+    mission = mission_over(service, rectangle(-25, 0, 35, 60))
+    show(page, mission)
+    by_id(page, "toggle-imports").click()
+    content = writer.write(tmp_path / "Data.lsf.gz", writer.survey(PINGS)).read_bytes()
+    by_id(page, "log-file").set_input_files(files=[file("Data.lsf.gz", content)])
+    nothing = page.get_by_text("The sea floor appears with the first soundings")
+    expect(by_id(page, "soundings")).to_have_text(str(PINGS))
+    expect(nothing).to_have_count(0)
+    by_id(page, "log-delete").click()
+    by_id(page, "log-delete-really").click()
+    expect(by_id(page, "soundings")).to_have_text("0")
+    expect(nothing).to_be_visible()
+
+
 def test_whose_a_multibeams_file_is_has_to_be_said_and_what_is_refused_is_told(
     watched: Watched, mission: str, tmp_path: Path
 ) -> None:

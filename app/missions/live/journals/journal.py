@@ -71,6 +71,11 @@ class Counts:
     beams: int = 0
     rejected_pings: int = 0
 
+    @property
+    def any_accepted(self) -> bool:
+        """Whether any sounding or ping counts."""
+        return self.accepted + self.pings > 0
+
     def of_soundings(self, accepted: int, rejected: int) -> "Counts":
         """Return the same with other numbers of soundings."""
         return replace(self, accepted=accepted, rejected=rejected)

@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -248,9 +248,19 @@ class LogImport:
                 for digest in sorted({head.digest, head.content})
                 for batch in await log_queries.earlier_batches(session, self._live.id, digest)
             ]
+        self.number = self._standing(rows, {_vehicle_of(batch) for _, batch in earlier})
+        for digest, batch in earlier:
+            begin = f"{LOG_KEY}-{digest[:32]}-{self._altimeter}-{head.vehicle}"
+            if self.number is None and batch.key in (f"{begin}-0", f"{begin}-pings-0"):
+                self._earlier_key = begin
+
+    def _standing(self, rows: Sequence[LogRow], named: Iterable[str] = ()) -> int | None:
+        """Return the number under which the content is there, if it is; ``named``: whose it is by other means.
+
+        Raises ConflictError where it is there as another vehicle's.
+        """
         standing = [row for row in rows if row.taken_back_at is None]
-        others = {row.vehicle for row in standing} | {_vehicle_of(batch) for _, batch in earlier}
-        others -= {head.vehicle}
+        others = {row.vehicle for row in standing}.union(named) - {self._head.vehicle}
         if others:
             names = ", ".join(sorted(others))
             raise ConflictError(
@@ -258,11 +268,7 @@ class LogImport:
                 f"leave it at that, give the name that it has there: --vehicle {names}, by REST vehicle={names}, "
                 f"or take it back: DELETE /api/v1/missions/{self._live.id}/logs/{{import_id}}",
             )
-        self.number = next((row.id for row in standing if row.altimeter == self._altimeter), None)
-        for digest, batch in earlier:
-            begin = f"{LOG_KEY}-{digest[:32]}-{self._altimeter}-{head.vehicle}"
-            if self.number is None and batch.key in (f"{begin}-0", f"{begin}-pings-0"):
-                self._earlier_key = begin
+        return next((row.id for row in standing if row.altimeter == self._altimeter), None)
 
     async def _number(self, session: AsyncSession) -> int | None:
         """Return the log's number, which it gets with the first that is stored of it. Raises ConflictError."""
@@ -276,6 +282,10 @@ class LogImport:
             if known is None or known.taken_back_at is not None:
                 raise ConflictError("the log was taken back while it was read", "send it again to have it after all")
             return self.number
+        # Another process may have begun with the same log since this one looked.
+        begun = self._standing(await log_queries.of_content(session, live.id, head.content))
+        if begun is not None:
+            return begun
         row = LogRow(
             mission_id=live.id,
             vehicle=head.vehicle,

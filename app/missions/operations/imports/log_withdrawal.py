@@ -41,6 +41,8 @@ async def _store(live: LiveMission, number: int, actor: str) -> EventRow | None:
         found = await log_queries.take_back(session, row, now(), actor)
         also = f" and {found.pings} pings" if found.pings else ""
         words = f"{found.soundings} soundings{also} from {row.file}, the log of {row.vehicle}, taken back by {actor}"
+        if doubles := await log_queries.with_doubles(session, row):
+            words += f". What {', '.join(doubles)} had of them, too, is gone with them: take back and send again"
         if live.gate.corrections.adjustment is not None:
             words += ". Tracks stay adjusted as they were with them: adjust them again"
         data = {

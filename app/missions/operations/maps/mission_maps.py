@@ -50,15 +50,16 @@ from app.storage.queries import soundings as sounding_queries
 async def newest_map(live: LiveMission, maps: FinalMaps, *, patient: bool = True) -> MapSnapshot:
     """Return the newest map. Raises MapNotReadyError when there is no sounding yet.
 
-    Without being ``patient``: an older one, if there is one, while a newer one is being made.
+    Without being ``patient``: an older one, if there is one, while a newer one is being made; not where all that it
+    was made of was taken back.
     """
     built = live.builder.newest
-    if not patient and built is not None and maps.busy(live.id):
+    if not patient and built is not None and maps.busy(live.id) and live.journal.counts.any_accepted:
         return live.snapshot(built)
     await maps.last(live.id)
     await live.notice_imports()
     built = live.builder.newest
-    if built is None or (live.map_is_missing and not live.running):
+    if built is None or (live.map_is_missing and not (live.running and live.journal.counts.any_accepted)):
         built = await live.build_map()
     if built is None:
         raise MapNotReadyError(
@@ -109,7 +110,7 @@ async def map_tiles(
     snapshot = None
     if step is not None:
         snapshot = await map_at_step(live, step)
-    elif live.running:
+    elif live.running and live.journal.counts.any_accepted:
         # Not with the planning threads, which a decision may keep for seconds.
         snapshot = await asyncio.to_thread(live.live_snapshot)
     if snapshot is None:

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from app.missions.errors import InvalidRequestError
+from app.missions.errors import ConflictError, InvalidRequestError
 from app.missions.operations.history import events_after
 from app.missions.operations.imports import log_batches
-from app.missions.operations.imports.log_import import import_log
+from app.missions.operations.imports.log_import import LogImport, import_log
 from app.missions.operations.maps.mission_maps import newest_map
 from app.missions.service import MissionService
 from app.missions.settings import ServiceSettings
@@ -105,6 +105,25 @@ async def test_a_log_imported_again_changes_nothing(
     assert (await take(service, mission.id, longer)).duplicate == PINGS
     assert stored(database_url, "*") == before[0]
     assert (await view_of(service, mission.id)).progress.soundings == first.soundings
+
+
+async def test_a_log_that_another_process_begins_with_meanwhile_has_one_number(
+    service: MissionService, log: Path, database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mission = await service.create(make_spec())
+    first = await take(service, mission.id, log)
+    track = points(database_url)
+
+    async def nothing_there_yet(_: LogImport) -> None:
+        pass
+
+    monkeypatch.setattr(LogImport, "_look", nothing_there_yet)
+    assert await take(service, mission.id, log) == first.model_copy(update={"known": True})
+    assert points(database_url) == track
+    assert len(query(database_url, "select id from logs")) == 1
+    with pytest.raises(ConflictError, match=f"as the log of {writer.NAME}"):
+        await take(service, mission.id, log, vehicle="other")
+    assert points(database_url) == track
 
 
 async def test_pings_of_a_log_count_once_and_are_on_the_map(

@@ -185,7 +185,10 @@ function followMap(id: string, connections: () => number): () => void {
     const further = furtherLayers.value;
     const { mapVersion, liveVersion } = view.value;
     const has = step !== null || mapVersion > 0 || liveVersion > 0;
-    const version = step === null ? `${connections()}.${mapVersion}.${liveVersion}` : `@${step}`;
+    // When the last that counted was taken back there is no other map, and no other version of it.
+    const { soundings = 0, pings = 0 } = view.value.mission?.progress ?? {};
+    const counts = soundings + pings > 0 ? "" : "-";
+    const version = step === null ? `${connections()}.${mapVersion}.${liveVersion}${counts}` : `@${step}`;
     return has ? `${version} ${further.join()}` : "";
   };
   const stop = effect(() => {
@@ -200,8 +203,8 @@ function followMap(id: string, connections: () => number): () => void {
         await fetchMap(step);
         shown = want;
       } catch (error) {
-        // Nothing was sounded until that step; or the service is gone, which the live socket tells of.
-        if (step !== null && error instanceof ServiceError && error.status === 404) {
+        // Nothing was sounded until that step, or nothing counts any more; that the service is gone the socket tells.
+        if (error instanceof ServiceError && error.status === 404) {
           seaFloor.value = null;
           shown = want;
         }
