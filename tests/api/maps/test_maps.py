@@ -184,6 +184,7 @@ async def test_the_list_of_files_is_complete_and_every_path_answers(client: http
         assert answer.status_code == refused.get(entry["name"], 200)
 
 
+@pytest.mark.slow
 async def test_files_come_in_another_projected_system(client: httpx.AsyncClient, measured: str, tmp_path: Path) -> None:
     zone, utm = {"crs": "EPSG:32629"}, {"crs": "utm"}
     for name in ("map.tif", "map.bag"):

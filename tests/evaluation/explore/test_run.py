@@ -49,7 +49,7 @@ def test_remaining_landmarks_only_ever_decrease(smooth: Terrain) -> None:
         ("cao", 0),
         ("lawnmower", 0),
         ("random", 0),
-        ("rollout", 0),
+        pytest.param("rollout", 0, marks=pytest.mark.slow),
         ("spsa", 0),
         ("osarses", 2),
         ("spsa-tried", 2),

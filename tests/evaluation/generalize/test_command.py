@@ -50,6 +50,7 @@ def test_a_floor_that_one_vehicle_covers_alone_is_told() -> None:
     assert [] in flown.tracks
 
 
+@pytest.mark.slow
 def test_an_interrupted_evaluation_goes_on(tmp_path: Path) -> None:
     arguments = ("--quick", "--tasks", "pcao", "--seeds", "1", "--json", "--out", str(tmp_path))
     first = json.loads(call(*arguments, "--floors", "1").stdout)

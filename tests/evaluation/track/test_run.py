@@ -36,7 +36,7 @@ def figures(run: Any) -> Any:
     return {k: v for k, v in asdict(run).items() if k not in ("wall_s", "plan_ms_median", "plan_ms_p99")}
 
 
-@pytest.mark.parametrize("planner", ["rollout", "cao", "lawnmower", "random"])
+@pytest.mark.parametrize("planner", [pytest.param("rollout", marks=pytest.mark.slow), "cao", "lawnmower", "random"])
 def test_the_same_seed_gives_the_same_run(planner: Any) -> None:
     first, second = (run_track(SMALL, planner, OPTIONS) for _ in range(2))
     assert figures(first) == figures(second)

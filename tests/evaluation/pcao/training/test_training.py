@@ -58,6 +58,7 @@ def test_the_kernels_floor_is_the_terrains(floor: SeaFloor) -> None:
     np.testing.assert_allclose(got, expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_flight_never_loses_what_it_knows_and_repeats_itself(floor: SeaFloor, task: TrainingTask) -> None:
     parameters = default_model().parameters
     remaining, error = task.run(floor, 5, parameters)
@@ -98,6 +99,7 @@ def test_real_tries_cost_what_the_paper_says() -> None:
     assert steps * (1 + tries_per_step(FDSA, 0, 3)) == 9500
 
 
+@pytest.mark.slow
 def test_more_tries_and_the_trained_controller_do_better(floor: SeaFloor) -> None:
     landmarks, start, headings = floor.draw(0, 3, 200)
     left = [
