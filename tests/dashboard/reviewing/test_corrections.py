@@ -43,6 +43,7 @@ def test_a_mounting_is_corrected_after_the_patch_test_and_taken_back(
     by_id(page, "mounting-roll_deg").fill("-1,5")
     by_id(page, "mounting-down").fill("0.25")
     by_id(page, "mounting-source").fill("patch test")
+    picture(page, "mounting")
     by_id(page, "mounting-set").click()
     expect(one).to_contain_text("roll -1.5°, 0 m forward, 0 m to starboard, 0.25 m down (patch test)")
     (told,) = service.get(corrections)["mountings"]
