@@ -193,11 +193,11 @@ def test_endings_are_told_by_name() -> None:
         drawing_ending("plan.dwg")
 
 
-def test_what_macos_packs_beside_a_shapefile_is_passed_over(tmp_path: Path) -> None:
-    with zipfile.ZipFile(io.BytesIO(line_files.shapefile(PLAN, tmp_path))) as packed:
-        files = {name: packed.read(name) for name in packed.namelist()}
-    beside = {f"__MACOSX/._{name}": b"\0\5\x16\7" + bytes(60) for name in files}
-    same_plan(read_drawings(zipped(beside | files), ".zip", None)[0])
+def test_what_macos_packs_beside_a_document_is_passed_over() -> None:
+    beside = {"__MACOSX/._doc.kml": b"\0\5\x16\7" + bytes(60)}
+    found, notes = read_drawings(zipped(beside | {"doc.kml": line_files.kml(PLAN)}), ".kmz", None)
+    assert notes == []
+    same_plan(found)
 
 
 def test_a_file_of_more_folders_than_are_read_is_refused_rather_than_cut() -> None:

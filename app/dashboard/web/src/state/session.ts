@@ -121,6 +121,12 @@ export function said(error: unknown): string {
   return [error.message, error.remedy].filter(Boolean).join(". ");
 }
 
+/** What the service says is wrong with single fields, or with all. */
+export function reasonOf(error: unknown): string {
+  const faults = error instanceof ServiceError ? error.faults : [];
+  return faults.length > 0 ? faults.map(({ message }) => message).join("; ") : said(error);
+}
+
 function clear(): void {
   view.value = EMPTY_VIEW;
   seaFloor.value = null;

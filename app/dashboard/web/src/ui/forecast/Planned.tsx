@@ -1,6 +1,6 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { api, type Described, ServiceError } from "../../api/client";
+import { api, type Described } from "../../api/client";
 import type { PlanView } from "../../api/types";
 import { vehicleColour } from "../../map/picture/palette";
 import { comingFrom, inAll, inSequence, type PlannedVehicle, total } from "../../state/form/blocks";
@@ -8,7 +8,7 @@ import type { Estimate, Share } from "../../state/form/draft";
 import { type NamedPlan, planFileName, planGeoJson, planGpx } from "../../state/form/planFile";
 import { LatestAsker, plansOf } from "../../state/form/planning";
 import { distance, duration, durations, percent } from "../../state/format";
-import { said } from "../../state/session";
+import { reasonOf } from "../../state/session";
 import { fleet, planned } from "../../state/store";
 import { say } from "../../words/say";
 import { Button } from "../parts/Controls";
@@ -62,12 +62,6 @@ const followingIn = (before: PlanView | undefined, one: Described): Described =>
 });
 
 const countOf = (described: string): number => (JSON.parse(described) as unknown[]).length;
-
-/** What the service says is wrong with single fields, or with all. */
-function reasonOf(error: unknown): string {
-  const faults = error instanceof ServiceError ? error.faults : [];
-  return faults.length > 0 ? faults.map(({ message }) => message).join("; ") : said(error);
-}
 
 interface PlannedProps {
   of: Estimate;

@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { api, ServiceError } from "../../api/client";
 import type { DrawingView } from "../../api/types";
-import { said } from "../../state/session";
+import { reasonOf } from "../../state/session";
 
 /** A file of lines and areas that the service reads, and what it asks of it. */
 export interface DrawingFile {
@@ -45,7 +45,7 @@ export function useDrawingFile(onDrawing: OnDrawing): DrawingFile {
       if (going.signal.aborted) return;
       const faults = error instanceof ServiceError ? error.faults : [];
       asksCrs.value = faults.some(({ field }) => field.endsWith("crs"));
-      fault.value = faults.length > 0 ? faults.map(({ message }) => message).join("; ") : said(error);
+      fault.value = reasonOf(error);
     } finally {
       if (gone.current === going) busy.value = false;
     }
