@@ -61,6 +61,7 @@ async def test_a_log_under_the_wrong_name_is_taken_back_and_counts_under_the_rig
     assert "wrong" in tracked
 
     gone = await take_back(client, path, wrong)
+    assert (wrong["can_be_taken_back"], gone["can_be_taken_back"]) == (True, False)
     assert (gone["state"], gone["taken_back_by"], gone["result"]) == ("taken-back", "local operator", wrong["result"])
     assert gone["taken_back_at"]
     assert await count(client, path) == 5
@@ -216,6 +217,7 @@ async def test_a_log_that_waits_or_is_read_is_stopped(
         waiting = (await send(client, path, content + b"1", filename="more.lsf")).json()
         assert waiting["state"] == "waiting"
         gone = await take_back(client, path, waiting)
+        assert (waiting["can_be_taken_back"], gone["can_be_taken_back"]) == (True, False)
         assert (gone["state"], gone["taken_back_by"], gone["result"]) == ("taken-back", "local operator", None)
         assert (await client.get(f"{path}/logs/{reading['id']}")).json()["state"] == "reading"
         gone = await take_back(client, path, reading)
@@ -237,6 +239,7 @@ async def test_a_log_that_waits_or_is_read_is_stopped(
 async def test_what_is_no_log_of_the_mission_cannot_be_taken_back(client: httpx.AsyncClient, path: str) -> None:
     assert (await client.delete(f"{path}/logs/nothing")).status_code == 404
     log = await ended(client, path, await send(client, path, b"no log", filename="Data.lsf"))
+    assert not log["can_be_taken_back"]
     refused = await client.delete(f"{path}/logs/{log['id']}")
     assert (refused.status_code, refused.json()["detail"]) == (409, "nothing is stored of this log")
 

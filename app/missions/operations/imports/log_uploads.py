@@ -94,6 +94,7 @@ class _Job:
             remedy=self.remedy,
             taken_back_at=self.taken_back_at,
             taken_back_by=self.stopped_by,
+            can_be_taken_back=_can_be_taken_back(self.state, self.number),
         )
 
     def fail(self, problem: str, remedy: str) -> None:
@@ -239,9 +240,10 @@ class LogUploads:
         if number is None:
             if view.state is LogState.TAKEN_BACK:
                 return view
+            brought = view.result is not None and (view.result.soundings or view.result.positions or view.result.pings)
             raise ConflictError(
                 "nothing is stored of this log"
-                if view.state is LogState.FAILED
+                if not brought
                 else "this log was imported by an earlier version, which did not note what it brought",
                 f"reject soundings one by one or many at once: POST /api/v1/missions/{live.id}/soundings/reject",
             )
@@ -383,6 +385,7 @@ def _stored_view(row: EventRow) -> LogView | None:
     """Return what a line of the mission's log tells of a log; None where it is about something else."""
     data: dict[str, Any] = row.data
     failed, stopped = "problem" in data, "stopped_by" in data
+    state = LogState.FAILED if failed else LogState.TAKEN_BACK if stopped else LogState.DONE
     if "sha256" not in data or not (failed or stopped or "packets" in data):
         return None
     told = {name: data[name] for name in LogImportView.model_fields if name in data}
@@ -392,7 +395,7 @@ def _stored_view(row: EventRow) -> LogView | None:
         file=data["file"],
         vehicle=data["vehicle"],
         sha256=data["sha256"],
-        state=LogState.FAILED if failed else LogState.TAKEN_BACK if stopped else LogState.DONE,
+        state=state,
         created_at=row.time,
         actor=data.get("actor", ""),
         result=result,
@@ -400,7 +403,13 @@ def _stored_view(row: EventRow) -> LogView | None:
         remedy=data.get("remedy", ""),
         taken_back_at=row.time if stopped else None,
         taken_back_by=data.get("stopped_by", ""),
+        can_be_taken_back=_can_be_taken_back(state, data.get("log")),
     )
+
+
+def _can_be_taken_back(state: LogState, number: int | None) -> bool:
+    """Tell whether a log can be stopped or taken back; ``number``: under which what it brought is stored, if it is."""
+    return state in (LogState.WAITING, LogState.READING) or (state is not LogState.TAKEN_BACK and number is not None)
 
 
 def _as_taken_back(view: LogView, row: EventRow | None) -> LogView:
@@ -408,4 +417,4 @@ def _as_taken_back(view: LogView, row: EventRow | None) -> LogView:
     if row is None:
         return view
     over = {"state": LogState.TAKEN_BACK, "taken_back_at": row.time, "taken_back_by": row.data.get("actor", "")}
-    return view.model_copy(update=over)
+    return view.model_copy(update={**over, "can_be_taken_back": False})

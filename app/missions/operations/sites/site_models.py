@@ -146,9 +146,9 @@ class SiteModels:
                 raise InvalidRequestError(field, f"{mission!r} is no mission of the site", "see the site's surveys")
         first, second = _comparable(rows, earlier, later)
         pair = (_surveyed(first), _surveyed(second))
-        # Two that were asked for leave nothing out.
-        passed = rows if earlier is None or later is None else []
-        notes = [_left_out(row) for row in passed[rows.index(first) :] if not _same_datum(row, first)]
+        # Two that were asked for leave nothing out, nor does what came after the one that was.
+        passed = [] if earlier and later else rows[rows.index(first) : rows.index(second) if later else None]
+        notes = [_left_out(row) for row in passed if not _same_datum(row, first)]
         async with self._database.reading() as session:
             spec = SiteSpec.model_validate((await stored_site(session, site_id)).spec)
             contents = await site_queries.contents(session, [one.mission_id for one in pair])

@@ -210,3 +210,7 @@ class LogView(View):
     remedy: str = Field(default="", description="What to do about it")
     taken_back_at: datetime | None = Field(default=None, description="When it was; null: it counts, or never did")
     taken_back_by: str = Field(default="", description="Who took it back")
+    can_be_taken_back: bool = Field(
+        description="Whether DELETE stops its reading or takes it back; false: it is taken back, nothing is stored of "
+        "it, or an earlier version did not note what it brought"
+    )

@@ -1115,6 +1115,10 @@ class LogView(Model):
     """When it was; null: it counts, or never did"""
     taken_back_by: str
     """Who took it back"""
+    can_be_taken_back: bool
+    """Whether DELETE stops its reading or takes it back; false: it is taken back, nothing is stored of it, or an
+    earlier version did not note what it brought
+    """
 
 
 class MapMessage(Model):

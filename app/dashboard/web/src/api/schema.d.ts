@@ -4352,6 +4352,11 @@ export interface components {
              * @default
              */
             taken_back_by: string;
+            /**
+             * Can Be Taken Back
+             * @description Whether DELETE stops its reading or takes it back; false: it is taken back, nothing is stored of it, or an earlier version did not note what it brought
+             */
+            can_be_taken_back: boolean;
         };
         /**
          * MapMessage

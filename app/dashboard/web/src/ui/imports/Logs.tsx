@@ -130,7 +130,7 @@ function Log({ log, onTakeBack }: { log: LogView; onTakeBack: () => void }) {
         </p>
       ) : null}
       {result && state !== "taken-back" ? <Result result={result} /> : null}
-      {whyNotCommand.value || state === "taken-back" || (state === "failed" && !vehicle) ? null : (
+      {whyNotCommand.value || !log.can_be_taken_back ? null : (
         <p class="row">
           <AskedTwice
             asked={asked}
