@@ -5,22 +5,29 @@ Real missions of simulated vehicles over generated sea floors, in Chromium witho
 """
 
 import argparse
+import gzip
 import io
 import json
+import math
 import socket
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, FilePayload, Page, sync_playwright
 
 from tests.dashboard.conftest import CHROMIUM, FLAGS
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, click_round, show
+from tests.support.imc import log_writer
+from tests.support.mapping import line_files
+from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.ais import named, nmea, position
 from tests.support.missions.specs import lon_lat, rectangle
 from tests.support.paths import PROJECT
@@ -50,6 +57,8 @@ BLOCKS = (
     [(900, 260), (1040, 250), (1060, 640), (920, 660)],
 )
 LOOK_S = 0.3
+BATCH = 500
+"""Soundings that are posted at once."""
 TIME_SCALE = "6"
 """Faster, a busy machine's vehicles circle while they wait for decisions."""
 
@@ -154,6 +163,28 @@ class Guide:
         mission = self.survey(0.0)
         self.wait(mission, lambda one: one["state"] == "finished")
         return mission
+
+    def multibeams(self) -> str:
+        """Full coverage by two vehicles, once most of it is done."""
+        if "multibeams" not in self.missions:
+            made = self.service.create(
+                name="Full coverage",
+                area=rectangle(0, 0, 240, 160),
+                vehicles=[{"name": f"wide-{n}", "kind": "sim", "sensor": "multibeam"} for n in (1, 2)],
+                planner={"name": "swath"},
+                budget={"minutes": 60},
+                steps=None,
+                limits={"max_depth_m": 20},
+            )
+            self.missions["multibeams"] = made
+            self.service.act(made, "start")
+        mission = self.missions["multibeams"]
+        self.wait(mission, lambda one: one["state"] != "running" or (one["progress"]["ensonified_pct"] or 0) > 60)
+        return mission
+
+
+def payload(name: str, content: bytes) -> FilePayload:
+    return FilePayload(name=name, mimeType="application/octet-stream", buffer=content)
 
 
 def dashboard(guide: Guide, page: Page) -> None:
@@ -313,27 +344,97 @@ def dashboard_replay(guide: Guide, page: Page) -> None:
 
 def swath(guide: Guide, page: Page) -> None:
     """Full coverage with multibeams: density and holidays."""
-    service = guide.service
-    vehicles = [{"name": f"wide-{n}", "kind": "sim", "sensor": "multibeam"} for n in (1, 2)]
-    mission = service.create(
-        name="Full coverage",
-        area=rectangle(0, 0, 240, 160),
-        vehicles=vehicles,
-        planner={"name": "swath"},
-        budget={"minutes": 60},
-        steps=None,
-        limits={"max_depth_m": 20},
-    )
-    service.act(mission, "start")
-    guide.wait(mission, lambda one: one["state"] != "running" or (one["progress"]["ensonified_pct"] or 0) > 60)
-    show(page, mission)
+    show(page, guide.multibeams())
     by_id(page, "layer").select_option(label="Density")
+
+
+def lines(_guide: Guide, page: Page) -> None:
+    """A client's line plan, read from its file."""
+    plan = {f"L{100 + k}": [lon_lat(30.0 * k, 0.0), lon_lat(30.0 * k + 40.0, HEIGHT_M)] for k in range(13)}
+    plan |= {f"X{k + 1}": [lon_lat(-10.0, north_m), lon_lat(430.0, north_m)] for k, north_m in enumerate((80.0, 220.0))}
+    page.goto("/")
+    by_id(page, "new-mission").click()
+    by_id(page, "field-name").fill("Fairway, line plan 7")
+    by_id(page, "planner-lawnmower").click()
+    by_id(page, "lines-file").set_input_files(payload("plan-7.geojson", line_files.geojson(plan)))
+    by_id(page, "lines-given").wait_for()
+    page.wait_for_selector('[data-testid="planned"][data-plan="new"]')
+    by_id(page, "lines-given").scroll_into_view_if_needed()
+
+
+def corrections(guide: Guide, page: Page) -> None:
+    """Casts of a day, and how a sonar is mounted."""
+    service = guide.service
+    mission = guide.multibeams()
+    started_s = datetime.fromisoformat(service.get(f"/missions/{mission}")["started_at"]).timestamp()
+    casts = []
+    for cast, before_h, speeds_mps in (("morning", 5.0, (1512.0, 1506.0)), ("noon", 0.5, (1511.0, 1507.0))):
+        profile = [[0.0, speeds_mps[0]], [30.0, speeds_mps[1]]]
+        time = datetime.fromtimestamp(started_s - 3600.0 * before_h, UTC).isoformat()
+        casts.append({"name": cast, "time": time, "position": HOME, "profile": profile, "source": f"{cast}.asvp"})
+    service.post(f"/missions/{mission}/sound-speed/casts", {"assumed_mps": 1500.0, "casts": casts})
+    show(page, mission)
+    by_id(page, "toggle-corrections").click()
+    mounting = by_id(page, "mounting-wide-1")
+    mounting.locator("summary").click()
+    for name, value in (("roll_deg", "-0.8"), ("pitch_deg", "1.2"), ("down", "0.25"), ("source", "patch test")):
+        by_id(page, f"mounting-{name}").fill(value)
+    by_id(page, "corrections-sound-speed").scroll_into_view_if_needed()
+
+
+def imports(guide: Guide, page: Page) -> None:
+    """A vehicle's own log after the dive, and depths that a mission began with."""
+    east_m, north_m = -200.0, -20.0
+    mission = guide.service.create(
+        name="After the dive",
+        area=rectangle(east_m, north_m, 60, 180),
+        cell_m=2,
+        vehicles=[{"name": "rover", "kind": "rest"}],
+    )
+    rng = np.random.default_rng(0)
+    rows = ["lon,lat,depth"]
+    for east, north in rng.uniform((east_m, north_m), (60, 180), (900, 2)).tolist():
+        lon, lat = lon_lat(east, north)
+        rows.append(f"{lon:.7f},{lat:.7f},{12.0 + 2.0 * math.sin(north / 20.0) + 0.01 * east:.2f}")
+    log = gzip.compress(b"".join(log_writer.survey(2000)))
+    show(page, mission)
+    by_id(page, "toggle-imports").click()
+    by_id(page, "prior-file").set_input_files(payload("chart-1998.csv", "\n".join(rows).encode()))
+    by_id(page, "prior-send").click()
+    by_id(page, "log-file").set_input_files(payload("Data.lsf.gz", log))
+    page.wait_for_selector('[data-testid="logs"] > [data-state="done"]')
+
+
+def sites(guide: Guide, page: Page) -> None:
+    """What changed at a place between two surveys."""
+    service = guide.service
+    area = rectangle(0, 0, 160, 100)
+    site = service.post("/sites", {"name": "Dredged berth", "area": area, "cell_m": 2.0})["id"]
+    for number, (name, dredged_m) in enumerate((("Before dredging", 0.0), ("After dredging", 1.8))):
+        mission = service.create(
+            name=name, area=area, cell_m=2.0, site=site, vehicles=[{"name": "boat", "kind": "rest"}]
+        )
+        way = flown(lawnmower(156, 96, 4.0), spacing_m=2.0, start_s=1_790_000_000.0 + 2_600_000.0 * number)
+        items = measured("boat", way + np.array([0.0, 2.0, 2.0, 0.0, 0.0]))
+        for item, (_, east, north, *_) in zip(items, way.tolist(), strict=True):
+            inside = 1.0 / (1.0 + math.exp((math.hypot((east - 95.0) / 1.6, north - 50.0) - 26.0) / 2.0))
+            item["range_m"] += 0.02 * east + math.sin(north / 14.0) + dredged_m * inside
+        for first in range(0, len(items), BATCH):
+            service.post(f"/missions/{mission}/measurements", {"items": items[first : first + BATCH]})
+        service.act(mission, "abort")
+        while not service.get(f"/sites/{site}/surveys")[number]["surveyed"]:
+            time.sleep(LOOK_S)
+    page.goto("/")
+    by_id(page, "open-sites").click()
+    by_id(page, "shown-site").select_option("Dredged berth")
+    by_id(page, "changes-picture").wait_for()
 
 
 SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = {
     # Before there is any mission.
     "planning": (planning, WIDE, "light"),
     "blocks": (blocks, WIDE, "light"),
+    "lines": (lines, WIDE, "light"),
     "checklist": (checklist, WIDE, "dark"),
     "dashboard": (dashboard, WIDE, "light"),
     "phone": (phone, PHONE, "night"),
@@ -341,6 +442,9 @@ SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = 
     "ships": (ships, WIDE, "light"),
     "harbour": (harbour, PHONE, "light"),
     "swath": (swath, WIDE, "light"),
+    "corrections": (corrections, WIDE, "light"),
+    "imports": (imports, WIDE, "light"),
+    "sites": (sites, WIDE, "light"),
     "space": (space, WIDE, "dark"),
     "profile": (profile, WIDE, "light"),
     "alarms": (alarms, WIDE, "light"),

@@ -93,7 +93,10 @@ def test_a_target_is_found_from_nothing() -> None:
     assert right >= 38
 
 
-@pytest.mark.parametrize(("noise", "vehicles"), [(0.01, 1), (0.02, 1), (0.01, 2), (0.1, 1)])
+@pytest.mark.parametrize(
+    ("noise", "vehicles"),
+    [(0.01, 1), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.02, 1), (0.01, 2), (0.1, 1)))],
+)
 def test_fine_ranges_do_not_make_a_filter_sure_of_a_wrong_place(noise: float, vehicles: int) -> None:
     """From nothing, also by ranges of one vehicle: a filter takes the bend of their spheres for nothing else."""
     nees = []

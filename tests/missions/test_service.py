@@ -748,7 +748,9 @@ async def test_a_paused_mission_is_paused_after_a_restart_and_keeps_its_vehicles
     await until_state(service, mission_id, S.FINISHED)
 
 
-@pytest.mark.parametrize("moment", range(2, 40, 5))
+@pytest.mark.parametrize(
+    "moment", [pytest.param(moment, marks=[pytest.mark.slow] if moment % 2 else []) for moment in range(2, 40, 5)]
+)
 async def test_a_loop_cancelled_at_any_write_goes_on_without_repeating_a_step(
     moment: int, harbour: Harbour, database: Database
 ) -> None:

@@ -14,7 +14,7 @@ from fastapi.routing import APIRoute
 from app.api.accounts.roles import Role
 from app.api.accounts.tokens import TokenStore
 from app.api.bodies import admission as bodies
-from app.api.bodies import json_route
+from app.api.bodies import json_route, unread
 from app.api.bodies.intake import BodyKind, Intakes
 from app.api.bodies.json_route import JsonRoute
 from app.api.http import field_problems, json_text
@@ -53,6 +53,12 @@ async def service(make_settings: Callable[..., Settings]) -> AsyncIterator[Token
 
 
 @pytest.fixture
+def hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For clients that do not send on what is not wanted: the service need not wait for it."""
+    monkeypatch.setattr(unread, "DRAIN_S", 0.1)
+
+
+@pytest.fixture
 async def mission_id(service: Tokens) -> str:
     async with make_client(service.server) as client:
         answer = await client.post("/missions", json=mission_spec(), headers=service.header(Role.OPERATOR))
@@ -80,6 +86,7 @@ LONG = [
 JSON = {"Content-Type": "application/json"}
 
 
+@pytest.mark.usefixtures("hung_up_on")
 @pytest.mark.parametrize("length", LONG, ids=["declared", "chunked", "asks first"])
 @pytest.mark.parametrize(
     ("role", "method", "path", "status"),
@@ -145,11 +152,13 @@ def test_every_route_that_may_change_something_says_who_may_and_what_it_takes() 
     assert files == {"importLog", "importSoundings", "proposeZones", "readDrawing", "setReference"}
 
 
+@pytest.mark.usefixtures("hung_up_on")
 async def test_packed_json_is_not_unpacked(service: Tokens) -> None:
     headers = JSON | {"Content-Encoding": "gzip", "Content-Length": "100"} | service.header(Role.OPERATOR)
     assert (await ask(service.port, "POST", "/missions", headers))[0] == 415
 
 
+@pytest.mark.usefixtures("hung_up_on")
 async def test_a_route_that_takes_no_body_reads_little(service: Tokens, mission_id: str) -> None:
     headers = service.header(Role.OPERATOR)
     path = f"/missions/{mission_id}/forecast"

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.settings import Settings
-from tests.support.api.rest import make_client, mission_spec, running, soundings
+from tests.support.api.rest import make_client, mission_spec, running
 
 QUESTIONS = ("Hatches closed", "Recovery boat ready")
 
@@ -21,10 +21,9 @@ async def asking(make_settings: Callable[..., Settings]) -> AsyncIterator[httpx.
 
 
 async def ready(client: httpx.AsyncClient) -> str:
-    """A mission whose vehicle was heard."""
-    mission = str((await client.post("/missions", json=mission_spec())).json()["id"])
-    await client.post(f"/missions/{mission}/measurements", json={"items": soundings(1)})
-    return mission
+    """A mission whose vehicle is there."""
+    vehicles = [{"name": "rover", "kind": "sim"}]
+    return str((await client.post("/missions", json=mission_spec(vehicles=vehicles))).json()["id"])
 
 
 async def said(client: httpx.AsyncClient, mission: str) -> list[tuple[str, str]]:

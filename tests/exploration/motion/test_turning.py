@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -30,6 +31,7 @@ def flown(heading_rad: float, target: np.ndarray, most_s: float = 300.0) -> np.n
 
 @settings(deadline=None, max_examples=60)
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi, math.pi), st.floats(3.0, 40.0))
+@pytest.mark.slow
 def test_a_vehicle_flies_over_its_leg_and_what_it_is_said_to_turn_over(
     heading_rad: float, bearing_rad: float, away_m: float
 ) -> None:

@@ -11,7 +11,7 @@ from app.exploration.planners import create_planner
 
 
 @pytest.mark.parametrize("name", ["lawnmower", "cao"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_vehicle_that_climbs_over_ground_does_not_turn_back_to_corners_that_it_cut(name: str, seed: int) -> None:
     """Climbing makes legs shorter than planned: what they passed is behind all the same."""
     side_m, team = 120.0, ("a", "b")

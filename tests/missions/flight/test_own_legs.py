@@ -393,6 +393,7 @@ def test_a_vehicle_in_the_middle_of_its_line_is_on_it_and_not_on_the_one_beside_
     assert nearest_leg(begin + part * (ends[0] - begin) + 1.0, ends, begin) == 0
 
 
+@pytest.mark.slow
 async def test_after_a_restart_the_rest_of_a_line_is_flown(harbour_closed: Harbour) -> None:
     service = await harbour_closed.open(time_scale=10.0)
     spec = sim_spec(

@@ -83,6 +83,7 @@ async def test_what_there_is_no_room_for_is_counted(harbour: Harbour, live: Live
     assert "400 more are in holidays.geojson." in printed.replace("\r\n", " ")
 
 
+@pytest.mark.slow
 async def test_the_sonar_of_a_vehicle_that_joined_later_is_not_said_to_be_the_usual_one(
     harbour: Harbour, live: LiveMission
 ) -> None:

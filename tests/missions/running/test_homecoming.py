@@ -452,7 +452,7 @@ async def test_a_mission_that_waits_for_batteries_can_be_finished(service: Missi
 
 
 @pytest.mark.parametrize("limits", [{}, {"max_step_m": 8.0, "com_range_m": 500.0}], ids=["apart", "one team"])
-@pytest.mark.parametrize("action", [Action.FINISH, Action.ABORT])
+@pytest.mark.parametrize("action", [Action.FINISH, pytest.param(Action.ABORT, marks=pytest.mark.slow)])
 async def test_a_mission_that_is_ended_while_somebody_surveys_waits_for_no_batteries(
     service: MissionService, limits: dict[str, Any], action: Action
 ) -> None:

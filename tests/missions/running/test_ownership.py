@@ -361,7 +361,10 @@ async def test_a_mission_that_cannot_be_read_for_a_while_does_not_hold_up_who_ta
                 assert (await service.ready())[1]["watch"] == "ok"
 
 
-@pytest.mark.parametrize("trouble", [asyncio.CancelledError, OSError, ValueError])
+@pytest.mark.parametrize(
+    "trouble",
+    [asyncio.CancelledError, *(pytest.param(error, marks=pytest.mark.slow) for error in (OSError, ValueError))],
+)
 async def test_a_mission_that_could_not_be_loaded_is_taken_up_when_the_watch_looks_again(
     two: tuple[Harbour, Harbour], monkeypatch: pytest.MonkeyPatch, trouble: type[BaseException]
 ) -> None:
@@ -385,6 +388,7 @@ async def test_a_mission_that_could_not_be_loaded_is_taken_up_when_the_watch_loo
     assert times == 2
 
 
+@pytest.mark.slow
 async def test_a_process_whose_first_missions_are_cancelled_takes_them_up_later(
     open_service: Callable[[], Harbour], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -91,6 +91,7 @@ async def test_a_boat_goes_round_what_nobody_knew_of_sees_the_goal_and_is_back_i
     assert search_grid(await service.get(mission.id), after=before.version) is None
 
 
+@pytest.mark.slow
 async def test_a_killed_search_goes_on_and_its_time_has_not_stood_still(
     harbour: Harbour, service: MissionService
 ) -> None:

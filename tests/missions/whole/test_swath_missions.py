@@ -92,6 +92,7 @@ async def test_a_mission_sees_all_of_its_area_and_ends_by_itself(harbour: Harbou
 
 
 @pytest.mark.usefixtures("simulated_time")
+@pytest.mark.slow
 async def test_a_vehicle_that_was_sent_elsewhere_leaves_nothing_out(harbour: Harbour) -> None:
     live = await started(harbour)
     await ensonified(live, 15.0)

@@ -22,6 +22,8 @@ from tests.support.storage.rows import one_of_each
 from tests.support.waiting import until
 
 EARLIER = sorted(path.name.partition("_")[0] for path in Path(migrate.MIGRATIONS, "versions").glob("0*.py"))[:-1]
+QUICK = (0, len(EARLIER) // 2, len(EARLIER) - 1)
+"""Those of the revisions that are tried in every run; the others are in the slow ones."""
 
 
 def _differences(connection: Connection) -> list[object]:
@@ -103,7 +105,13 @@ def _fill_as_it_is(connection: Connection) -> dict[str, list[str]]:
     return {table.name: [c.name for c in table.columns] for table in tables.sorted_tables if table.name in sample}
 
 
-@pytest.mark.parametrize("revision", EARLIER)
+@pytest.mark.parametrize(
+    "revision",
+    [
+        pytest.param(revision, marks=[] if place in QUICK else [pytest.mark.slow])
+        for place, revision in enumerate(EARLIER)
+    ],
+)
 async def test_database_of_every_earlier_revision_keeps_its_rows(empty_url: str, revision: str) -> None:
     """As the release of that time left it: up to this one, in use, and down again."""
     if empty_url.startswith("postgresql") and revision not in (EARLIER[0], EARLIER[-1]):
