@@ -366,20 +366,21 @@ def corrections(guide: Guide, page: Page) -> None:
     """Casts of a day, and how a sonar is mounted."""
     service = guide.service
     mission = guide.multibeams()
-    started_s = datetime.fromisoformat(service.get(f"/missions/{mission}")["started_at"]).timestamp()
+    service.act(mission, "pause")
+    now_s = time.time()
     casts = []
     for cast, before_h, speeds_mps in (("morning", 5.0, (1512.0, 1506.0)), ("noon", 0.5, (1511.0, 1507.0))):
         profile = [[0.0, speeds_mps[0]], [30.0, speeds_mps[1]]]
-        time = datetime.fromtimestamp(started_s - 3600.0 * before_h, UTC).isoformat()
-        casts.append({"name": cast, "time": time, "position": HOME, "profile": profile, "source": f"{cast}.asvp"})
+        taken = datetime.fromtimestamp(now_s - 3600.0 * before_h, UTC).isoformat()
+        casts.append({"name": cast, "time": taken, "position": HOME, "profile": profile, "source": f"{cast}.asvp"})
     service.post(f"/missions/{mission}/sound-speed/casts", {"assumed_mps": 1500.0, "casts": casts})
     show(page, mission)
     by_id(page, "toggle-corrections").click()
     mounting = by_id(page, "mounting-wide-1")
     mounting.locator("summary").click()
     for name, value in (("roll_deg", "-0.8"), ("pitch_deg", "1.2"), ("down", "0.25"), ("source", "patch test")):
-        by_id(page, f"mounting-{name}").fill(value)
-    by_id(page, "corrections-sound-speed").scroll_into_view_if_needed()
+        mounting.get_by_test_id(f"mounting-{name}").fill(value)
+    mounting.get_by_test_id("mounting-set").scroll_into_view_if_needed()
 
 
 def imports(guide: Guide, page: Page) -> None:
@@ -396,11 +397,15 @@ def imports(guide: Guide, page: Page) -> None:
     for east, north in rng.uniform((east_m, north_m), (60, 180), (900, 2)).tolist():
         lon, lat = lon_lat(east, north)
         rows.append(f"{lon:.7f},{lat:.7f},{12.0 + 2.0 * math.sin(north / 20.0) + 0.01 * east:.2f}")
-    log = gzip.compress(b"".join(log_writer.survey(2000)))
+    log = gzip.compress(b"".join(log_writer.survey(560)))
     show(page, mission)
     by_id(page, "toggle-imports").click()
+    by_id(page, "imports").locator("summary").first.click()
+    by_id(page, "prior-sd").fill("0.4")
+    by_id(page, "prior-source").fill("chart of 1998")
     by_id(page, "prior-file").set_input_files(payload("chart-1998.csv", "\n".join(rows).encode()))
-    by_id(page, "prior-send").click()
+    page.wait_for_selector('[data-testid="priors"] > li')
+    by_id(page, "imports").locator("summary").first.click()
     by_id(page, "log-file").set_input_files(payload("Data.lsf.gz", log))
     page.wait_for_selector('[data-testid="logs"] > [data-state="done"]')
 
@@ -426,8 +431,7 @@ def sites(guide: Guide, page: Page) -> None:
             time.sleep(LOOK_S)
     page.goto("/")
     by_id(page, "open-sites").click()
-    by_id(page, "shown-site").select_option("Dredged berth")
-    by_id(page, "changes-picture").wait_for()
+    by_id(page, "changes-picture").scroll_into_view_if_needed()
 
 
 SCENES: dict[str, tuple[Callable[[Guide, Page], None], tuple[int, int], str]] = {

@@ -40,9 +40,9 @@ class Change:
     significant
         Where that is more than chance makes of an unchanged floor in a share ``confidence`` of the cells.
     gained, lost
-        What came and what went in significant cells, both positive.
+        Volumes in significant cells that are shoaler and deeper now, both positive.
     net
-        What came less what went, over all cells that both surveys know.
+        Gained less lost, over all cells that both surveys know, significant or not.
     """
 
     grid: Grid

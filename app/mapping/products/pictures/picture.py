@@ -1,6 +1,7 @@
 """Map as a picture for reports."""
 
 import io
+import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DPI = 150
+LABEL_LETTERS = 45
+"""So many letters of the colour bar's label are in one line."""
 
 
 def picture_png(
@@ -76,7 +79,7 @@ def picture_png(
     north_arrow(axes)
     axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="east (m)", ylabel="north (m)", title=title)
     bar = figure.colorbar(image, ax=axes, extend="both", fraction=0.046, pad=0.03)
-    bar.set_label(f"depth (m below {vertical_datum})")
+    bar.set_label(textwrap.fill(f"depth (m below {vertical_datum})", LABEL_LETTERS))
     bar.ax.invert_yaxis()
     share = float(bathymetry.sounded[np.isfinite(bathymetry.depth_m)].mean()) if np.any(interpolated) else 1.0
     figure.text(0.01, 0.01, f"hatched: interpolated; sounded cells {share:.0%}; {bathymetry.model}", fontsize=6)

@@ -102,9 +102,9 @@ class ChangesView(View):
     expected_pct: float = Field(description="What chance makes of unchanged ground where deviations are right")
     deeper_pct: float = Field(description="Of the compared cells, those that are significantly deeper now")
     shoaler_pct: float
-    lost: VolumeView = Field(description="What went where it is significantly deeper")
-    gained: VolumeView = Field(description="What came where it is significantly shoaler")
-    net: VolumeView = Field(description="What came less what went, over all compared cells")
+    lost: VolumeView = Field(description="Volume that is gone where it is significantly deeper")
+    gained: VolumeView = Field(description="Volume that was added where it is significantly shoaler")
+    net: VolumeView = Field(description="Gained less lost, over all compared cells, significant or not")
     mean_m: float | None = Field(description="Later depth less earlier depth: positive where it is deeper now")
     rms_m: float | None
     median_sd_m: float | None = Field(description="Standard deviation of a difference")

@@ -468,11 +468,11 @@ class ChangesView(Model):
     """Of the compared cells, those that are significantly deeper now"""
     shoaler_pct: float
     lost: VolumeView
-    """What went where it is significantly deeper"""
+    """Volume that is gone where it is significantly deeper"""
     gained: VolumeView
-    """What came where it is significantly shoaler"""
+    """Volume that was added where it is significantly shoaler"""
     net: VolumeView
-    """What came less what went, over all compared cells"""
+    """Gained less lost, over all compared cells, significant or not"""
     mean_m: float | None
     """Later depth less earlier depth: positive where it is deeper now"""
     rms_m: float | None

@@ -2933,11 +2933,11 @@ export interface components {
             deeper_pct: number;
             /** Shoaler Pct */
             shoaler_pct: number;
-            /** @description What went where it is significantly deeper */
+            /** @description Volume that is gone where it is significantly deeper */
             lost: components["schemas"]["VolumeView"];
-            /** @description What came where it is significantly shoaler */
+            /** @description Volume that was added where it is significantly shoaler */
             gained: components["schemas"]["VolumeView"];
-            /** @description What came less what went, over all compared cells */
+            /** @description Gained less lost, over all compared cells, significant or not */
             net: components["schemas"]["VolumeView"];
             /**
              * Mean M

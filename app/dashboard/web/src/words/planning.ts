@@ -491,8 +491,8 @@ export const PLANNING = {
     pt: "Um local com missões ou levantamentos é guardado",
   },
   "site.fromToChangedIsChanceWent": {
-    en: "From {earlier} to {later}: {significantPct} % changed ({expectedPct} % is chance); {lost} went, {gained} came.",
-    pt: "De {earlier} a {later}: {significantPct} % mudou ({expectedPct} % é acaso); saíram {lost}, entraram {gained}.",
+    en: "From {earlier} to {later}: {significantPct} % changed ({expectedPct} % is chance); {lost} lost, {gained} gained.",
+    pt: "De {earlier} a {later}: {significantPct} % mudou ({expectedPct} % é acaso); {lost} perdidos, {gained} ganhos.",
   },
   "site.lookedAtFree": { en: "looked at, free", pt: "visto, livre" },
   "site.notLookedAt": { en: "not looked at", pt: "não visto" },

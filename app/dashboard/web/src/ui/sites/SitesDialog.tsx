@@ -50,6 +50,11 @@ export function SitesDialog() {
           />
         </label>
       ) : null}
+      {list.length === 1 && shown ? (
+        <p data-testid="only-site">
+          <b>{shown.name}</b>
+        </p>
+      ) : null}
       {open && shown ? <Site key={shown.id} site={shown} onChange={() => void ask()} /> : null}
     </Dialog>
   );
