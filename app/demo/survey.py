@@ -315,12 +315,12 @@ class _Demo:
                 seed=self._options.seed,
             )
         table = Table(title="Map against the true sea floor", title_justify="left")
-        for heading in ("survey", "map RMSE", "ratio", "soundings", "travelled"):
+        for heading in ("survey", "map RMSE", "ours / its", "soundings", "travelled"):
             table.add_column(heading, justify="left" if heading == "survey" else "right")
         table.add_row(
             f"bathyfleet, {self._options.vehicles} vehicles",
             f"{ours.rmse_m:.3f} m",
-            "1.00",
+            "",
             str(progress["soundings"]),
             f"{progress['distance_m']:.0f} m",
             style="bold",
