@@ -1,5 +1,6 @@
 """A patch test: how a vehicle's sonar is mounted, estimated from its lines that overlap."""
 
+import asyncio
 import math
 import threading
 from dataclasses import dataclass
@@ -68,8 +69,22 @@ async def estimate_mounting(live: LiveMission, vehicle: str, request: MountingEs
             f"beams from {', '.join(files)} are placed with the mounting that the multibeam was given",
             "evaluate the patch test in the multibeam's own processing",
         )
+    # Each holds hundreds of thousands of beams.
+    async with live.part(_Turn).taken:
+        return await _estimate(live, vehicle, LineErrors(request.position_sd_m, request.level_sd_m))
+
+
+class _Turn:
+    """One patch test of a mission is evaluated at a time."""
+
+    def __init__(self, _live: LiveMission) -> None:
+        self.taken = asyncio.Lock()
+
+
+async def _estimate(live: LiveMission, vehicle: str, errors: LineErrors) -> MountingEstimateView:
     await live.journal.flush()
     until, corrections = await live.pings.newest_block(), live.gate.corrections
+    applied = live.spec.mountings.get(vehicle) or live.stated_mountings.get(vehicle, MountingSpec())
     track = _Track(live)
     async for name, pings in live.pings.all_accepted(until):
         if name == vehicle:
@@ -82,7 +97,7 @@ async def estimate_mounting(live: LiveMission, vehicle: str, request: MountingEs
     async for name, pings in live.pings.all_accepted(until):
         if name == vehicle:
             await live.in_background(survey.take, pings, ground)
-    errors, left = LineErrors(request.position_sd_m, request.level_sd_m), threading.Event()
+    left = threading.Event()
     try:
         found = await live.in_background(survey.estimate, errors, left)
     except NoOverlapError as error:
@@ -90,7 +105,7 @@ async def estimate_mounting(live: LiveMission, vehicle: str, request: MountingEs
     finally:
         # Who asked may have left: a thread does not end by itself.
         left.set()
-    return _view(live, vehicle, survey.passes, found)
+    return _view(vehicle, applied, survey.passes, found)
 
 
 def _no_overlap(vehicle: str, why: str) -> ConflictError:
@@ -217,8 +232,7 @@ class _Survey:
         return _Met(np.column_stack([at.east_m, at.north_m])[good], line[at.ping][good], known)
 
 
-def _view(live: LiveMission, vehicle: str, passes: Passes, found: MountingEstimate) -> MountingEstimateView:
-    applied = live.spec.mountings.get(vehicle) or live.stated_mountings.get(vehicle, MountingSpec())
+def _view(vehicle: str, applied: MountingSpec, passes: Passes, found: MountingEstimate) -> MountingEstimateView:
     parameters = [_parameter(name, one, found) for name, one in zip(MountingParameter, found.parameters, strict=True)]
     changes = {one.name.value: one.value for one in parameters if one.proposed}
     proposal = None

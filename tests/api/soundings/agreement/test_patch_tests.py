@@ -1,10 +1,13 @@
 """A patch test over REST: what overlapping lines say of a mounting, which is taken over and makes them agree."""
 
+import asyncio
 from typing import Any
 
 import httpx
 import pytest
+from typer.testing import CliRunner
 
+from app.cli import app
 from app.settings import Settings
 from tests.support.api.rest import make_client, running
 from tests.support.api.surveys import START_S, new_mission, post
@@ -17,6 +20,13 @@ async def estimated(client: httpx.AsyncClient, path: str, **asked: float) -> dic
     assert answer.status_code == 200, answer.text
     found: dict[str, Any] = answer.json()
     return found
+
+
+def at_the_command_line(path: str, *options: str, pings_url: str = "") -> str:
+    words = ["patch-test", path.rpartition("/")[2], "rover", *options]
+    ended = CliRunner().invoke(app, words, env={"BATHYFLEET_PINGS_URL": pings_url})
+    assert ended.exit_code == 0, ended.output
+    return ended.output
 
 
 @pytest.mark.slow
@@ -41,10 +51,19 @@ async def test_overlapping_lines_tell_a_mounting_that_makes_them_agree(settings:
         assert {round(one["heading_deg"]) % 360 for one in found["lines"]} == {0, 180}
         assert found["after_m"] < 0.5 * found["before_m"]
         assert found["proposal"]["offset_m"] == REAL["offset_m"], "the lever arm stays"
-        assert (await client.put(f"{path}/mountings/rover", json=found["proposal"])).status_code == 200
+        told_there = await asyncio.to_thread(at_the_command_line, path, "--url", server.url, "--apply")
+        assert f"roll     {told['roll_deg']['value']:+.3f} ±" in told_there
+        assert "latency  undetermined: these lines do not tell it; it takes a line flown twice" in told_there
+        assert "the mounting of rover is corrected: roll +1.2" in told_there
+        (kept,) = (await client.get(f"{path}/corrections")).json()["mountings"]
+        assert kept["corrected"] == found["proposal"]
         again = await estimated(client, path)
         assert again["proposal"] is None, "lines agree already"
         assert again["before_m"] == pytest.approx(found["after_m"], rel=0.1)
+    told_here = await asyncio.to_thread(
+        at_the_command_line, path, "--database", settings.database_url, pings_url=settings.pings_url
+    )
+    assert "nothing is proposed" in told_here
 
 
 async def test_what_does_not_overlap_or_is_no_swath_is_refused_with_advice(client: httpx.AsyncClient) -> None:
