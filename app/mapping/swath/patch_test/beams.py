@@ -41,6 +41,11 @@ class PatchBeams:
     frame: LocalFrame
     casts: Casts | None = None
 
+    def bent(self, by: float) -> "PatchBeams":
+        """Return the same beams steered by a sonar at which sound is faster by a share."""
+        angle = np.arcsin(np.clip(np.sin(self.pings.angle_rad.astype(np.float64)) * (1.0 + by), -1.0, 1.0))
+        return replace(self, pings=replace(self.pings, angle_rad=angle.astype(np.float32)))
+
     def placed(self, mounting: Mounting) -> tuple[FloatArray, IntArray]:
         """Return where beams met the bottom, (n, 3) east, north and down, and the ping of each, (n,).
 

@@ -7,15 +7,18 @@ import numpy as np
 from app.arrays import BoolArray, FloatArray, IntArray
 from app.mapping.swath.patch_test.ground import block_of
 
+ROLL, PITCH, HEADING, LATENCY, BEND = range(5)
+"""What may be wrong, by its number."""
+
 LEAST_BEAMS = 4
 """A line with fewer beams in a cell tells nothing of it."""
 
 LEAST_EXTENT = 0.1
 """Beams of a cell spread at least so far as a share of its side in every direction: else they tell no slope."""
 
-SURE = 25.0
-"""A slope tells of what moves beams aside when its square is so many times its variance: noise of slopes, where there
-are none, would else be taken for knowledge."""
+SURE, SLOPE_SD = 25.0, 0.01
+"""A slope tells of what moves beams aside when its square is so many times its variance, to which swaths that are bent
+and tilted add: slopes that are not there would else be taken for knowledge."""
 
 LEVEL, BENT = 1e-6, 1e-3
 """What slopes and bends of cells with few beams are held level with, as a share of the beams."""
@@ -39,10 +42,13 @@ class SharedCells:
         Mean depth of the line's beams, carried to the middle of the cell's beams along its surface.
     sd_m : (g,)
         Of that, from how its beams scatter about that.
-    change : (g, 4)
-        By how much the depth changes with roll, pitch, heading (per radian) and latency (per second). Of the last
-        three only what they do along a slope: on even ground depths tell of a pitch by how it goes together with the
-        vehicle's motion alone, and so would errors of heave and attitude.
+    change : (g, 5)
+        By how much the depth changes with roll, pitch, heading (per radian), latency (per second) and the bend of the
+        swath (by a share of the sound speed at the sonar). Of pitch, heading and latency only what they do along a
+        slope: on even ground depths tell of a pitch by how it goes together with the vehicle's motion alone, and so
+        would errors of heave and attitude.
+    along : (g,)
+        How far along its line, -1 at the first of the line's rows to 1 at the last.
     slope : (g, 2)
         Of the cell to the east and to the north, as far as it is sure, else zero.
     """
@@ -53,6 +59,7 @@ class SharedCells:
     depth_m: FloatArray
     sd_m: FloatArray
     change: FloatArray
+    along: FloatArray
     slope: FloatArray
 
     def __len__(self) -> int:
@@ -81,14 +88,19 @@ class _Surface:
     @property
     def is_sure(self) -> BoolArray:
         with np.errstate(invalid="ignore", divide="ignore"):
-            a, b, d = self.covariance[:, 0, 0], self.covariance[:, 0, 1], self.covariance[:, 1, 1]
+            a, b, d = (self.covariance + SLOPE_SD**2 * np.eye(2)).reshape(-1, 4)[:, [0, 1, 3]].T
             x, y = self.slope.T
             squared = (d * x**2 - 2.0 * b * x * y + a * y**2) / (a * d - b**2)
             return np.asarray(squared >= SURE)
 
 
 def shared_cells(
-    where_m: FloatArray, change: FloatArray, line: IntArray, size_m: tuple[float, float], height_m: float
+    where_m: FloatArray,
+    change: FloatArray,
+    line: IntArray,
+    time_s: FloatArray,
+    size_m: tuple[float, float],
+    height_m: float,
 ) -> SharedCells:
     """Return the cells that beams of several lines met.
 
@@ -96,9 +108,9 @@ def shared_cells(
     ----------
     where_m : (n, 3)
         East, north and down.
-    change : (n, 4, 3)
-        Of these with each parameter.
-    line : (n,)
+    change : (n, 5, 3)
+        Of these with each of them.
+    line, time_s : (n,)
     size_m
         Sides of a cell, and of a block: a power of two times that.
     height_m
@@ -106,7 +118,7 @@ def shared_cells(
     """
     key = block_of(where_m[:, :2], size_m[0])
     rows = _seen_twice(key, line)
-    where_m, change, line, key = where_m[rows], change[rows], line[rows], key[rows]
+    where_m, change, line, time_s, key = where_m[rows], change[rows], line[rows], time_s[rows], key[rows]
     _, cell = np.unique(key, return_inverse=True)
     group, of_group, size = _groups(cell, line)
     surface = _surfaces(where_m, cell, group, size, size_m[0])
@@ -115,7 +127,8 @@ def shared_cells(
     off = (where_m[:, :2] - middle[cell]) / (0.5 * size_m[0])
     depth = where_m[:, 2] - (surface.bend[cell] * _terms(off)).sum(axis=1)
     seen = -(change[:, :, :2] * sure[cell][:, None, :]).sum(axis=2)
-    seen[:, 0] += change[:, 0, 2]
+    for upright in (ROLL, BEND):
+        seen[:, upright] += change[:, upright, 2]
     scatter = surface.scatter_m[cell[of_group]]
     known = np.isfinite(scatter)
     sd = np.hypot(np.where(known, scatter, 0.0) / np.sqrt(size), LEAST_SD * height_m)
@@ -128,6 +141,7 @@ def shared_cells(
         depth_m=_means(depth[:, None], group)[kept, 0],
         sd_m=sd[kept],
         change=_means(seen, group)[kept],
+        along=_along(line[of_group], _means(time_s[:, None], group)[:, 0])[kept],
         slope=sure[cell[of_group]][kept],
     )
 
@@ -140,6 +154,15 @@ def _seen_twice(key: IntArray, line: IntArray) -> BoolArray:
     lines = np.unique(np.column_stack([key[enough], line[enough]]), axis=0)
     cells, seen = np.unique(lines[:, 0], return_counts=True)
     return np.asarray(enough & np.isin(key, cells[seen > 1]))
+
+
+def _along(line: IntArray, time_s: FloatArray) -> FloatArray:
+    """Return how far along its line each row (g,) is, -1 to 1, by its time."""
+    count = int(line.max(initial=-1)) + 1
+    first, last = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(first, line, time_s)
+    np.maximum.at(last, line, time_s)
+    return np.asarray(2.0 * (time_s - first[line]) / np.maximum(last - first, 1e-9)[line] - 1.0)
 
 
 def _both(cell: IntArray, known: BoolArray) -> BoolArray:

@@ -9,15 +9,16 @@ import numpy as np
 from app.arrays import FloatArray, IntArray
 from app.mapping.swath.mounting import Mounting
 from app.mapping.swath.patch_test.beams import PatchBeams
-from app.mapping.swath.patch_test.cells import SharedCells, shared_cells
+from app.mapping.swath.patch_test.cells import BEND, LATENCY, ROLL, SharedCells, shared_cells
 from app.mapping.swath.patch_test.solution import Equations, LineErrors, Step
 
 PARAMETERS = ("roll_rad", "pitch_rad", "heading_rad", "latency_s")
 
-ROLL, LATENCY = 0, 3
-
 STEPS = np.array([1e-4, 1e-4, 1e-4, 0.05])
 """By which parameters are changed to see what that does."""
+
+BENT_BY = 0.001
+"""And the sound speed at the sonar, by a share."""
 
 LIMITS = np.array([np.radians(10.0), np.radians(10.0), np.radians(15.0), 2.0])
 """Nothing farther than this from the mounting that counts now is looked for."""
@@ -44,7 +45,7 @@ end steps to and fro, as beams change their cells, have to become smaller."""
 LAST = 8
 """So often at most, to the end, with what is known."""
 
-LEAST_CELLS = 30
+LEAST_CELLS, LEAST_BLOCKS = 30, 5
 OF_HEIGHT = 0.1
 """The smallest cells are as wide as this share of the height of the sonar above ground."""
 
@@ -91,8 +92,7 @@ class ParameterEstimate:
 class Agreement:
     """How well lines agree: RMS of their depths in cells beside the cells' means, metres.
 
-    That lines lie off as a whole, aside or too deep, does not count. ``significance``: by how many of its standard
-    deviations the mean square became smaller.
+    ``significance``: by how many of its standard deviations the mean square became smaller.
     """
 
     before_m: float
@@ -186,6 +186,7 @@ class _Search:
     ) -> None:
         self._is_wanted = is_wanted
         self._beams, self._start, self._height_m, self._errors = beams, mounting, height_m, errors
+        self._bent = beams.bent(BENT_BY)
         self._block_m = block_size_m(height_m)
         self._first = np.array([getattr(mounting, name) for name in PARAMETERS])
         self._at = self._first.copy()
@@ -247,7 +248,7 @@ class _Search:
                 other = best.copy()
                 other[group] = self._at[group]
                 after = self._spread_of(other)
-                if _agreement(spread, after).significance >= SURE:
+                if _is_better(spread, after):
                     best, spread = other, after
                     proposed |= set(group)
         parameters = {
@@ -276,13 +277,15 @@ class _Search:
         if not self._is_wanted():
             raise NotWantedError
         where, ping = self._beams.placed(self._mounting(at))
-        change = np.empty((len(where), len(PARAMETERS), 3))
+        change = np.empty((len(where), BEND + 1, 3))
         for number, by in enumerate(STEPS.tolist()):
             other = at.copy()
             other[number] += by
             change[:, number] = (self._beams.placed(self._mounting(other))[0] - where) / by
+        change[:, BEND] = (self._bent.placed(self._mounting(at))[0] - where) / BENT_BY
         sizes = (size * self._block_m / ROUNDS[0][0], self._block_m)
-        return shared_cells(where, change, self._beams.line[ping], sizes, self._height_m)
+        times = self._beams.pings.time_s[ping]
+        return shared_cells(where, change, self._beams.line[ping], times, sizes, self._height_m)
 
 
 def _excess(step: Step, free: Sequence[int]) -> FloatArray:
@@ -309,26 +312,45 @@ def _least_known(equations: Equations, step: Step, free: Sequence[int]) -> int:
     return free[int(np.argmax(_excess(step, free)))]
 
 
+def _is_better(before: "_Spread", after: "_Spread") -> bool:
+    """Whether lines agree better by a mounting, as they are, or at least in shape and no worse as they are."""
+    if _significance(before.block, before.whole_m2, after.block, after.whole_m2) >= SURE:
+        return True
+    in_shape = _significance(before.block, before.shape, after.block, after.shape)
+    return in_shape >= SURE and after.rms_m <= before.rms_m
+
+
+def _significance(block: IntArray, before_m2: FloatArray, other: IntArray, after_m2: FloatArray) -> float:
+    """Return by how many deviations mean squares of blocks became smaller."""
+    _, of, those = np.intersect1d(block, other, return_indices=True)
+    gain = before_m2[of] - after_m2[those]
+    if len(gain) < LEAST_BLOCKS:
+        return 0.0
+    return float(gain.mean() * np.sqrt(len(gain)) / max(float(gain.std(ddof=1)), 1e-12))
+
+
 def _agreement(before: "_Spread", after: "_Spread") -> Agreement:
-    """Return how well lines agreed and agree; blocks of ground tell how sure the difference is."""
-    _, of, those = np.intersect1d(before.block, after.block, return_indices=True)
-    gain = before.mean_m2[of] - after.mean_m2[those]
-    sd = float(gain.std(ddof=1)) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
-    return Agreement(before.rms_m, after.rms_m, float(gain.mean()) / max(sd, 1e-12) if len(gain) else 0.0)
+    significance = _significance(before.block, before.whole_m2, after.block, after.whole_m2)
+    return Agreement(before.rms_m, after.rms_m, significance)
 
 
 @dataclass(frozen=True)
 class _Spread:
-    """How far lines' depths differ in their cells: in all, and the mean square of each block (b,) of ground."""
+    """How far lines' depths differ in their cells: in all, and the mean square of each block (b,) of ground.
+
+    ``whole_m2`` as lines are, ``shape`` in variances when each is shifted to where it fits, outliers counting less.
+    """
 
     cells: SharedCells
     rms_m: float
     block: IntArray
-    mean_m2: FloatArray
+    whole_m2: FloatArray
+    shape: FloatArray
 
     @classmethod
     def of(cls, cells: SharedCells, errors: LineErrors) -> "_Spread":
-        square = Equations(cells, errors).between_lines() ** 2
+        equations = Equations(cells, errors)
         block, of = np.unique(cells.block, return_inverse=True)
-        mean_m2 = np.bincount(of, square) / np.bincount(of)
-        return cls(cells, float(np.sqrt(square.mean())), block, mean_m2)
+        whole = equations.differences_m() ** 2
+        means = [np.bincount(of, each) / np.bincount(of) for each in (whole, equations.misfit())]
+        return cls(cells, float(np.sqrt(whole.mean())), block, means[0], means[1])

@@ -10,23 +10,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.arrays import FloatArray
+from app.arrays import FloatArray, IntArray
 from app.mapping.swath.patch_test.cells import SharedCells
 
 HUBER, ROUNDS = 1.5, 8
 """Differences of more than so many standard deviations count less."""
 
+VARIES = 0.06
+"""How far parts of a line lie off beside the line, as a share of how far lines do. It is not solved for: it makes what
+is found less sure."""
+
 LEAST_SCALE = 1.0
 """Differences are never taken to be smaller than what beams and ground account for: errors in that are not random."""
 
-UNKNOWN_SD = np.array([np.radians(2.0), np.radians(2.0), np.radians(3.0), 0.0])
-"""How wrong roll, pitch and heading may be where lines do not tell them. Latency is taken as it is stated then: with
-lines of one speed nothing else tells pitch from it, and clocks are synchronised."""
+UNKNOWN_SD = np.array([np.radians(2.0), np.radians(2.0), np.radians(3.0), 0.0, 0.002])
+"""How wrong roll, pitch and heading may be where lines do not tell them, and how far swaths may be bent. Latency is
+taken as it is stated then: with lines of one speed nothing else tells pitch from it, and clocks are synchronised."""
 
 
 @dataclass(frozen=True)
 class LineErrors:
-    """How well lines fit each other besides the mounting: standard deviations, metres."""
+    """How well lines fit each other besides the mounting: standard deviations, metres.
+
+    Within a line they vary by ``VARIES`` of that from quarter to quarter.
+    """
 
     position_m: float
     level_m: float
@@ -63,13 +70,19 @@ class Equations:
         self._moved = moved.reshape(len(cells), -1)
         self._lines = len(lines)
 
-    def between_lines(self) -> FloatArray:
-        """Return the lines' depths beside the mean of their cell, (g,), as far as no line lies off as a whole."""
-        step = self._solved([], [])
+    def differences_m(self, *, shifted: bool = False) -> FloatArray:
+        """Return the lines' depths beside the mean of their cell, (g,); each shifted as a whole to where it fits."""
         cells = self._cells
-        depth = cells.depth_m + self._moved @ step.line_m.ravel()
+        depth = cells.depth_m
+        if shifted:
+            depth = depth + self._moved @ self._solved([], []).line_m.ravel()
         mean = np.bincount(cells.cell, depth) / np.maximum(np.bincount(cells.cell), 1)
         return np.asarray(depth - mean[cells.cell])
+
+    def misfit(self) -> FloatArray:
+        """Return Huber's loss of each row (g,) when lines are shifted to where they fit, in variances."""
+        off = np.abs(self.differences_m(shifted=True)) / self._cells.sd_m
+        return np.where(off <= HUBER, off**2, 2.0 * HUBER * off - HUBER**2)
 
     def solve(self, free: Sequence[int]) -> Step:
         """Return the best change of parameters, which are numbered as in ``SharedCells.change``.
@@ -119,14 +132,34 @@ class Equations:
         return table[:, :-1], table[:, -1]
 
     def _sd(self, inverse: FloatArray, weighted: FloatArray, left: FloatArray) -> FloatArray:
-        """Return standard deviations: by the weights, and by how blocks of ground pull at the parameters (sandwich)."""
+        """Return standard deviations: by the weights, or by how blocks of ground pull at the parameters (sandwich)."""
         count = len(inverse)
-        by_weight = np.sqrt(np.maximum(np.diag(inverse[:, :count]), 0.0))
+        by_weight = np.diag(inverse[:, :count])
         pull = (weighted * left[:, None]) @ inverse.T
         _, block = np.unique(self._cells.block, return_inverse=True)
         blocks = int(block.max(initial=0)) + 1
-        by_block = (
-            np.column_stack([np.bincount(block, column) for column in pull.T]) if count else np.zeros((blocks, 0))
-        )
-        spread = np.sqrt((by_block**2).sum(axis=0) * blocks / max(blocks - 1, 1))
-        return np.asarray(np.maximum(by_weight, spread))
+        by_block = _sums(pull, block)
+        spread = (by_block**2).sum(axis=0) * blocks / max(blocks - 1, 1)
+        return np.asarray(np.sqrt(np.maximum(by_weight, spread) + self._from_parts(weighted @ inverse.T)))
+
+    def _from_parts(self, influence: FloatArray) -> FloatArray:
+        """Return variances (p,) that come of parts of lines lying off, by the influence of each row (g, p)."""
+        cells = self._cells
+        quarter = np.clip(np.floor(2.0 * (cells.along + 1.0)), 0, 3).astype(np.int64)
+        part = 4 * np.unique(cells.line, return_inverse=True)[1] + quarter
+        errors = self._errors
+        variance = np.zeros(influence.shape[1])
+        for moved, sd in (
+            (cells.slope[:, :1], errors.position_m),
+            (cells.slope[:, 1:], errors.position_m),
+            (np.ones((len(cells), 1)), errors.level_m),
+        ):
+            variance += (_sums(influence * moved, part) ** 2).sum(axis=0) * (VARIES * sd) ** 2
+        return variance
+
+
+def _sums(values: FloatArray, of: IntArray) -> FloatArray:
+    """Return sums of rows (n, m) by their numbers (n,)."""
+    found = np.zeros((int(of.max(initial=0)) + 1, values.shape[1]))
+    np.add.at(found, of, values)
+    return found

@@ -68,10 +68,7 @@ class MountingEstimateView(View):
     proposal: MountingSpec | None = Field(
         description="What to send to PUT .../mountings/{name}; null: lines agree as well as they do now without it"
     )
-    before_m: float = Field(
-        description="RMS of lines' depths beside the mean of all in the same cell, as they are now. That lines lie "
-        "aside or too deep as a whole does not count"
-    )
+    before_m: float = Field(description="RMS of lines' depths beside the mean of all in the same cell, as they are now")
     after_m: float = Field(description="With the proposal; where there is none, with all that is determined")
     significance: float = Field(description="By how many standard deviations its square became smaller")
     cells: int = Field(description="Cells that at least two lines saw")

@@ -14,6 +14,7 @@ import pytest
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
 from app.missions.operations.imports import log_uploads
+from app.missions.operations.imports.log_process import reading
 from app.settings import Settings
 from simulator.floors.terrain import Terrain
 from simulator.sonars.mounting import SonarMounting
@@ -227,7 +228,7 @@ async def test_beams_that_came_placed_are_not_placed_again(client: httpx.AsyncCl
 async def test_a_mounting_is_refused_while_a_file_is_read_whose_beams_come_placed(
     client: httpx.AsyncClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun, go_on, reading = asyncio.Event(), asyncio.Event(), log_uploads.reading
+    begun, go_on = asyncio.Event(), asyncio.Event()
 
     @asynccontextmanager
     async def late(*arguments: Any) -> AsyncIterator[Any]:

@@ -1360,9 +1360,7 @@ class MountingEstimateView(Model):
     proposal: MountingSpec | None
     """What to send to PUT .../mountings/{name}; null: lines agree as well as they do now without it"""
     before_m: float
-    """RMS of lines' depths beside the mean of all in the same cell, as they are now. That lines lie aside or too
-    deep as a whole does not count
-    """
+    """RMS of lines' depths beside the mean of all in the same cell, as they are now"""
     after_m: float
     """With the proposal; where there is none, with all that is determined"""
     significance: float

@@ -5021,7 +5021,7 @@ export interface components {
             proposal: components["schemas"]["MountingSpec"] | null;
             /**
              * Before M
-             * @description RMS of lines' depths beside the mean of all in the same cell, as they are now. That lines lie aside or too deep as a whole does not count
+             * @description RMS of lines' depths beside the mean of all in the same cell, as they are now
              */
             before_m: number;
             /**
