@@ -14,6 +14,7 @@ from app.commands.failsafes import failsafes
 from app.commands.home import home
 from app.commands.logs import import_logs
 from app.commands.missions import missions_app
+from app.commands.patch_test import patch_test
 from app.commands.service.audit import audit
 from app.commands.service.backup import backup, prune, restore
 from app.commands.service.doctor import doctor
@@ -40,6 +41,7 @@ app.command("import")(import_file)
 app.command("import-log")(import_logs)
 app.command()(tide)
 app.command()(adjust)
+app.command("patch-test")(patch_test)
 app.command()(train)
 app.command()(failsafes)
 app.add_typer(alarms_app, name="alarms")

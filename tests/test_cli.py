@@ -194,6 +194,8 @@ def test_the_help_shows_all_that_is_said_of_an_option_and_its_default(
         (["tide", "nowhere", "--url", "http://127.0.0.1:9"], {}, 1, "does not answer"),
         (["tide", "nowhere", __file__, "--level", "1"], {}, 2, "the table's levels would count: give one of them"),
         (["adjust", "nowhere", "--undo", "--fixes", __file__], {}, 2, "positions as they came have no fixes"),
+        (["patch-test", "nowhere", "rover", "--position-sd", "0"], {}, 1, "position_sd_m is 0.0"),
+        (["patch-test", "nowhere", "rover"], {}, 1, "there is no database /"),
         (["missions", "list", "--state", "runing"], {}, 2, "'runing' is not one of draft, ready, running"),
         (["fly"], {}, 2, "No such command 'fly'"),
     ],

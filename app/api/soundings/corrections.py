@@ -1,19 +1,20 @@
 """How soundings are corrected: mounting, tide, sound speed, systematic errors, and the drift of vehicles."""
 
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Path, Query, Request
 
 from app.api.access.auth import Operator, Reader
 from app.api.bodies.json_route import JsonRoute
 from app.api.http.problems import body_problems, problems
+from app.api.http.while_connected import while_connected
 from app.api.mission import Mission
 from app.api.schemas import API, VehicleName
 from app.api.state import Service
 from app.mapping.s44 import Order
 from app.missions.errors import MapNotReadyError
-from app.missions.operations.corrections import adjustment, casts, recorrection
+from app.missions.operations.corrections import adjustment, casts, patch_test, recorrection
 from app.missions.operations.corrections.cast_use import casts_view
 from app.missions.operations.corrections.recorrection import corrections_view
 from app.missions.operations.corrections.systematic_errors import systematic_errors
@@ -23,6 +24,7 @@ from app.missions.spec.systematic_errors import SystematicErrors
 from app.missions.spec.water import MOST_NAME, CastDescription, CastRules, NewCasts, SoundSpeed
 from app.missions.views.measurements.adjustment import AdjustmentRequest, AdjustmentView
 from app.missions.views.measurements.corrections import CastsView, CorrectionsView, TideCorrection
+from app.missions.views.measurements.mounting_estimate import MountingEstimateRequest, MountingEstimateView
 from app.missions.views.measurements.systematic_errors import SystematicErrorsView
 
 router = APIRouter(
@@ -165,6 +167,29 @@ async def set_mounting(
 async def delete_mounting(name: VehicleName, operator: Operator, mission: Mission) -> CorrectionsView:
     """Correct the mounting no more: what the vehicle's description states counts again."""
     return await recorrection.set_mounting(mission, name, None, operator.name)
+
+
+@router.post(
+    "/mountings/{name}/estimate",
+    operation_id="estimateMounting",
+    summary="Estimate how a sonar is mounted",
+    response_model=MountingEstimateView,
+    responses=body_problems("mission-not-found", "vehicle-not-found", "conflict", "pings-unreadable"),
+)
+async def estimate_mounting(
+    name: VehicleName,
+    operator: Operator,
+    mission: Mission,
+    request: Request,
+    wanted: MountingEstimateRequest | None = None,
+) -> Any:
+    """Evaluate a patch test: find the roll, pitch, heading and latency with which overlapping lines agree best.
+
+    Changes nothing: what is proposed is sent to PUT. What the lines do not tell is named, with the lines that would.
+    Takes some seconds, with millions of beams a minute; a client that does not wait any more ends it.
+    """
+    estimating = patch_test.estimate_mounting(mission, name, wanted or MountingEstimateRequest())
+    return await while_connected(request, estimating)
 
 
 @router.get(

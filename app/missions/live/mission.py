@@ -2,7 +2,8 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -146,6 +147,8 @@ class LiveMission:
         """Ranges to moving targets, and what they tell."""
         self.correcting = asyncio.Lock()
         """Held while corrections change, one after the other."""
+        self._placed_files: list[tuple[str, str]] = []
+        """Vehicles, and multibeams' own files of them that are being read."""
         self.fitted_budget = spec.budget
         """The length that the legs which vehicles have ahead fit into."""
         self.flown_out = False
@@ -186,6 +189,19 @@ class LiveMission:
         self._parts: dict[Callable[[LiveMission], Any], Any] = {}
         self.notice_imports = Shared(self._notice_imports)
         """Count anew where logs were taken in, by the command line as well, or taken back since that was last done."""
+
+    @contextmanager
+    def reading_placed(self, file: str, vehicle: str) -> Iterator[None]:
+        """Note that a multibeam's own file is being read, whose beams come placed."""
+        self._placed_files.append((vehicle, file))
+        try:
+            yield
+        finally:
+            self._placed_files.remove((vehicle, file))
+
+    def placed_files_being_read(self, vehicle: str) -> set[str]:
+        """Return the multibeam's own files of a vehicle that are being read."""
+        return {file for own, file in self._placed_files if own == vehicle}
 
     def part(self, kind: Callable[["LiveMission"], Part]) -> Part:
         """Return the mission's own object of a class, made of the mission when it is first asked for."""

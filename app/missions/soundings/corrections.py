@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.mapping.coordinates.georeference import LocalFrame
-from app.mapping.swath.mounting import STRAIGHT, BeamVectors, StatedTrack, displaced, mounted
+from app.mapping.swath.mounting import STRAIGHT, BeamVectors, Mounting, StatedTrack, displaced, mounted
 from app.mapping.swath.pings import Pings, PlacedPings, placed
 from app.mapping.water.casts import CastPlaces, Casts
 from app.mapping.water.sound_speed import SoundSpeedProfile
@@ -250,24 +250,39 @@ class Corrections:
         None where the frame has no place for them. Depths for whose time there is no water level are NaN. ``track``:
         where the vehicle was stated to be before.
         """
-        errors = self._errors_of(vehicle)
         try:
             pings = self.mounted(vehicle, pings, track)
-            found = placed(self._steered(pings, errors), self._frame, self.casts)
+            found = placed(self.steered(vehicle, pings), self._frame, self.casts)
         except ValueError:
             return None
         if self.adjustment is not None:
             off = self.adjustment.offsets(vehicle, pings.time_s)[found.ping]
             found = replace(found, east_m=found.east_m - off[:, 0], north_m=found.north_m - off[:, 1])
-        levels = self._levels(pings.time_s)
-        depth_m = found.depth_m - errors.depth_m - levels[found.ping] + self._tide.datum_offset_m
+        levels, wrong_m = self._levels(pings.time_s), self._errors_of(vehicle).depth_m
+        depth_m = found.depth_m - wrong_m - levels[found.ping] + self._tide.datum_offset_m
         return PlacedPings(pings, replace(found, depth_m=depth_m))
+
+    def mounting_of(self, vehicle: str) -> Mounting:
+        """Return how a vehicle's sonar is taken to be mounted."""
+        return self._applied.get(vehicle, STRAIGHT)
+
+    def shift_m(self, vehicle: str, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what is added to the places of beams of some times (n,): east, north, down (n, 3).
+
+        NaN where there is no water level.
+        """
+        shift = np.zeros((len(time_s), 3))
+        if self.adjustment is not None:
+            shift[:, :2] -= self.adjustment.offsets(vehicle, time_s)
+        shift[:, 2] = self._tide.datum_offset_m - self._errors_of(vehicle).depth_m - self._levels(time_s)
+        return shift
 
     def _errors_of(self, vehicle: str) -> InstrumentErrors:
         return self._systematic.vehicles.get(vehicle, _RIGHT)
 
-    def _steered(self, pings: Pings, errors: InstrumentErrors) -> Pings:
-        """Return pings whose beams point where they really did."""
+    def steered(self, vehicle: str, pings: Pings) -> Pings:
+        """Return a vehicle's pings whose beams point where they really did."""
+        errors = self._errors_of(vehicle)
         if not errors.has_swath_errors:
             return pings
         faster = 1.0 + errors.sound_speed_mps / self._assumed_mps

@@ -8,6 +8,7 @@ from playwright.sync_api import FilePayload, Route, expect
 from tests.support.dashboard.browser import Watched
 from tests.support.dashboard.service import Service
 from tests.support.dashboard.steps import by_id, picture, show, violations
+from tests.support.mapping.calibration import REAL, calibration
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.specs import rectangle
 
@@ -55,6 +56,50 @@ def test_a_mounting_is_corrected_after_the_patch_test_and_taken_back(
     expect(one).not_to_contain_text("patch test")
     expect(one).to_contain_text("along the vehicle")
     assert service.get(corrections)["mountings"][0]["corrected"] is None
+
+
+def test_a_mounting_is_estimated_from_lines_that_overlap_taken_over_and_applied(
+    watched: Watched, service: Service
+) -> None:
+    page = watched.page
+    vehicle = {"name": "rover", "kind": "rest", "sensor": "multibeam", "mounting": {"offset_m": REAL["offset_m"]}}
+    mission = service.create(name="Patch test", area=rectangle(0, 0, 60, 60), cell_m=2, vehicles=[vehicle])
+    items = calibration("rover", START_S)
+    for start in range(0, len(items), 200):
+        service.post(f"/missions/{mission}/measurements", {"items": items[start : start + 200]})
+    show(page, mission)
+    by_id(page, "toggle-corrections").click()
+    by_id(page, "mounting-rover").locator("summary").click()
+    by_id(page, "mounting-estimate").click()
+    told = by_id(page, "mounting-estimated")
+    expect(told).to_contain_text("6 lines", timeout=60_000)
+    expect(by_id(page, "estimated-roll_deg")).to_have_text(re.compile(r"estimated 1\.\d\d ± 0\.\d\d"))
+    expect(by_id(page, "estimated-latency_s")).to_have_count(0)
+    expect(by_id(page, "unknown-latency_s")).to_contain_text("slowly and fast")
+    expect(by_id(page, "mounting-roll_deg")).to_have_value("0")
+    picture(page, "patch-test")
+    by_id(page, "mounting-take").click()
+    expect(by_id(page, "mounting-roll_deg")).to_have_value(re.compile(r"1\.[12]\d*"))
+    expect(by_id(page, "mounting-forward")).to_have_value("1.5")
+    expect(by_id(page, "mounting-source")).to_have_value("patch test of 6 lines")
+    assert service.get(f"/missions/{mission}/corrections")["mountings"][0]["corrected"] is None, "it is not applied yet"
+    assert [one for one in violations(page) if "-rover" not in one] == []
+    page.set_viewport_size({"width": 390, "height": 844})
+    by_id(page, "toggle-missions").click()
+    by_id(page, "mounting-estimated").scroll_into_view_if_needed()
+    picture(page, "patch-test-narrow")
+    by_id(page, "mounting-set").click()
+    expect(by_id(page, "mounting-rover")).to_contain_text("(patch test of 6 lines)")
+    assert abs(service.get(f"/missions/{mission}/corrections")["mountings"][0]["corrected"]["pitch_deg"] + 2.5) < 0.5
+
+
+def test_what_an_estimate_cannot_be_made_of_is_told(watched: Watched, service: Service, surveyed: str) -> None:
+    page = watched.page
+    show(page, surveyed)
+    by_id(page, "toggle-corrections").click()
+    by_id(page, "mounting-rover").locator("summary").click()
+    by_id(page, "mounting-estimate").click()
+    expect(by_id(page, "corrections").get_by_role("alert")).to_contain_text("has no pings of a swath sonar")
 
 
 def text_file(name: str, text: str) -> FilePayload:

@@ -17,6 +17,7 @@ from app.missions.clock import now
 from app.missions.errors import MapNotReadyError
 from app.missions.live.mission import LiveMission
 from app.missions.operations import reports
+from app.missions.operations.corrections.recorrection import set_mounting
 from app.missions.operations.measurements import measure
 from app.missions.operations.reports import ReportOptions
 from app.missions.report import contents
@@ -30,6 +31,7 @@ from app.missions.report.sections.maps import MOST_HOLIDAYS
 from app.missions.report.texts import Language, Texts
 from app.missions.settings import ServiceSettings
 from app.missions.soundings.measurement import Measurement
+from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.vehicle import VehicleSpec
 from tests.support.mapping.tracks import flown, lawnmower, measured
 from tests.support.missions.harbour import Harbour, act, sim_spec
@@ -93,6 +95,30 @@ async def test_the_sonar_of_a_vehicle_that_joined_later_is_not_said_to_be_the_us
     page = html(contents.document_of(answers, Texts(Language.PT))).decode()
     assert "later" in page
     assert "predefinido" not in page
+
+
+async def test_a_report_tells_of_a_mounting_that_was_corrected_and_does_not_say_that_vehicles_state_it(
+    harbour: Harbour, live: LiveMission
+) -> None:
+    async def page(language: Language) -> str:
+        answers = await harbour.service.reports.answers(live)
+        return unescape(html(contents.document_of(answers, Texts(language))).decode())
+
+    as_stated = {Language.EN: "no patch test is part of this report", Language.PT: "nenhum teste de calibração"}
+    before = await page(Language.EN)
+    assert as_stated[Language.EN] in before
+    assert "Mounting of a" not in before
+    mounting = MountingSpec(roll_deg=-0.42, latency_s=0.15, offset_m=(0.6, 0.0, 0.12), source="patch test")
+    await set_mounting(live, "a", mounting, "Ana")
+    for language, roll in ((Language.EN, "Mounting of a: roll (starboard down)"), (Language.PT, "Montagem de a")):
+        after = await page(language)
+        assert roll in after
+        assert as_stated[language] not in after
+    after = await page(Language.EN)
+    for value in ("\u22120.42°", "+0.150\u00a0s", "+0.60\u00a0m", "+0.12\u00a0m"):
+        assert f">{value}<" in after
+    assert "Mounting of a: pitch" not in after
+    assert "were corrected by the operator for a" in after
 
 
 async def test_nearly_all_is_not_said_to_be_all(harbour: Harbour, live: LiveMission) -> None:

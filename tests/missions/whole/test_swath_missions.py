@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
+from app.mapping.s44 import Order
 from app.missions.errors import InvalidRequestError
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.decisions.leg import Place
 from app.missions.flight.orders import orders_of
 from app.missions.live.mission import LiveMission
+from app.missions.operations.corrections.crossovers import survey_check
+from app.missions.operations.corrections.patch_test import estimate_mounting
 from app.missions.operations.corrections.recorrection import set_mounting
 from app.missions.operations.maps.mission_maps import export, map_at_step, newest_map
 from app.missions.preflight.survey import preflight
@@ -27,6 +30,7 @@ from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.orders import GoOrder, OrderState
 from app.missions.spec.water import Tide
 from app.missions.states import ENDED, MissionState
+from app.missions.views.measurements.mounting_estimate import MountingEstimateRequest
 from app.missions.views.mission import CheckStatus
 from app.storage.models import TelemetryRow
 from tests.support.missions.harbour import Harbour, act, until_state, view_of
@@ -308,3 +312,46 @@ async def test_a_sonar_that_is_simulated_askew_is_put_right_after_the_mission(ha
     assert right_m < 0.02
     await set_mounting(live, "a", None, "Ana")
     assert await spread_m() == pytest.approx(off_m, rel=1e-12), "beams are summed up in another order than as they came"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("simulated_time")
+async def test_what_overlapping_lines_of_a_mission_say_of_its_sonar_puts_the_depths_right(
+    harbour_closed: Harbour,
+) -> None:
+    harbour = harbour_closed
+    await harbour.open(simulation={"family": "rugged", "seed": 2}, time_scale=30.0)
+    askew = {"roll_deg": 2.0, "pitch_deg": -2.5, "heading_deg": 2.0}
+    vehicle = {"name": "a", "kind": "sim", "sensor": "multibeam", "sonar": SONAR, "depth_m": 1.0}
+    live = await started(
+        harbour,
+        vehicles=[vehicle | {"simulated_mounting": askew}],
+        sounding_noise=0.0,
+        coverage={"overlap_pct": 50, "crosslines_pct": 20},
+    )
+    await until_state(harbour.service, live.id, MissionState.FINISHED)
+    before = live.gate.corrections
+    found = await estimate_mounting(live, "a", MountingEstimateRequest())
+    assert live.gate.corrections is before, "nothing is changed"
+    told = {one.name.value: one for one in found.parameters}
+    for name, real in askew.items():
+        one = told[name]
+        assert one.value is not None, (name, one.why)
+        assert one.sd is not None
+        assert abs(one.value - real) < 4.0 * one.sd, one
+    assert found.proposal is not None
+
+    async def apart_m() -> float:
+        """How far beams of crosslines lie from the depths of all other lines."""
+        beams = (await survey_check(live)).beams
+        assert beams is not None
+        overall = beams.overall(Order.ORDER_1A)
+        assert overall is not None
+        assert overall.sd_m is not None
+        return overall.sd_m
+
+    spoiled_m = await apart_m()
+    await set_mounting(live, "a", found.proposal, "Ana")
+    right_m = await apart_m()
+    assert right_m < 0.5 * spoiled_m
+    assert (await estimate_mounting(live, "a", MountingEstimateRequest())).proposal is None

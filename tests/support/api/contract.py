@@ -61,6 +61,7 @@ CONTRACT = {
     "GET /missions/{mission_id}/corrections": "getCorrections",
     "PUT /missions/{mission_id}/mountings/{name}": "setMounting",
     "DELETE /missions/{mission_id}/mountings/{name}": "deleteMounting",
+    "POST /missions/{mission_id}/mountings/{name}/estimate": "estimateMounting",
     "GET /missions/{mission_id}/systematic-errors": "getSystematicErrors",
     "PUT /missions/{mission_id}/systematic-errors": "setSystematicErrors",
     "DELETE /missions/{mission_id}/systematic-errors": "deleteSystematicErrors",

@@ -176,14 +176,11 @@ async def set_mounting(live: LiveMission, vehicle: str, mounting: MountingSpec |
 
     Raises VehicleNotFoundError, InvalidRequestError where its beams came placed.
     """
-    known = await _who_sounded(live)
-    if vehicle not in known:
-        who = ", ".join(sorted(known)) or "none so far"
-        raise VehicleNotFoundError(f"vehicle {vehicle!r} takes no part in the mission", f"these do: {who}")
+    await check_who_sounded(live, vehicle)
     async with live.correcting:
         applied = live.stated_mountings.get(vehicle, MountingSpec()) if mounting is None else mounting
         if not applied.is_ideal:
-            files = sorted(file for file, own in (await _multibeam_files(live)).items() if own == vehicle)
+            files = await placed_files(live, vehicle)
             if files:
                 raise InvalidRequestError(
                     "mounting",
@@ -200,6 +197,20 @@ async def set_mounting(live: LiveMission, vehicle: str, mounting: MountingSpec |
     words = f"mounting of {vehicle}'s sonar: {how}, set by {actor}"
     await live.journal.log(Level.INFO, "corrections", words, vehicle=vehicle, actor=actor)
     return corrections_view(live)
+
+
+async def check_who_sounded(live: LiveMission, vehicle: str) -> None:
+    """Raise VehicleNotFoundError where a vehicle takes no part in a mission, and none of its logs was imported."""
+    known = await _who_sounded(live)
+    if vehicle not in known:
+        who = ", ".join(sorted(known)) or "none so far"
+        raise VehicleNotFoundError(f"vehicle {vehicle!r} takes no part in the mission", f"these do: {who}")
+
+
+async def placed_files(live: LiveMission, vehicle: str) -> list[str]:
+    """Return the multibeam's own files whose beams came placed, of one vehicle; also those that are being read."""
+    stored = [file for file, own in (await _multibeam_files(live)).items() if own == vehicle]
+    return sorted({*stored, *live.placed_files_being_read(vehicle)})
 
 
 def check_casts(live: LiveMission, sound_speed: SoundSpeed) -> None:

@@ -304,6 +304,12 @@ class LogUploads:
 
     async def _read(self, job: _Job, upload: Upload) -> LogImportView:
         live = await self._get(job.mission_id)
+        if job.vehicle is None or not is_multibeam(job.file):
+            return await self._read_into(live, job, upload)
+        with live.reading_placed(job.file, job.vehicle):
+            return await self._read_into(live, job, upload)
+
+    async def _read_into(self, live: LiveMission, job: _Job, upload: Upload) -> LogImportView:
         check_log(live, job.file, job.vehicle)
         bridge = bridge_settings(self._settings.imc, self._settings.time_scale)
 

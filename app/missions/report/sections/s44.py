@@ -44,7 +44,10 @@ def _not_said(w: Writer) -> list[Text]:
     elif answers.at("crosslines.at_crosslines") is None:
         said.append(t("cannot_crosslines"))
     adjusted = w.answers.at("adjustment.applied")
-    said += [t("cannot_adjusted" if adjusted else "cannot_positions"), t("cannot_calibration")]
+    said.append(t("cannot_adjusted" if adjusted else "cannot_positions"))
+    corrected = [one["vehicle"] for one in answers.at("corrections.mountings") if one["corrected"] is not None]
+    named = t("cannot_calibration_corrected", vehicles=", ".join(corrected))
+    said.append(named if corrected else t("cannot_calibration"))
     if answers.at("imports"):
         said.append(t("cannot_imports"))
     return said

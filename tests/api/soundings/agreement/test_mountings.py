@@ -2,6 +2,8 @@
 
 import asyncio
 import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,8 @@ import pytest
 
 from app.arrays import FloatArray
 from app.mapping.coordinates.georeference import LocalFrame
+from app.missions.operations.imports import log_uploads
+from app.missions.operations.imports.log_process import reading
 from app.settings import Settings
 from simulator.floors.terrain import Terrain
 from simulator.sonars.mounting import SonarMounting
@@ -219,3 +223,30 @@ async def test_beams_that_came_placed_are_not_placed_again(client: httpx.AsyncCl
     assert "a.gsf" in refused.text
     assert (await client.delete(f"{path}/mountings/rover")).status_code == 200, "nothing is stated: nothing to apply"
     assert (await client.put(f"{path}/mountings/other", json={"roll_deg": 1.0})).status_code == 200
+
+
+async def test_a_mounting_is_refused_while_a_file_is_read_whose_beams_come_placed(
+    client: httpx.AsyncClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on = asyncio.Event(), asyncio.Event()
+
+    @asynccontextmanager
+    async def late(*arguments: Any) -> AsyncIterator[Any]:
+        begun.set()
+        await go_on.wait()
+        async with reading(*arguments) as process:
+            yield process
+
+    monkeypatch.setattr(log_uploads, "reading", late)
+    path = await new_mission(client, "rover", "other", sensor="multibeam")
+    lat, lon = FRAME.to_geographic(30.0, 30.0)
+    content = await asyncio.to_thread(write_gsf, tmp_path / "a.gsf", line(LocalFrame(float(lat), float(lon))))
+    sending = asyncio.create_task(sent(client, path, content, "rover"))
+    await begun.wait()
+    refused = await client.put(f"{path}/mountings/rover", json={"roll_deg": 1.0})
+    assert refused.status_code == 422, refused.text
+    assert "a.gsf" in refused.text
+    assert (await client.post(f"{path}/mountings/rover/estimate")).status_code == 409
+    assert (await client.put(f"{path}/mountings/other", json={"roll_deg": 1.0})).status_code == 200
+    go_on.set()
+    assert (await sending)["state"] == "done"

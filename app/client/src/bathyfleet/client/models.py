@@ -60,6 +60,9 @@ Guidance: TypeAlias = Annotated[Literal["follow", "legs", "acoustic"], Open]
 Homecoming: TypeAlias = Annotated[Literal["return", "stop"], Open]
 """What becomes of a vehicle that goes on no further."""
 
+Known: TypeAlias = Annotated[Literal["determined", "undetermined", "unsettled", "beside"], Open]
+"""What lines tell of a parameter."""
+
 Language: TypeAlias = Annotated[Literal["en", "pt"], Open]
 """A language that reports are written in."""
 
@@ -80,6 +83,9 @@ MissionKind: TypeAlias = Annotated[Literal["survey", "search"], Open]
 
 MissionState: TypeAlias = Annotated[Literal["draft", "ready", "running", "paused", "finished", "aborted", "failed"], Open]
 """Where a mission is in its life."""
+
+MountingParameter: TypeAlias = Annotated[Literal["roll_deg", "pitch_deg", "heading_deg", "latency_s"], Open]
+"""What overlapping lines may tell, by its name in a mounting."""
 
 NodeState: TypeAlias = Annotated[Literal["heard", "announced", "active", "ready", "in_plan", "lost", "expected_offline"], Open]
 """How far the acquaintance with a node has come."""
@@ -1339,6 +1345,38 @@ class MissionView(Model):
     """Share of all metres flown that led along planned legs; null while nothing was flown."""
 
 
+class MountingEstimateRequest(Model):
+    """How well lines fit each other beside the mounting; all of it may be left out."""
+
+    position_sd_m: float = 0.3
+    """How far a line may lie aside of another one as a whole, standard deviation east and north, metres"""
+    level_sd_m: float = 0.05
+    """How far it may lie too deep as a whole, as from the water level, standard deviation, metres"""
+
+
+class MountingEstimateView(Model):
+    """What overlapping lines of a vehicle say of how its sonar is mounted. Nothing is changed by it."""
+
+    vehicle: str
+    applied: MountingSpec
+    """What counts now"""
+    parameters: list[ParameterEstimateView]
+    proposal: MountingSpec | None
+    """What to send to PUT .../mountings/{name}; null: lines agree as well as they do now without it"""
+    before_m: float
+    """RMS of lines' depths beside the mean of all in the same cell, as they are now"""
+    after_m: float
+    """With the proposal; where there is none, with all that is determined"""
+    significance: float
+    """By how many standard deviations its square became smaller"""
+    cells: int
+    """Cells that at least two lines saw"""
+    beams: int
+    """Beams that were compared; of many a part is chosen"""
+    lines: list[PatchLineView]
+    """The lines that were compared, in the order of their times"""
+
+
 class MountingSpec(Model):
     """How a sonar is mounted in its vehicle, in the vehicle's frame: forward, starboard, down, right-handed."""
 
@@ -1425,6 +1463,35 @@ class OwnShipView(Model):
     """Since it was heard"""
     current: bool
     """Heard just now; false: she may be elsewhere"""
+
+
+class ParameterEstimateView(Model):
+    """What overlapping lines tell of one parameter of a mounting."""
+
+    name: MountingParameter
+    known: Known
+    """determined; undetermined: the lines do not tell it; unsettled: the search for it does not come to rest;
+    beside: it would be far from what counts now, where nothing is looked for
+    """
+    value: float | None
+    """Degrees or seconds, in place of what counts now; null: not determined"""
+    sd: float | None
+    """Its standard deviation"""
+    proposed: bool
+    """Whether it is among what `proposal` changes"""
+    why: str
+    """Why it is proposed, or not, or which lines would tell it"""
+
+
+class PatchLineView(Model):
+    """A line that shares ground with others."""
+
+    start_s: float
+    """The vehicle's clock, Unix seconds"""
+    end_s: float
+    heading_deg: float
+    """Of the vehicle, clockwise from north"""
+    speed_mps: float
 
 
 class PcaoModel(Model):

@@ -566,6 +566,20 @@ class Operations(ABC):
             models.CorrectionsView,
         ))
 
+    def estimate_mounting(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.MountingEstimateRequest | Mapping[str, Any] | None = None,
+    ) -> models.MountingEstimateView:
+        """Estimate how a sonar is mounted: ``POST /missions/{mission_id}/mountings/{name}/estimate``."""
+        return self._call(Call[models.MountingEstimateView](
+            "POST",
+            f"/missions/{part(mission_id)}/mountings/{part(name)}/estimate",
+            models.MountingEstimateView,
+            body=body,
+        ))
+
     def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:
         """See what is always wrong: ``GET /missions/{mission_id}/systematic-errors``."""
         return self._call(Call[models.SystematicErrorsView](
@@ -2221,6 +2235,20 @@ class AsyncOperations(ABC):
             "DELETE",
             f"/missions/{part(mission_id)}/mountings/{part(name)}",
             models.CorrectionsView,
+        ))
+
+    async def estimate_mounting(
+        self,
+        mission_id: str,
+        name: str,
+        body: models.MountingEstimateRequest | Mapping[str, Any] | None = None,
+    ) -> models.MountingEstimateView:
+        """Estimate how a sonar is mounted: ``POST /missions/{mission_id}/mountings/{name}/estimate``."""
+        return await self._call(Call[models.MountingEstimateView](
+            "POST",
+            f"/missions/{part(mission_id)}/mountings/{part(name)}/estimate",
+            models.MountingEstimateView,
+            body=body,
         ))
 
     async def get_systematic_errors(self, mission_id: str) -> models.SystematicErrorsView:

@@ -25,6 +25,7 @@ import type {
   MissionAction,
   MissionSummary,
   MissionView,
+  MountingEstimateView,
   MountingSpec,
   NewCasts,
   NewMission,
@@ -350,6 +351,9 @@ export const api = {
     put<CorrectionsView>(mountingPath(id, vehicle), mounting),
   deleteMounting: (id: string, vehicle: string) =>
     request<CorrectionsView>(mountingPath(id, vehicle), { method: "DELETE" }),
+  /** What overlapping lines say; nothing is changed by it, and it takes as long as it takes. */
+  estimateMounting: (id: string, vehicle: string, gone: AbortSignal) =>
+    request<MountingEstimateView>(`${mountingPath(id, vehicle)}/estimate`, { method: "POST", signal: gone }),
   logs: (id: string) => poll<LogView[]>(`${missionPath(id)}/logs`),
   /** `vehicle`: empty where the log says whose it is. */
   sendLog: (id: string, vehicle: string, sending: Sending) =>

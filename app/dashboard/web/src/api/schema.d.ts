@@ -852,6 +852,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/missions/{mission_id}/mountings/{name}/estimate": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Estimate how a sonar is mounted
+         * @description Evaluate a patch test: find the roll, pitch, heading and latency with which overlapping lines agree best.
+         *
+         *     Changes nothing: what is proposed is sent to PUT. What the lines do not tell is named, with the lines that would.
+         *     Takes some seconds, with millions of beams a minute; a client that does not wait any more ends it.
+         */
+        post: operations["estimateMounting"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/missions/{mission_id}/systematic-errors": {
         parameters: {
             query?: never;
@@ -3939,6 +3962,12 @@ export interface components {
             reason: string;
         };
         /**
+         * Known
+         * @description What lines tell of a parameter.
+         * @enum {string}
+         */
+        Known: "determined" | "undetermined" | "unsettled" | "beside";
+        /**
          * Language
          * @description A language that reports are written in.
          * @enum {string}
@@ -4965,6 +4994,74 @@ export interface components {
             readonly efficiency_pct: number | null;
         };
         /**
+         * MountingEstimateRequest
+         * @description How well lines fit each other beside the mounting; all of it may be left out.
+         */
+        MountingEstimateRequest: {
+            /**
+             * Position Sd M
+             * @description How far a line may lie aside of another one as a whole, standard deviation east and north, metres
+             * @default 0.3
+             */
+            position_sd_m: number;
+            /**
+             * Level Sd M
+             * @description How far it may lie too deep as a whole, as from the water level, standard deviation, metres
+             * @default 0.05
+             */
+            level_sd_m: number;
+        };
+        /**
+         * MountingEstimateView
+         * @description What overlapping lines of a vehicle say of how its sonar is mounted. Nothing is changed by it.
+         */
+        MountingEstimateView: {
+            /** Vehicle */
+            vehicle: string;
+            /** @description What counts now */
+            applied: components["schemas"]["MountingSpec"];
+            /** Parameters */
+            parameters: components["schemas"]["ParameterEstimateView"][];
+            /** @description What to send to PUT .../mountings/{name}; null: lines agree as well as they do now without it */
+            proposal: components["schemas"]["MountingSpec"] | null;
+            /**
+             * Before M
+             * @description RMS of lines' depths beside the mean of all in the same cell, as they are now
+             */
+            before_m: number;
+            /**
+             * After M
+             * @description With the proposal; where there is none, with all that is determined
+             */
+            after_m: number;
+            /**
+             * Significance
+             * @description By how many standard deviations its square became smaller
+             */
+            significance: number;
+            /**
+             * Cells
+             * @description Cells that at least two lines saw
+             */
+            cells: number;
+            /**
+             * Beams
+             * @description Beams that were compared; of many a part is chosen
+             */
+            beams: number;
+            /**
+             * Lines
+             * @description The lines that were compared, in the order of their times
+             */
+            lines: components["schemas"]["PatchLineView"][];
+        };
+        /**
+         * MountingParameter
+         * @description What overlapping lines may tell, by its name in a mounting.
+         * @enum {string}
+         */
+        MountingParameter: "roll_deg" | "pitch_deg" | "heading_deg" | "latency_s";
+        /**
          * MountingSpec
          * @description How a sonar is mounted in its vehicle, in the vehicle's frame: forward, starboard, down, right-handed.
          */
@@ -5182,6 +5279,55 @@ export interface components {
          * @enum {string}
          */
         Palette: "deep" | "violet" | "matter" | "balance" | "landmarks" | "classes";
+        /**
+         * ParameterEstimateView
+         * @description What overlapping lines tell of one parameter of a mounting.
+         */
+        ParameterEstimateView: {
+            name: components["schemas"]["MountingParameter"];
+            /** @description determined; undetermined: the lines do not tell it; unsettled: the search for it does not come to rest; beside: it would be far from what counts now, where nothing is looked for */
+            known: components["schemas"]["Known"];
+            /**
+             * Value
+             * @description Degrees or seconds, in place of what counts now; null: not determined
+             */
+            value: number | null;
+            /**
+             * Sd
+             * @description Its standard deviation
+             */
+            sd: number | null;
+            /**
+             * Proposed
+             * @description Whether it is among what `proposal` changes
+             */
+            proposed: boolean;
+            /**
+             * Why
+             * @description Why it is proposed, or not, or which lines would tell it
+             */
+            why: string;
+        };
+        /**
+         * PatchLineView
+         * @description A line that shares ground with others.
+         */
+        PatchLineView: {
+            /**
+             * Start S
+             * @description The vehicle's clock, Unix seconds
+             */
+            start_s: number;
+            /** End S */
+            end_s: number;
+            /**
+             * Heading Deg
+             * @description Of the vehicle, clockwise from north
+             */
+            heading_deg: number;
+            /** Speed Mps */
+            speed_mps: number;
+        };
         /**
          * PcaoModel
          * @description A controller that ``bathyfleet train`` wrote.
@@ -13489,6 +13635,143 @@ export interface operations {
             };
             /** @description Too many requests */
             429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    estimateMounting: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description The vehicle's name */
+                name: string;
+                /** @description The mission's id */
+                mission_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["MountingEstimateRequest"] | null;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MountingEstimateView"];
+                };
+            };
+            /** @description The body cannot be read; a parameter of the address or the head cannot be taken */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An access token is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not allowed */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such mission; there is no such vehicle */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request took too long to arrive */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It contradicts the present state */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body's media type is not supported */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some values cannot be taken */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is sent at once; too many requests */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A file of pings is missing or damaged */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too much is under way */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -152,6 +152,41 @@ export const REVIEW = {
   "mountings.downM": { en: "Down, m", pt: "Abaixo, m" },
   "mountings.patchTest": { en: "patch test", pt: "teste de calibração" },
   "mountings.apply": { en: "Apply this mounting", pt: "Aplicar esta montagem" },
+  "mountings.estimate": {
+    en: "Estimate from overlapping lines",
+    pt: "Estimar a partir de linhas sobrepostas",
+  },
+  "mountings.estimating": { en: "Comparing lines…", pt: "A comparar linhas…" },
+  "mountings.estimated": { en: "estimated {value} ± {sd}", pt: "estimado {value} ± {sd}" },
+  "mountings.compared": {
+    en: "{lines} lines, {cells} shared cells. Depths of lines differ by {before} m (RMS) as they are placed now, by {after} m with the estimates.",
+    pt: "{lines} linhas, {cells} células em comum. As profundidades das linhas diferem {before} m (RMS) como estão agora, {after} m com as estimativas.",
+  },
+  "mountings.proposed": {
+    en: "Proposed: {mounting}. Nothing changes before you apply it.",
+    pt: "Proposta: {mounting}. Nada muda antes de a aplicar.",
+  },
+  "mountings.nothingProposed": {
+    en: "Nothing is proposed: lines agree no better with other values than with those that count now.",
+    pt: "Nada é proposto: as linhas não concordam melhor com outros valores do que com os atuais.",
+  },
+  "mountings.takeOver": { en: "Take over", pt: "Adotar" },
+  "mountings.rollUnknown": {
+    en: "Roll is not determined. Fly lines there and back over the same even ground.",
+    pt: "O balanço não fica determinado. Percorra linhas de ida e volta sobre o mesmo fundo plano.",
+  },
+  "mountings.pitchUnknown": {
+    en: "Pitch is not determined. Fly a line there and back, at one speed, over a slope or over features.",
+    pt: "O cabeceio não fica determinado. Percorra uma linha de ida e volta, à mesma velocidade, sobre um declive ou relevos.",
+  },
+  "mountings.headingUnknown": {
+    en: "Heading is not determined. Fly lines side by side, overlapping by half, past features or along a slope.",
+    pt: "A proa não fica determinada. Percorra linhas lado a lado, sobrepostas em metade, junto a relevos ou ao longo de um declive.",
+  },
+  "mountings.latencyUnknown": {
+    en: "Latency is not determined; the one that counts now is kept. Fly a line twice in the same direction over a slope or features, slowly and fast.",
+    pt: "O atraso não fica determinado; mantém-se o atual. Percorra uma linha duas vezes no mesmo sentido sobre um declive ou relevos, devagar e depressa.",
+  },
   "mountings.asStated": { en: "As the vehicle states", pt: "Como o veículo indica" },
   "compare.compareWith": { en: "Compare with", pt: "Comparar com" },
   "compare.chooseAMission": { en: "Choose a mission", pt: "Escolha uma missão" },

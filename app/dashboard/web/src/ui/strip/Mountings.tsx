@@ -1,10 +1,12 @@
 import { useSignal } from "@preact/signals";
 import { api } from "../../api/client";
-import type { MountingSpec, MountingView } from "../../api/types";
+import type { MountingEstimateView, MountingSpec, MountingView } from "../../api/types";
 import { plain } from "../../state/format";
 import { say } from "../../words/say";
 import { Button, Typed } from "../parts/Controls";
 import { numberOf, type PartProps } from "./correctionParts";
+import { Estimated, MountingEstimate, PARAMETERS } from "./MountingEstimate";
+import { described } from "./mountingWords";
 
 /** How sonars are mounted, each corrected by what its patch test told. */
 export function Mountings({ found, busy, change, fault }: PartProps) {
@@ -28,25 +30,6 @@ export function Mountings({ found, busy, change, fault }: PartProps) {
 /** What counts: the correction, or else what the vehicle states. */
 const counted = ({ stated, corrected }: MountingView): MountingSpec => corrected ?? stated;
 
-/** A mounting in words. */
-export function described(mounting: MountingSpec): string {
-  const [forward, starboard, down] = mounting.offset_m;
-  const parts = [
-    mounting.roll_deg ? say("mountings.roll", { angle: plain(mounting.roll_deg) }) : "",
-    mounting.pitch_deg ? say("mountings.pitch", { angle: plain(mounting.pitch_deg) }) : "",
-    mounting.heading_deg ? say("mountings.heading", { angle: plain(mounting.heading_deg) }) : "",
-    mounting.latency_s ? say("mountings.latency", { seconds: plain(mounting.latency_s) }) : "",
-    forward || starboard || down
-      ? say("mountings.offset", {
-          forward: plain(forward),
-          starboard: plain(starboard),
-          down: plain(down),
-        })
-      : "",
-  ].filter((part) => part !== "");
-  return parts.length ? parts.join(", ") : say("mountings.straight");
-}
-
 interface OneProps extends Omit<PartProps, "found"> {
   one: MountingView;
 }
@@ -63,6 +46,7 @@ function Mounting({ one, busy, change, fault }: OneProps) {
     down: useSignal(plain(now.offset_m[2])),
   };
   const source = useSignal(now.source);
+  const estimate = useSignal<MountingEstimateView | null>(null);
   const labels: [keyof typeof numbers, string][] = [
     ["roll_deg", say("mountings.rollDeg")],
     ["pitch_deg", say("mountings.pitchDeg")],
@@ -104,6 +88,7 @@ function Mounting({ one, busy, change, fault }: OneProps) {
           <label class="field" key={name}>
             {label}
             <Typed text={numbers[name]} id={`mounting-${name}`} />
+            <Estimated of={name} found={estimate.value} />
           </label>
         ))}
         <label class="field">
@@ -116,6 +101,15 @@ function Mounting({ one, busy, change, fault }: OneProps) {
           />
         </label>
       </div>
+      <MountingEstimate
+        vehicle={one.vehicle}
+        estimate={estimate}
+        fault={fault}
+        take={(mounting) => {
+          for (const name of PARAMETERS) numbers[name].value = plain(mounting[name]);
+          source.value = mounting.source;
+        }}
+      />
       <p class="row">
         <Button id="mounting-set" commands busy={busy.value} onClick={apply}>
           {say("mountings.apply")}
