@@ -106,6 +106,15 @@ changed ground that is called so with the right sign, *volume* how far the net v
 deviations (RMS). Half of the pit's rim lies between lines: not all of it can be found.
 """,
 )
+PATCH_TEST = Page(
+    "patch-test.md",
+    """# Patch test: what was measured
+
+Every section is written by the command that stands in it (`--write`). Eight lines over generated floors, by the
+simulator's multibeam. *drawn*: the sonar is mounted otherwise than is stated; *right*: as is stated, where nothing
+should be proposed. *off* is the error of what was determined (RMS), also in the deviations that were told with it.
+""",
+)
 PLANNING = Page(
     "planning.md",
     """# Planners: what was measured

@@ -2,6 +2,7 @@
 
 import asyncio
 import gzip
+import json
 from pathlib import Path
 from typing import Any
 
@@ -242,6 +243,23 @@ async def test_what_is_no_log_of_the_mission_cannot_be_taken_back(client: httpx.
     assert not log["can_be_taken_back"]
     refused = await client.delete(f"{path}/logs/{log['id']}")
     assert (refused.status_code, refused.json()["detail"]) == (409, "nothing is stored of this log")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("accepted", [PINGS, 0])
+async def test_a_log_that_an_earlier_version_took_in_says_why_it_cannot_be_taken_back(
+    client: httpx.AsyncClient, path: str, content: bytes, database_url: str, accepted: int
+) -> None:
+    await ended(client, path, await send(client, path, content))
+    [(line, data)] = query(database_url, "select id, data from events where kind = 'import'")
+    told = (json.loads(data) if isinstance(data, str) else data) | {"soundings": accepted, "rejected": 0}
+    kept = {name: value for name, value in told.items() if name not in ("log", "import_id")}
+    query(database_url, "update events set data = :data where id = :id", data=json.dumps(kept), id=line)
+    earlier = await client.get(f"{path}/logs/line-{line}")
+    assert earlier.json()["can_be_taken_back"] is False
+    refused = await client.delete(f"{path}/logs/line-{line}")
+    assert refused.status_code == 409
+    assert ("an earlier version" in refused.json()["detail"]) is bool(accepted)
 
 
 async def test_only_operators_take_logs_back(guarded: Guarded, content: bytes) -> None:

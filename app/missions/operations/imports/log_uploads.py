@@ -240,11 +240,12 @@ class LogUploads:
         if number is None:
             if view.state is LogState.TAKEN_BACK:
                 return view
-            brought = view.result is not None and (view.result.soundings or view.result.positions or view.result.pings)
+            one = view.result
+            brought = one is not None and bool(one.soundings + one.rejected + one.pings + one.pings_rejected)
             raise ConflictError(
-                "nothing is stored of this log"
-                if not brought
-                else "this log was imported by an earlier version, which did not note what it brought",
+                "this log was imported by an earlier version, which did not note what it brought"
+                if brought
+                else "nothing is stored of this log",
                 f"reject soundings one by one or many at once: POST /api/v1/missions/{live.id}/soundings/reject",
             )
         await self._stop(lambda job: job.mission_id == live.id and job.number == number, actor)
