@@ -33,6 +33,12 @@ FAULTS = """(root, low) => {
 }"""
 
 
+LOW = """(parts, low) => parts
+    .map((part) => [part.dataset.testid ?? part.textContent, part.getBoundingClientRect().height])
+    .filter(([, height]) => height > 1 && height < low)"""
+"""Cards lie in a row that scrolls sideways: how high what is pressed in them is, alone."""
+
+
 @pytest.fixture(params=["en", "pt"])
 def phone(request: pytest.FixtureRequest, browser: Browser, service: Service) -> Iterator[Page]:
     language = str(request.param)
@@ -114,6 +120,10 @@ def test_dialogs_of_a_mission_under_way_and_panes_fit(phone: Page, service: Serv
     casts = [{"name": f"cast at the pier {n}.asvp", "profile": [[0, 1500 + 60 * n]]} for n in (0, 1)]
     timed = [cast | {"time": f"2026-11-2{n}T01:00:00Z"} for n, cast in enumerate(casts)]
     service.post(f"/missions/{mission}/sound-speed/casts", {"casts": timed})
+    for part, name in ((".legend", "legend"), (".map-tools", "map-tools")):
+        expect_fits(phone, phone.locator(part), name)
+    low = phone.locator(".cards-column :is(button, select, summary)").evaluate_all(LOW, LOW_PX)
+    assert low == []
     for pane in PANES:
         by_id(phone, f"toggle-{pane}").dispatch_event("click")
         expect_fits(phone, phone.locator(".bottom .log"), pane)
