@@ -64,7 +64,7 @@ def test_charts_layers_space_and_comparison_of_a_finished_mission(
     show(page, flown)
     by_id(page, "toggle-charts").click()
     expect(by_id(page, "charts").locator("canvas")).not_to_have_count(0)
-    expect(by_id(page, "charts")).to_contain_text(re.compile(r"covered \d"))
+    expect(by_id(page, "charts")).to_contain_text(re.compile(r"known \d"))
     # This page was opened after the end: what it shows of vehicles was kept.
     expect(by_id(page, "charts")).to_contain_text(re.compile(r"Depth of vehicles.*sim-1 \d"))
     by_id(page, "toggle-charts").click()
@@ -72,7 +72,7 @@ def test_charts_layers_space_and_comparison_of_a_finished_mission(
         by_id(page, "layer").select_option(name)
         expect(by_id(page, "range-low")).to_be_visible()
     by_id(page, "layer").select_option("flags")
-    expect(by_id(page, "landmarks")).to_contain_text(re.compile(r"accurate \d+ %"))
+    expect(by_id(page, "landmarks")).to_contain_text(re.compile(r"known as asked \d+ %"))
     by_id(page, "layer").select_option("difference")
     expect(page.get_by_text("The mission has no reference grid to differ from")).to_be_visible()
     by_id(page, "layer").select_option("depth")
