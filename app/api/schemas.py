@@ -19,6 +19,7 @@ from pydantic import (
 from app.api.http.field_problems import MAX_ERRORS, SUGGESTION, field_problem
 from app.api.http.json_text import Bounds, Unreadable
 from app.api.http.problems import FieldProblem
+from app.missions.operations.measurements import MAX_BATCH
 from app.missions.operations.scans import MAX_SCANS
 from app.missions.search.scan_schema import Scan
 from app.missions.soundings.measurement import Measurement
@@ -27,7 +28,6 @@ from app.missions.spec.site import SiteId
 
 API = "/api/v1"
 
-MAX_BATCH = 10_000
 MAX_FAULTS = 5
 """At most so many faults of one item are explained."""
 

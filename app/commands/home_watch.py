@@ -99,7 +99,7 @@ class Watch:
             await asyncio.sleep(TICK_S)
 
     def look(self) -> None:
-        """Look once at everybody."""
+        """Look once where every vehicle is, and note what is not as it has to be."""
         out: dict[str, tuple[Member, Place]] = {}
         for member in self._live.team:
             seen = self.seen.setdefault(member.name, Seen())

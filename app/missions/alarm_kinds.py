@@ -53,6 +53,7 @@ class AlarmKind(StrEnum):
     DATABASE_UNWRITABLE = "database_unwritable"
     MISSION_FAILED = "mission_failed"
     NOT_BEGUN = "not_begun"
+    WATCH_FAILED = "watch_failed"
     TEST = "test"
 
 
@@ -167,6 +168,12 @@ ALARMS: Mapping[AlarmKind, AlarmRule] = {
         "read why; start it, or bring its vehicles in",
         "waiting",
     ),
+    AlarmKind.WATCH_FAILED: AlarmRule(
+        _CRITICAL,
+        "something that looks after a mission's vehicles fails, such as failsafes or keeping them apart",
+        "watch the vehicles yourself; read why, pause or call them home, restart the service; report the error",
+        "safety",
+    ),
     AlarmKind.TEST: AlarmRule(_MINOR, "somebody tries who is told", "nothing", "test"),
 }
 """Every alarm there is."""
@@ -178,6 +185,7 @@ OF_A_MISSION = (
     AlarmKind.SEARCH_LATE,
     AlarmKind.SEARCH_STUCK,
     AlarmKind.NO_WATER_LEVEL,
+    AlarmKind.WATCH_FAILED,
 )
 """Those that are over when their mission is: they say that it does not go on as it should."""
 

@@ -97,7 +97,7 @@ class Capacity:
         now
             Seconds of the bridge's clock.
         """
-        if standing is not Standing.UNANNOUNCED and self._is_wanted(name, now):
+        if standing is not Standing.UNANNOUNCED and self._is_wanted(name):
             if len(self._nodes) < MAX_NODES:
                 return True, None
             leaver = self._weakest(lambda node: True)
@@ -125,7 +125,7 @@ class Capacity:
     def _counts_as_heard(self, node: Node) -> bool:
         return standing_of(node) is Standing.HEARD and not self.keeps(node)
 
-    def _is_wanted(self, name: str, now: float) -> bool:
+    def _is_wanted(self, name: str) -> bool:
         """Whether a name's place is still free: no system uses it yet."""
         holder = next((node for node in self._nodes.values() if node.name == name), None)
         return name in self.wanted and (holder is None or standing_of(holder) is not Standing.HEARD)

@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from app.arrays import BoolArray, FloatArray, IntArray
+from app.arrays import FloatArray, IntArray
 from app.estimation.adjustment import misfit, surface
 from app.estimation.adjustment.drift import Nodes
 from app.estimation.adjustment.tracks import TrackSoundings
@@ -348,8 +348,3 @@ def _told(mean: FloatArray, covariance: FloatArray, known: Known) -> tuple[Float
     shift = basis @ ((basis.T @ pull) / gain[told])
     information = inverse.T @ (basis * gain[told]) @ basis.T @ inverse
     return known.mean_m + root @ shift, 0.5 * (information + information.T)
-
-
-def overlapping(ties: list[Tie]) -> BoolArray:
-    """Return which ties compare soundings at all, (k,)."""
-    return np.array([np.isfinite(tie.residual_m) for tie in ties], dtype=bool)

@@ -377,7 +377,7 @@ class FlownPlan(NamedTuple):
 
 
 def new_checkpoints(room: int, vehicles: int, landmarks: int) -> Checkpoints:
-    """Return an no checkpoints yet."""
+    """Return checkpoints of a plan that none was made of yet."""
     return Checkpoints(np.zeros((room + 1, vehicles, 3)), np.zeros((room + 1, landmarks)), np.zeros((room + 1, 4)))
 
 

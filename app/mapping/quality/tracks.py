@@ -145,7 +145,7 @@ def cut(tracks: Tracks) -> Lines:
     begins = np.zeros(count, dtype=bool)
     begins[:1] = True
     begins[1:] = ~joined[:-1]
-    begins[_turns(tracks, begins, joined)] = True
+    begins[_turns(tracks, begins)] = True
     # A sounding that no segment leads from ends the line before it, if one leads there.
     begins[1:] &= joined[1:] | ~joined[:-1]
     line = np.cumsum(begins) - 1
@@ -183,7 +183,7 @@ def _joined(tracks: Tracks) -> BoolArray:
     return joined
 
 
-def _turns(tracks: Tracks, begins: BoolArray, joined: BoolArray) -> Sequence[int]:
+def _turns(tracks: Tracks, begins: BoolArray) -> Sequence[int]:
     """Return the soundings where the course turns."""
     run = np.cumsum(begins) - 1
     long = np.bincount(run)[run] > 1 if len(run) else np.zeros(0, dtype=bool)

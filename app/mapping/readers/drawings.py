@@ -274,7 +274,7 @@ def _drawings(drawn: _Drawn, crs: str | None, left_out: _LeftOut) -> Iterator[Dr
     lonlat = _to_degrees(xy, crs if uses_given else drawn.crs)
     ends = np.cumsum([len(places) for *_, places in kept])[:-1]
     for (kind, name, _), places in zip(kept, np.split(lonlat, ends), strict=True):
-        yield Drawing(kind, _text(name), _simplified(kind, name, places))
+        yield Drawing(kind, _text(name), _simplified(kind, places))
 
 
 def _are_degrees(xy: FloatArray) -> bool:
@@ -323,7 +323,7 @@ def _unknown_system() -> ReadError:
     return ReadError("crs", "it is no coordinate reference system that is known", "give EPSG:… or WKT")
 
 
-def _simplified(kind: str, name: str, places: FloatArray) -> FloatArray:
+def _simplified(kind: str, places: FloatArray) -> FloatArray:
     # The outline of an area ends where it began, which is one more.
     most = MOST_CORNERS - (kind == "area")
     if len(places) <= most:

@@ -1,4 +1,4 @@
-"""The one interface through which the mission loop sees vehicles.
+"""The one interface through which missions see vehicles.
 
 Everything here is geographic (WGS84 degrees, depth in metres, positive down) because a vehicle exists before any
 mission gives it a local frame. Links report by calling an :data:`EventSink` from the event loop's thread; they never

@@ -6,10 +6,9 @@ crash between any two moments loses nothing and repeats nothing but the sending,
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Executor
 from functools import partial
-from typing import Any
 
 import numpy as np
 import structlog
@@ -41,6 +40,7 @@ from app.missions.flight.orders import Flight, OrderBook
 from app.missions.flight.own_legs import OwnLegs
 from app.missions.flight.search_hooks import SearchHooks
 from app.missions.flight.team_steps import TeamSteps
+from app.missions.flight.watches import Watches
 from app.missions.flight.way_home.failsafe_watch import FailsafeWatch
 from app.missions.flight.way_home.onboard_way import OnboardWays
 from app.missions.flight.way_home.withdrawals import Withdrawals
@@ -53,7 +53,6 @@ from app.missions.views.mission import Level
 from app.storage.concurrency.uncancellable import to_the_end
 from app.storage.queries import missions as mission_queries
 
-BEGIN_ANEW_S = 1.0
 """After how long a part of the flight that failed begins anew, on the wall clock."""
 
 log = structlog.get_logger(__name__)
@@ -115,18 +114,19 @@ class Runner:
         live = self._live
         live.flight_begins()
         metrics.RUNNING.inc()
+        watches = Watches(live)
         keepers = [
-            asyncio.create_task(kept_going(keep))
-            for keep in (
-                self._engagement.keep,
-                partial(keep_time, live),
-                partial(keep_telemetry, live, self._time_scale),
-                VehicleClocks(live, self._time_scale).keep,
-                self._watch.keep,
-                self._withdrawals.keep,
-                self._onboard.keep,
-                self._keeping_off.keep,
-                self._giving_way.keep,
+            asyncio.create_task(watches.keep(name, watch))
+            for name, watch in (
+                ("engaging vehicles", self._engagement.keep),
+                ("the mission's clock", partial(keep_time, live)),
+                ("telemetry for charts", partial(keep_telemetry, live, self._time_scale)),
+                ("comparing vehicles' clocks", VehicleClocks(live, self._time_scale).keep),
+                ("failsafes", self._watch.keep),
+                ("bringing vehicles home", self._withdrawals.keep),
+                ("ways home on board", self._onboard.keep),
+                ("keeping vehicles off zones", self._keeping_off.keep),
+                ("keeping vehicles apart", self._giving_way.keep),
             )
         ]
         try:
@@ -267,16 +267,6 @@ def flies_apart(live: LiveMission, constraints: Constraints, planner: PlannerBas
     """Whether vehicles of a mission have legs of their own, rather than go together in steps."""
     linked = np.isfinite(constraints.com_range_m) or any(m.capabilities.flies_together for m in live.team)
     return live.search is None and not linked and planner.decides_apart
-
-
-async def kept_going(keep: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run what has to go on as long as a mission is flown; where it fails that is logged, and it begins anew."""
-    while True:
-        try:
-            return await keep()
-        except Exception:
-            log.exception("a part of the flight failed and begins anew", part=repr(keep))
-        await asyncio.sleep(BEGIN_ANEW_S)
 
 
 def nearest_leg(place_m: FloatArray, ends_m: FloatArray, begin_m: FloatArray | None = None) -> int:

@@ -7,15 +7,13 @@ import numpy as np
 
 from app.arrays import FloatArray
 from app.exploration.motion.timeline import SLOWEST_SHARE, Timeline
+from imc_bridge.control.orders import PASSED_WITHIN_M
 from simulator.vehicles.vehicle import LEFT_BEHIND, TOO_CLOSE
 
 STEP_M = 1.0
 """A vehicle's way is made of pieces that are at most so long,"""
 STEPS_OF_RADIUS = 4.0
 """and of so many on its turning circle's radius."""
-
-PASSED_WITHIN_M = 8.0
-"""Who passes the end of its leg at most this far to the side has come there, as at sea."""
 
 MOST_CIRCLES = 2.0
 """After so many whole circles more than a leg is long a vehicle gives its end up."""

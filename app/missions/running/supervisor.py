@@ -158,8 +158,8 @@ class MissionSupervisor:
             self.runs.pop(live.id, None)
             return
         except Exception as error:
-            log.exception("the step loop failed", mission=live.id)
-            target, reason = MissionState.FAILED, f"the step loop failed: {error}"
+            log.exception("the flight failed", mission=live.id)
+            target, reason = MissionState.FAILED, f"the flight failed: {error}"
             alarm: AlarmKind | None = AlarmKind.MISSION_FAILED
         else:
             target, alarm = MissionState.FINISHED, None

@@ -23,10 +23,8 @@ from app.missions.spec.mission import MissionSpec
 from app.missions.spec.mounting import MountingSpec
 from app.missions.spec.systematic_errors import InstrumentErrors, SystematicErrors
 from app.missions.spec.water import Cast, SoundSpeed, Tide
+from app.storage.queries.logs import NO_LEVEL
 from imc_bridge.printable import printable
-
-NO_LEVEL = "tide: "
-"""How the reason of a sounding begins that is refused because no water level is known for its time."""
 
 ASSUMED_MPS = 1500.0
 """Speed that is set in sonars where nobody says otherwise."""

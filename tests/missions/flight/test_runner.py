@@ -8,7 +8,6 @@ import pytest
 from app.missions.fleet.hub import FleetHub, VehicleKey
 from app.missions.fleet.interface import LinkState, VehicleRefusedError
 from app.missions.fleet.links.sim import SimFleetLink
-from app.missions.flight import runner
 from app.missions.flight.decisions import deciding
 from app.missions.flight.decisions.decision import Decision, decide
 from app.missions.flight.legs.commit import LegCommit
@@ -21,18 +20,6 @@ from tests.support.missions.harbour import act, sim_spec, until_state, view_of
 from tests.support.waiting import until
 
 REASON = "leaves no safe depth"
-
-
-async def test_a_part_of_the_flight_that_fails_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "BEGIN_ANEW_S", 0.0)
-    failures = iter([OSError("a disk"), ValueError("a figure")])
-
-    async def keep() -> None:
-        for failure in failures:
-            raise failure
-
-    await runner.kept_going(keep)
-    assert not list(failures), "it went on after both"
 
 
 async def test_a_step_in_which_every_order_is_refused_does_not_count(

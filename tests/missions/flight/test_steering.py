@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.missions.flight.steering import PASSED_WITHIN_M, STEP_M, steered_motion
+from app.missions.flight.steering import STEP_M, steered_motion
+from imc_bridge.control.orders import PASSED_WITHIN_M
 
 SPEED_MPS, RADIUS_M = 1.5, 5.0
 AWAY = st.floats(20.0, 60.0)

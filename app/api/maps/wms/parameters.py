@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from starlette.datastructures import QueryParams
 
+from app.api.maps.maps import MAX_VALUE_M
 from app.api.maps.wms.problems import NEW, OLD, WmsError, missing, wrong
 from app.mapping.coordinates.map_windows import WEB_MERCATOR, WGS84, MapWindow
 from app.missions.maps.gis_layers import WEB_LAYERS, Range
@@ -25,8 +26,6 @@ LISTED_INFO_FORMATS = (HTML, TEXT)
 """QGIS would ask for JSON if it were listed, and take the answer for GML unless it begins with ``Content-Type`` in this
 very writing, which our server does not use."""
 DEFAULT_STYLE = "default"
-MAX_VALUE_M = 20_000.0
-
 _COLOUR = re.compile(r"^(?:0x|#)([0-9a-f]{6})$", re.IGNORECASE)
 
 

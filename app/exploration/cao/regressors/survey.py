@@ -35,6 +35,7 @@ from app.exploration.core.routes import (
 )
 from app.exploration.lines.flown_lines import after_line
 from app.exploration.lines.handover import hand_over
+from app.exploration.lines.lawnmower import CORNER_LOSS
 from app.exploration.lines.parts import is_cut_off
 from app.exploration.planner.base import vehicle_rng
 from app.exploration.planner.options import PlannerOptions
@@ -72,8 +73,6 @@ SKIPPED_M = 5.0
 """Ground along a line that is left out is marked at places so far apart."""
 MOST_GIVEN = 24
 """How many of a vehicle's last legs can be taken back."""
-CORNER_LOSS = 0.4
-"""Part of a step that a corner costs where steps are counted: the leg to it ends early."""
 LEAST_EXTRA = 0.5
 """Whose lines are all flown gets more to fly where at least this part of a step is left."""
 TURNS_RAD = np.deg2rad([-120.0, -90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 120.0])

@@ -62,18 +62,15 @@ class GivingWay:
         self.led = LedVehicles(live, moment, room)
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Keep vehicles apart from each other and from other missions', until cancelled."""
         with self._others.flown(self.led):
             while True:
-                try:
-                    if not self._live.halted and self._live.spec.limits.min_separation_m > 0.0:
-                        await self.look()
-                except Exception:
-                    log.exception("vehicles' ways could not be looked at")
+                if not self._live.halted and self._live.spec.limits.min_separation_m > 0.0:
+                    await self.look()
                 await until_next_look(self._time_scale)
 
     async def look(self) -> None:
-        """Look once at everybody."""
+        """Look once which vehicles are about to meet, and let one of them wait."""
         own, about = self._may_meet()
         near = [self._moment.as_led(member) for member in own]
         near += [vehicle.imminent(self._live.frame) for vehicle in about]

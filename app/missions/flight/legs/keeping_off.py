@@ -83,17 +83,14 @@ class KeepingOff:
         """From which leg each vehicle was led aside last, and how often."""
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Keep vehicles off zones, where there are any, until cancelled."""
         while self._live.spec.keep_out:
-            try:
-                if not self._live.halted:
-                    await self.look()
-            except Exception:
-                log.exception("vehicles' ways past zones could not be looked at")
+            if not self._live.halted:
+                await self.look()
             await until_next_look(self._time_scale)
 
     async def look(self) -> None:
-        """Look once at everybody."""
+        """Look once whether any vehicle's way leads too near to a zone."""
         aside = self._asides.of(Because.ZONE)
         for member in list(self._live.team):
             if not self._asides.may_lead(member, Because.ZONE):

@@ -15,7 +15,7 @@ CLOCK_SET_S = 2.0
 
 
 async def keep_time(live: LiveMission) -> None:
-    """Go on until cancelled."""
+    """Store how long the mission has been flown and tell when this machine's clock was set, until cancelled."""
     loop = asyncio.get_running_loop()
     ahead_s = now().timestamp() - loop.time()
     while True:

@@ -65,7 +65,7 @@ class Engagement:
         self._machine_advised = False
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Engage every vehicle that should follow and does not, until cancelled."""
         try:
             while True:
                 await self._look()

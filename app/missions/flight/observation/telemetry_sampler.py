@@ -13,7 +13,7 @@ LEAST_PERIOD_S = 0.5
 
 
 async def keep_telemetry(live: LiveMission, time_scale: float) -> None:
-    """Go on until cancelled."""
+    """Keep samples of vehicles for charts, until cancelled."""
     while True:
         live.journal.telemetry(samples_of(live))
         await asyncio.sleep(max(LEAST_PERIOD_S, PERIOD_S / time_scale))

@@ -29,16 +29,13 @@ class VehicleClocks:
         self._told: set[str] = set()
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Compare vehicles' clocks with this machine's again and again, until cancelled."""
         while True:
             await asyncio.sleep(PERIOD_S)
-            try:
-                await self.look()
-            except Exception:
-                log.exception("vehicles' clocks could not be looked at")
+            await self.look()
 
     async def look(self) -> None:
-        """Look once at everybody; a clock is told of once, and again when it was right meanwhile."""
+        """Compare them once; a wrong one is told of once, and again when it was right meanwhile."""
         if not self._comparable or self._live.gate.corrections.table is None:
             return
         for member in self._live.team:

@@ -79,16 +79,13 @@ class FailsafeWatch:
         """Vehicles are launched side by side: who has not been apart yet is not too close."""
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Look at every vehicle's failsafes again and again, until cancelled."""
         while True:
-            try:
-                self.look()
-            except Exception:
-                log.exception("the failsafes could not be looked at")
+            self.look()
             await until_next_look(self._time_scale)
 
     def look(self) -> None:
-        """Look once at everybody."""
+        """Look once which failsafes are active on which vehicles, and see to what follows."""
         now_s = asyncio.get_running_loop().time() * self._time_scale
         too_close = self._too_close()
         self._range.take_currents()

@@ -36,7 +36,7 @@ class OnboardWays:
         self._told: set[str] = set()
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Keep a way home on board of every vehicle that can, as it is now, until cancelled."""
         while True:
             able = [member for member in self._live.team if member.capabilities.keeps_way_home and member.controllable]
             await asyncio.gather(*(self._renew(member) for member in able))

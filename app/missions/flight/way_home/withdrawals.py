@@ -79,14 +79,14 @@ class Withdrawals:
                 member.withdrawal.led = False
 
     async def keep(self) -> None:
-        """Go on until cancelled."""
+        """Lead every vehicle that was called home or aside, until cancelled."""
         while True:
             await self.look()
             await self._dispatch.settle_late([m for m in self._live.team if m.withdrawal is not None])
             await until_next_look(self._time_scale)
 
     async def look(self) -> None:
-        """Look once at everybody."""
+        """Lead each of them once."""
         for member in self._live.team:
             if member.withdrawal is not None and not member.withdrawal.over and not self._live.halted:
                 try:

@@ -27,7 +27,7 @@ from app.missions.live.journals.write_behind import Committed, WriteBehind
 from app.missions.live.watchers.alarms import MissionAlarms
 from app.missions.live.watchers.broadcast import Broadcaster
 from app.missions.pings.store import JudgedBatch, PingStore, TakenPings
-from app.missions.soundings.corrections import NO_LEVEL, PlacedSounding
+from app.missions.soundings.corrections import PlacedSounding
 from app.missions.soundings.gate import Gate
 from app.missions.views.measurements.soundings import ItemVerdict, Verdict
 from app.missions.views.messages import EventMessage
@@ -40,6 +40,7 @@ from app.storage.queries import alarms as alarm_queries
 from app.storage.queries import missions as mission_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import telemetry as telemetry_queries
+from app.storage.queries.logs import NO_LEVEL
 
 FLUSH_PERIOD_S = 0.1
 ENDS = "ends"

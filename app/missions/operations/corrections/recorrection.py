@@ -20,7 +20,7 @@ from app.missions.errors import ConflictError, InvalidRequestError, VehicleNotFo
 from app.missions.fleet.interface import BeamGeometry, Position, SoundingReport
 from app.missions.live.mission import LiveMission
 from app.missions.soundings.adjustment import TrackAdjustment
-from app.missions.soundings.corrections import NO_LEVEL, Corrections, Tracks, no_tracks
+from app.missions.soundings.corrections import Corrections, Tracks, no_tracks
 from app.missions.soundings.gate import Gate
 from app.missions.spec.base import FieldError
 from app.missions.spec.mission import MissionSpec
@@ -39,6 +39,7 @@ from app.storage.models import ImportRow, MissionRow, SoundingRow, TideTableRow
 from app.storage.queries import events as event_queries
 from app.storage.queries import soundings as sounding_queries
 from app.storage.queries import stored_maps
+from app.storage.queries.logs import NO_LEVEL
 
 AT_ONCE = 10_000
 """At most so many soundings are corrected and written at a time."""

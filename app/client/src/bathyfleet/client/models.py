@@ -15,7 +15,7 @@ from bathyfleet.client.model import Model, Open
 Action: TypeAlias = Annotated[Literal["start", "pause", "resume", "abort", "finish"], Open]
 """What operators and consoles may ask of a mission."""
 
-AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "no_position", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "not_begun", "test"], Open]
+AlarmKind: TypeAlias = Annotated[Literal["leak", "critical_energy", "too_deep", "position_lost", "no_position", "low_energy", "link_lost", "traffic", "geofence_left", "vehicle_error", "other_console", "all_links_lost", "zone_entered", "area_left", "vehicle_lost", "vehicle_restarted", "vehicle_refuses", "stop_not_acknowledged", "not_come_home", "no_way_home", "no_vehicle", "no_waypoint", "no_scan", "search_late", "search_stuck", "no_water_level", "database_unwritable", "mission_failed", "not_begun", "watch_failed", "test"], Open]
 """What is raised as an alarm. Those of failsafes have the failsafes' names."""
 
 AlarmSeverity: TypeAlias = Annotated[Literal["minor", "major", "critical"], Open]

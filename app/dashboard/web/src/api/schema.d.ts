@@ -2362,7 +2362,7 @@ export interface components {
          * @description What is raised as an alarm. Those of failsafes have the failsafes' names.
          * @enum {string}
          */
-        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "no_position" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "not_begun" | "test";
+        AlarmKind: "leak" | "critical_energy" | "too_deep" | "position_lost" | "no_position" | "low_energy" | "link_lost" | "traffic" | "geofence_left" | "vehicle_error" | "other_console" | "all_links_lost" | "zone_entered" | "area_left" | "vehicle_lost" | "vehicle_restarted" | "vehicle_refuses" | "stop_not_acknowledged" | "not_come_home" | "no_way_home" | "no_vehicle" | "no_waypoint" | "no_scan" | "search_late" | "search_stuck" | "no_water_level" | "database_unwritable" | "mission_failed" | "not_begun" | "watch_failed" | "test";
         /**
          * AlarmMessage
          * @description An alarm was raised or acknowledged; by its id the page knows whether it has it already.

@@ -18,6 +18,7 @@ from app.missions.fleet.interface import (
     VehicleReport,
     WaypointOrder,
 )
+from imc_bridge.control.orders import PASSED_WITHIN_M
 from simulator.floors.terrain import Terrain
 from simulator.obstacles.scanning import Scan, Scanning
 from simulator.sonars.swath import SwathSounder
@@ -25,9 +26,6 @@ from simulator.targets import Ranging
 from simulator.vehicles.battery import Battery
 from simulator.vehicles.vehicle import STEP_S
 from simulator.world import BeamReturn, LocalPosition, SimulatedVehicle, SwathPing
-
-PASSED_WITHIN_M = 8.0
-"""A vehicle that passes its waypoint at most this far to the side has arrived, as for those led over IMC."""
 
 
 class DeployedVehicle:
