@@ -91,7 +91,7 @@ class OwnLegs:
         self,
         live: LiveMission,
         decider: Decider,
-        committing: LegCommit,
+        leg_commit: LegCommit,
         dispatch: Dispatch,
         maps: StepMaps,
         waiting: Waiting,
@@ -105,11 +105,11 @@ class OwnLegs:
         self._constraints = constraints
         self._live = live
         self._decider = decider
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._dispatch = dispatch
         self._maps = maps
         self._waiting = waiting
-        self._exchange = LegExchange(live, decider, committing, energy_range, time_scale)
+        self._exchange = LegExchange(live, decider, leg_commit, energy_range, time_scale)
         self._time_scale = time_scale
         self._watched = bool(live.spec.targets) or live.spec.surface_policy is not None
         self._measured = live.spec.planner.name in COVERERS
@@ -208,7 +208,7 @@ class OwnLegs:
         for name, place_m, ends_m in self._dispatch.unflown.take_left_lines():
             planner.leave(name, space.nearest(place_m), ends_m)
         # What was stored with the legs has these as flown, and a restart would go on from that.
-        await self._committing.remember(planner.snapshot())
+        await self._leg_commit.remember(planner.snapshot())
         return True
 
     @property
@@ -239,7 +239,7 @@ class OwnLegs:
                 given_back = True
         if given_back:
             # What was stored with the legs has these as flown, and a restart would go on from that.
-            await self._committing.remember(planner.snapshot())
+            await self._leg_commit.remember(planner.snapshot())
 
     def _legs_within(self, member: Member, *, begun: bool) -> int:
         """Return how many of the legs that a vehicle has ahead end within its way, with ``begun`` begin there."""
@@ -347,7 +347,7 @@ class OwnLegs:
                 planner.put_back(name, np.array(ends))
             if not_given:
                 # What was stored with the legs has these as flown, and a restart would go on from that.
-                await self._committing.remember(planner.snapshot())
+                await self._leg_commit.remember(planner.snapshot())
         self._maps.begin()
 
     def _not_given(self, decision: Decision, given_m: dict[str, FloatArray]) -> Iterable[Leg]:
@@ -384,7 +384,7 @@ class OwnLegs:
                 if not leg.refusal and leg.vehicle in numbers and self._dispatch.unflown.is_barred(leg.vehicle):
                     # The planner takes it as flown, and it goes on from legs that are not.
                     self._dispatch.unflown.add_barred(leg.vehicle, [leg.target_m[:2]])
-            await self._committing.commit(replace(decision, legs=legs), numbers)
+            await self._leg_commit.commit(replace(decision, legs=legs), numbers)
             live.changed.set()
         elif any(self._refusals.get(leg.vehicle) == 1 for leg in decision.legs):
             for note in decision.notes:

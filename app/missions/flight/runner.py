@@ -90,24 +90,24 @@ class Runner:
         self._apart = flies_apart(live, constraints, planner.planner)
         self._maps = StepMaps(live, executor, time_scale, map_pause_s, maps_ready)
         self._waiting = Waiting(live)
-        self._lookout = SearchHooks(live, time_scale, self._waiting.until)
+        self._search_hooks = SearchHooks(live, time_scale, self._waiting.until)
         decided = limits_of_decisions(constraints, planner.planner) if self._apart else constraints
         self._decider = Decider(live, decided, planner, self._maps, executor)
-        self._committing = LegCommit(live, constraints, leads=not self._lookout.needed)
-        self._dispatch = Dispatch(live, hub, self._committing, time_scale, persistent=self._apart)
+        self._leg_commit = LegCommit(live, constraints, leads=not self._search_hooks.needed)
+        self._dispatch = Dispatch(live, hub, self._leg_commit, time_scale, persistent=self._apart)
         self._engagement = Engagement(live, hub, time_scale, self._dispatch.send)
-        self._range = EnergyRange(live, constraints, self._committing)
+        self._range = EnergyRange(live, constraints, self._leg_commit)
         self._watch = FailsafeWatch(live, hub, self._range, time_scale)
         zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
-        asides = Asides(live, self._committing, self._dispatch)
+        asides = Asides(live, self._leg_commit, self._dispatch)
         self._keeping_off = KeepingOff(live, constraints, zones, asides, time_scale)
         moment = NextMoment(live, time_scale)
-        room = RoomAside(live, constraints, self._committing, zones, asides, moment)
+        room = RoomAside(live, constraints, self._leg_commit, zones, asides, moment)
         self._giving_way = GivingWay(live, moment, room, asides, others, time_scale)
         self._onboard = OnboardWays(live, hub, self._range, time_scale)
         self._orders = live.part(OrderBook)
         self._ordered = Flight(planner, constraints, self._range, self._dispatch, self._apart)
-        self._withdrawals = Withdrawals(live, hub, self._committing, self._dispatch, self._range, time_scale)
+        self._withdrawals = Withdrawals(live, hub, self._leg_commit, self._dispatch, self._range, time_scale)
 
     async def run(self) -> str:
         """Fly to the mission's end. Returns why nobody goes on; raises whatever went wrong."""
@@ -166,10 +166,10 @@ class Runner:
         return any(staying.get(member.name) is not member for member in self._live.team.surveying)
 
     def _flight(self) -> OwnLegs | TeamSteps:
-        shared = (self._live, self._decider, self._committing, self._dispatch, self._maps, self._waiting)
+        shared = (self._live, self._decider, self._leg_commit, self._dispatch, self._maps, self._waiting)
         if self._apart:
             return OwnLegs(*shared, self._constraints, self._time_scale, self._range, self._orders)
-        return TeamSteps(*shared, self._lookout, self._time_scale)
+        return TeamSteps(*shared, self._search_hooks, self._time_scale)
 
     def _ended_before(self) -> str:
         """Return why an earlier flight called everybody home at the mission's end; '' where it did not."""

@@ -38,20 +38,20 @@ class TeamSteps:
         self,
         live: LiveMission,
         decider: Decider,
-        committing: LegCommit,
+        leg_commit: LegCommit,
         dispatch: Dispatch,
         maps: StepMaps,
         waiting: Waiting,
-        lookout: SearchHooks,
+        search_hooks: SearchHooks,
         time_scale: float,
     ) -> None:
         self._live = live
         self._decider = decider
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._dispatch = dispatch
         self._maps = maps
         self._waiting = waiting
-        self._lookout = lookout
+        self._search_hooks = search_hooks
         self._time_scale = time_scale
 
     @property
@@ -81,7 +81,7 @@ class TeamSteps:
                 await self._waiting.for_team(
                     patient_s=None if live.header.step else step_allowed_s(self._live) / self._time_scale
                 )
-                await self._lookout.look_round()
+                await self._search_hooks.look_round()
                 decision = await self._decide_to_fly()
                 if decision is None:
                     continue
@@ -90,14 +90,14 @@ class TeamSteps:
                 member.status = None
                 member.ahead.clear()
             number = live.header.step + 1
-            await self._committing.commit(decision, {leg.vehicle: number for leg in decision.legs})
+            await self._leg_commit.commit(decision, {leg.vehicle: number for leg in decision.legs})
             await self._dispatch.begin()
             await self._send_until_flown()
             taken = decision
             # The map is made and its model refined while the vehicles travel.
             self._maps.begin()
             decision = await self._travel()
-            if over := await self._lookout.why_over(taken, asyncio.get_running_loop().time() - started_s):
+            if over := await self._search_hooks.why_over(taken, asyncio.get_running_loop().time() - started_s):
                 if not live.team.held:
                     return over
                 # Those that are back have nothing to do; who is held is not left at sea.
@@ -114,7 +114,7 @@ class TeamSteps:
         """
         while self._live.team.plannable:
             number = self._live.header.step + 1
-            decision = await self._decider.decide_to_fly(number, self._places(), self._lookout.task(number))
+            decision = await self._decider.decide_to_fly(number, self._places(), self._search_hooks.task(number))
             if decision:
                 return decision[0]
             await asyncio.sleep(DECIDE_AGAIN_S / self._time_scale)
@@ -130,25 +130,26 @@ class TeamSteps:
         deadline_s, live = self._deadline_s(), self._live
         close = await self._waiting.until(
             lambda: (
-                all(self._about_to_arrive(m) for m in live.team.surveying if m.busy) or bool(self._lookout.barred())
+                all(self._about_to_arrive(m) for m in live.team.surveying if m.busy)
+                or bool(self._search_hooks.barred())
             ),
             deadline_s,
         )
         last = live.header.step >= self._spec.steps
-        if not close or last or not live.team.plannable or self._lookout.barred():
+        if not close or last or not live.team.plannable or self._search_hooks.barred():
             await self._arrive(deadline_s)
             return None
         planner = self._decider.planner
         memory, number = planner.snapshot(), live.header.step + 1
         expected = [place_ahead(member, live) for member in live.team.plannable]
-        deciding = asyncio.create_task(self._decider.decide(number, expected, self._lookout.task(number)))
+        deciding = asyncio.create_task(self._decider.decide(number, expected, self._search_hooks.task(number)))
         try:
             await self._arrive(deadline_s)
             [decision] = await deciding
         finally:
             deciding.cancel()
         flown = not all(leg.refusal for leg in decision.legs)
-        if flown and self._came_true(expected) and self._lookout.still_clear(decision):
+        if flown and self._came_true(expected) and self._search_hooks.still_clear(decision):
             return decision
         planner.restore(memory)
         return None
@@ -189,9 +190,9 @@ class TeamSteps:
     async def _arrive(self, deadline_s: float) -> None:
         """Wait until every vehicle under way arrived or refused; at the deadline go on without the others."""
         if await self._waiting.until(
-            lambda: not any(m.busy for m in self._live.team.surveying) or bool(self._lookout.barred()), deadline_s
+            lambda: not any(m.busy for m in self._live.team.surveying) or bool(self._search_hooks.barred()), deadline_s
         ):
-            await self._end_early(self._lookout.barred())
+            await self._end_early(self._search_hooks.barred())
             return
         late = [member for member in self._live.team.surveying if member.busy]
         if not late:
@@ -209,7 +210,7 @@ class TeamSteps:
             if member.busy:
                 reason = "something stands on its way" if member in barred else "the step ended before it was there"
                 self._dispatch.settle(member, WaypointStatus.MISSED, reason)
-        await self._lookout.tell_of(barred)
+        await self._search_hooks.tell_of(barred)
 
     @property
     def _somebody_surveys(self) -> bool:

@@ -39,12 +39,12 @@ class PlacedVehicles:
         self.live = live
         self.ordered: list[WaypointOrder] = []
         constraints = make_constraints(live.spec)
-        self.committing = committing = LegCommit(live, constraints, leads=False)
-        self.dispatch = dispatch = Dispatch(live, hub, committing, 1.0, persistent=True)
+        self.leg_commit = leg_commit = LegCommit(live, constraints, leads=False)
+        self.dispatch = dispatch = Dispatch(live, hub, leg_commit, 1.0, persistent=True)
         zones = KeepOutZones(live.spec.to_local(zone) for zone in live.spec.keep_out)
-        self.asides = asides = Asides(live, committing, dispatch)
+        self.asides = asides = Asides(live, leg_commit, dispatch)
         moment = NextMoment(live, 1.0)
-        room = RoomAside(live, constraints, committing, zones, asides, moment)
+        room = RoomAside(live, constraints, leg_commit, zones, asides, moment)
         self.others = OtherVehicles(hub, 1.0) if others is None else others
         self.giving_way = GivingWay(live, moment, room, asides, self.others, 1.0)
         self.keeping_off = KeepingOff(live, constraints, zones, asides, 1.0)

@@ -41,9 +41,9 @@ class Aside:
 class Asides:
     """The vehicles of one running mission that are led aside: each for one reason at a time."""
 
-    def __init__(self, live: LiveMission, committing: LegCommit, dispatch: Dispatch) -> None:
+    def __init__(self, live: LiveMission, leg_commit: LegCommit, dispatch: Dispatch) -> None:
         self._live = live
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._dispatch = dispatch
         self._led: dict[str, Aside] = {}
 
@@ -73,7 +73,7 @@ class Asides:
 
         No for one that was sent elsewhere already since it has flown its leg.
         """
-        order = self._committing.waiting_at(member, place_m)
+        order = self._leg_commit.waiting_at(member, place_m)
         if order is None:
             return False
         begins = member.waits_m is None
@@ -82,7 +82,7 @@ class Asides:
 
     async def lead(self, member: Member, place_m: FloatArray, because: Because) -> bool:
         """Lead a vehicle to a place (2,) where it stays; whether it flew its leg until now, and takes this order."""
-        order = self._committing.waiting_at(member, place_m)
+        order = self._leg_commit.waiting_at(member, place_m)
         if order is None or member.order is None:
             return False
         begins = self._now(member.name) is None

@@ -33,7 +33,7 @@ class Dispatch:
     Parameters
     ----------
     live, hub
-    committing
+    leg_commit
         Makes a leg an order.
     time_scale
         How much faster than the wall clock the vehicles live.
@@ -42,12 +42,12 @@ class Dispatch:
     """
 
     def __init__(
-        self, live: LiveMission, hub: FleetHub, committing: LegCommit, time_scale: float, *, persistent: bool
+        self, live: LiveMission, hub: FleetHub, leg_commit: LegCommit, time_scale: float, *, persistent: bool
     ) -> None:
         self._persistent = persistent
         self._live = live
         self._hub = hub
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._time_scale = time_scale
         self._idle_since_s: dict[str, float] = {}
         """Since when vehicles have had nothing to fly, the event loop's time; inf once they hold."""
@@ -125,7 +125,7 @@ class Dispatch:
 
         That is no leg: what the vehicle tells of it is of no interest.
         """
-        order = self._committing.holding(member)
+        order = self._leg_commit.holding(member)
         if order is not None:
             await self.stay(member, order)
 
@@ -148,11 +148,11 @@ class Dispatch:
         for member in self._live.team:
             if self._live.halted or member.ordered or not member.ahead:
                 continue
-            barred = self._committing.barred(member)
+            barred = self._leg_commit.barred(member)
             if barred:
                 await self.drop_ahead(member, f"from where it is {barred}")
                 continue
-            self._committing.begin_next(member)
+            self._leg_commit.begin_next(member)
             member.leg_began_s = asyncio.get_running_loop().time()
             member.leg_allowed_s = leg_allowed_s(self._live, member)
             self._refusals.pop(member.name, None)

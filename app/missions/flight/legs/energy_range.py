@@ -33,10 +33,10 @@ LEAST_DEPTH_M = 0.5
 class EnergyRange:
     """Ways home of the vehicles of one running mission, and what their energy leaves beside them."""
 
-    def __init__(self, live: LiveMission, constraints: Constraints, committing: LegCommit) -> None:
+    def __init__(self, live: LiveMission, constraints: Constraints, leg_commit: LegCommit) -> None:
         self._live = live
         self._constraints = constraints
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._found: dict[str, tuple[FloatArray, FloatArray | None]] = {}
         self._ways: dict[tuple[float, float], tuple[WaysHome, WaysHome | None]] = {}
         """By recovery point: all ways, and those that keep off what is known to be too shallow, if anything is."""
@@ -74,7 +74,7 @@ class EnergyRange:
         if way_m is None or home_m is None or end_m is None or not member.ordered or member.withdrawal is not None:
             return way_m
         here_m = member.place_m(self._live.frame)
-        last_m = self._committing.followed_to_m(member, end_m)
+        last_m = self._leg_commit.followed_to_m(member, end_m)
         on_leg = here_m + np.linspace(0.0, 1.0, travel_depth.LEG_SAMPLES)[:, None] * (last_m - here_m)
         if self._live.search is None and self._sees(home_m, on_leg, way_m[0]):
             return way_m
@@ -106,7 +106,7 @@ class EnergyRange:
         if self._live.search is not None:
             return self._live.search.way_m(here_m, home_m, places_m, apart_m)
         self._look_for_land()
-        for bottom, least_m in ((self._committing.bottom, self._least_m), (None, 0.0)):
+        for bottom, least_m in ((self._leg_commit.bottom, self._least_m), (None, 0.0)):
             ways = WaysHome(self._constraints, home_m, bottom, least_m, (places_m, apart_m))
             if (way_m := ways.way(here_m)) is not None:
                 return way_m
@@ -118,7 +118,7 @@ class EnergyRange:
     def _ways_to(self, home_m: FloatArray) -> tuple[WaysHome, WaysHome | None]:
         key = (float(home_m[0]), float(home_m[1]))
         if key not in self._ways:
-            bottom, least_m = self._committing.bottom, self._least_m
+            bottom, least_m = self._leg_commit.bottom, self._least_m
             off_land = WaysHome(self._constraints, home_m, bottom, least_m) if self._land else None
             self._ways[key] = WaysHome(self._constraints, home_m), off_land
         return self._ways[key]
@@ -128,7 +128,7 @@ class EnergyRange:
 
         Each of the team has a depth of its own there, too, since ways home lead to the same place.
         """
-        limits, bottom, layer = self._live.spec.limits, self._committing.bottom, self.layer(member)
+        limits, bottom, layer = self._live.spec.limits, self._leg_commit.bottom, self.layer(member)
         return [
             layer.depth_m(travel_depth.travel_depth_m(a, b, layer.deepest_m, bottom, limits.min_altitude_m))
             for a, b in pairwise(np.vstack([here_m, way_m]))
@@ -150,7 +150,7 @@ class EnergyRange:
         if now_s - self._looked_s < LAND_PERIOD_S:
             return
         self._looked_s = now_s
-        shallow = self._committing.bottom.depth_m < self._least_m
+        shallow = self._leg_commit.bottom.depth_m < self._least_m
         land = shallow.tobytes() if shallow.any() else b""
         if land != self._land:
             self._land = land

@@ -39,11 +39,11 @@ class LegExchange:
     """
 
     def __init__(
-        self, live: LiveMission, decider: Decider, committing: LegCommit, energy_range: EnergyRange, time_scale: float
+        self, live: LiveMission, decider: Decider, leg_commit: LegCommit, energy_range: EnergyRange, time_scale: float
     ) -> None:
         self._live = live
         self._decider = decider
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._range = energy_range
         self._time_scale = time_scale
         self._looked_at: object = None
@@ -162,7 +162,7 @@ class LegExchange:
                     member = live.team.members[leg.vehicle]
                     if not self._range.allows(member, leg.target_m[:2]):
                         return False
-                    member.ahead.append(self._committing.leg_ahead(leg, numbers[leg.vehicle] + later))
+                    member.ahead.append(self._leg_commit.leg_ahead(leg, numbers[leg.vehicle] + later))
             return True
         finally:
             for member in members:
@@ -175,7 +175,7 @@ class LegExchange:
         live = self._live
         members = [live.team.members[name] for name in old]
         new = {
-            name: [self._committing.leg_ahead(leg, was.number) for leg, was in zip(anew[name], legs, strict=True)]
+            name: [self._leg_commit.leg_ahead(leg, was.number) for leg, was in zip(anew[name], legs, strict=True)]
             for name, legs in old.items()
         }
         longer_m = {m.name: self._way_m(m, old[m.name]) for m in members}
@@ -184,7 +184,7 @@ class LegExchange:
             del member.ahead[-len(old[member.name]) :]
         written = False
         try:
-            await self._committing.rewrite(last, {name: list(zip(new[name], anew[name], strict=True)) for name in new})
+            await self._leg_commit.rewrite(last, {name: list(zip(new[name], anew[name], strict=True)) for name in new})
             written = True
         finally:
             for member in members:

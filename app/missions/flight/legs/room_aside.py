@@ -55,14 +55,14 @@ class RoomAside:
         self,
         live: LiveMission,
         constraints: Constraints,
-        committing: LegCommit,
+        leg_commit: LegCommit,
         zones: KeepOutZones,
         asides: Asides,
         moment: NextMoment,
     ) -> None:
         self._live = live
         self._constraints = constraints
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._zones = zones
         self._asides = asides
         self._moment = moment
@@ -145,7 +145,7 @@ class RoomAside:
         if member.withdrawal is not None and home_m is not None:
             constraints = homeward_ground(constraints, home_m)
         here, target = np.append(here_m, depth_m), np.append(member.target_m, depth_m)
-        aside = ways_aside(here, target, constraints, self._committing.bottom, or_nearer=True)
+        aside = ways_aside(here, target, constraints, self._leg_commit.bottom, or_nearer=True)
         places_m = [here_m, *aside[:, :2]]
         if self._asides.may_stand_elsewhere(member):
             # For long, maybe: rather where its circles stay inside, but first of all apart from others.

@@ -52,14 +52,14 @@ class Withdrawals:
         self,
         live: LiveMission,
         hub: FleetHub,
-        committing: LegCommit,
+        leg_commit: LegCommit,
         dispatch: Dispatch,
         energy_range: EnergyRange,
         time_scale: float,
     ) -> None:
         self._live = live
         self._hub = hub
-        self._committing = committing
+        self._leg_commit = leg_commit
         self._dispatch = dispatch
         self._range = energy_range
         self._time_scale = time_scale
@@ -157,7 +157,7 @@ class Withdrawals:
         if not rises and not will_rise:
             return False
         withdrawal.below = True
-        order = self._committing.waiting_below(member)
+        order = self._leg_commit.waiting_below(member)
         if rises:
             self._dispatch.settle(member, WaypointStatus.MISSED, f"{others} would be in its way")
         if order is not None:
@@ -237,7 +237,7 @@ class Withdrawals:
             await self._end(member, withdrawal, f"{member.name} is at the surface")
             return
         self._stranded.add(member.name)
-        self._committing.lead_home(member, [(member.place_m(self._live.frame), 0.0)])
+        self._leg_commit.lead_home(member, [(member.place_m(self._live.frame), 0.0)])
         await self._dispatch.begin()
 
     async def _go_home(self, member: Member, withdrawal: Withdrawal) -> None:
@@ -272,7 +272,7 @@ class Withdrawals:
         self._lay[member.name] = frozenset(other.name for other in self._live.team.at_rest)
         # In a search it ends where it leads, which may be beside that place.
         end_m = home_m if search is None else way[-1][0]
-        self._committing.lead_home(member, [*way, (end_m, 0.0)])
+        self._leg_commit.lead_home(member, [*way, (end_m, 0.0)])
         await self._dispatch.begin()
 
     def _waited_to_rise(self, member: Member) -> bool:

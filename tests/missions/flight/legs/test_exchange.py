@@ -48,11 +48,11 @@ class Flight:
         spec = live.spec
         constraints = make_constraints(spec)
         self.planner = OrderedPlanner(make_planner(spec))
-        self.committing = LegCommit(live, constraints, leads=False)
+        self.leg_commit = LegCommit(live, constraints, leads=False)
         maps = StepMaps(live, executor, TIME_SCALE, 0.2, _at_once)
         self.decider = Decider(live, constraints, self.planner, maps, executor)
-        ways = EnergyRange(live, constraints, self.committing)
-        self.exchange = LegExchange(live, self.decider, self.committing, ways, TIME_SCALE)
+        ways = EnergyRange(live, constraints, self.leg_commit)
+        self.exchange = LegExchange(live, self.decider, self.leg_commit, ways, TIME_SCALE)
 
     async def begin(self) -> None:
         for slot, vehicle in enumerate(self.live.spec.vehicles):
@@ -62,10 +62,10 @@ class Flight:
         self.sound()
         places = [replace(place_ahead(m, self.live), left_m=300.0) for m in self.live.team]
         for number, decision in enumerate(await self.decider.decide(1, places, legs=LEGS), 1):
-            await self.committing.commit(decision, {place.vehicle: number for place in places})
+            await self.leg_commit.commit(decision, {place.vehicle: number for place in places})
             places = moved_on(places, decision)
         for member in self.live.team:
-            self.committing.begin_next(member)
+            self.leg_commit.begin_next(member)
             member.status = WaypointStatus.SENT
 
     def put(self, member: Member, en_m: FloatArray) -> None:
@@ -203,7 +203,7 @@ async def test_a_leg_that_was_begun_meanwhile_is_not_exchanged_and_the_planner_k
 
     def begins(target_m: FloatArray) -> FloatArray:
         if len(early.ahead) == LEGS - 1:
-            flight.committing.begin_next(early)
+            flight.leg_commit.begin_next(early)
         return aside(target_m)
 
     before = await flight.stored(database)

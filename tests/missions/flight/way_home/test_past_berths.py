@@ -103,7 +103,7 @@ async def test_who_comes_to_lie_on_a_way_home_is_gone_round(
     """Seen in shallow water: one was home where it had turned, and another one that was led before passed over it."""
     live, energy_range = await team_over(service, 4.0)
     scene = PlacedVehicles(live, service.hub, monkeypatch)
-    withdrawals = Withdrawals(live, service.hub, scene.committing, scene.dispatch, energy_range, 1.0)
+    withdrawals = Withdrawals(live, service.hub, scene.leg_commit, scene.dispatch, energy_range, 1.0)
     home_m = berth_m(live, "a")
     here, lies_m = (float(home_m[0]), 30.0, 1.0), home_m - (aside_m, 40.0)
     a = scene.put("a", here, (*home_m, 0.0))
