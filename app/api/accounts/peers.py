@@ -124,7 +124,7 @@ def _asked_by_netlink(near: End, far: End) -> tuple[int, int, int]:
 
 
 def _looked_up_in_table(near: End, far: End, table: Path = Path("/proc/self/net")) -> tuple[int, int, int] | None:
-    """Return the same from the kernel's tables of sockets, which are read from beginning to end."""
+    """Return state, user and inode of a socket from the kernel's tables, which are read from beginning to end."""
     for name, forms in (("tcp", _forms_v4), ("tcp6", _forms_v6)):
         wanted = [list(forms(end)) for end in (near, far)]
         if not all(wanted):

@@ -59,7 +59,7 @@ class _Block:
         return self.products - np.outer(self.means, self.means) / max(self.weight, 1e-12)
 
     def centred_m2(self) -> FloatArray:
-        """Return the same in metres, every beam counting alike."""
+        """Return these products (3, 3) in square metres, every beam counting alike."""
         return self.squares_m2 - np.outer(self.sums_m, self.sums_m) / max(self.count, 1)
 
 

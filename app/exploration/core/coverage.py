@@ -47,12 +47,12 @@ class Coverage:
         return np.column_stack([self.west_m + (cols + 0.5) * self.cell_m, self.south_m + (rows + 0.5) * self.cell_m])
 
     def planned_on(self) -> "Coverage":
-        """Return the same on as many cells as lines are planned on: neighbours are joined where there are more."""
+        """Return the coverage on as many cells as lines are planned on: neighbours are joined where there are more."""
         factor = int(np.ceil(np.sqrt(self.wanted.sum() / MOST_CELLS)))
         return self if factor <= 1 else self.coarser(factor)
 
     def coarser(self, factor: int) -> "Coverage":
-        """Return the same on cells so many times as large: wanted where any is, done where all that are wanted are."""
+        """Return the coverage on larger cells, by a factor: wanted where any is, done where all that are wanted are."""
         rows, cols = self.wanted.shape
         pad = ((0, -rows % factor), (0, -cols % factor))
 

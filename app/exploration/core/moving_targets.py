@@ -79,7 +79,7 @@ class Localization:
     shared: bool = False
 
     def of(self, rows: NDArray[np.int64]) -> "Localization":
-        """Return the same for some of the vehicles, in this order."""
+        """Return the localization of some of the vehicles, in this order."""
         return replace(self, sd_m=self.sd_m[rows], foretold_sd_m=self.foretold_sd_m[rows])
 
 

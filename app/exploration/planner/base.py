@@ -176,7 +176,7 @@ class PlannerBase(ABC):
         return 0.0
 
     def lines_left(self) -> dict[str, float]:
-        """Return the same by the lines' names, where they have any."""
+        """Return how much is left of each of those lines that has a name, metres."""
         return {}
 
     def snapshot(self) -> bytes:

@@ -417,7 +417,7 @@ class SwathSurvey:
         return self._tries.count(path, flying, coverage, self._rasters.of(coverage, self._direction_rad), tries)
 
     def _left(self, coverage: Coverage) -> Coverage:
-        """Return the same without what is given up: what lines under way are to see is not, before they end."""
+        """Return a coverage without what is given up: what lines under way are to see is not, before they end."""
         under_way = (
             sweep.counted
             for sweep in self._sweeps.values()

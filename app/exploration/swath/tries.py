@@ -30,7 +30,7 @@ def unpacked(state: list[Any]) -> IntArray:
 
 
 def without(coverage: Coverage, cells: BoolArray | None) -> Coverage:
-    """Return the same as if some cells (rows, cols) were done; on another grid than theirs all is left as it is."""
+    """Return a coverage as if some cells (rows, cols) were done; on another grid than theirs it is left as it is."""
     if cells is None or cells.shape != coverage.done.shape:
         return coverage
     return replace(coverage, done=coverage.done | cells)

@@ -68,12 +68,12 @@ class SurveyCheck:
         return agreement(self.crossings.difference_m, self.crossings.mean_depth_m, order)
 
     def at_crosslines(self, order: Order) -> Agreement | None:
-        """Return the same for crossings of a crossline with a main line alone."""
+        """Return what crossings of a crossline with a main line say, these alone; None without any."""
         one, other = self.is_crossline[self.crossings.line].T
         return self._among(one != other, order)
 
     def by_vehicles(self, order: Order) -> dict[tuple[str, str], Agreement]:
-        """Return the same for each pair of vehicles that cross each other, a vehicle and itself among them."""
+        """Return what crossings say for each pair of vehicles that cross, a vehicle and itself among them."""
         pair = self.lines.vehicle[self.crossings.line]
         return {
             (self.names[a], self.names[b]): found

@@ -208,7 +208,7 @@ def _at_once(lines: list[str], layout: _Layout) -> FloatArray | None:
 
 
 def _one_by_one(lines: list[str], numbers: list[int], layout: _Layout) -> FloatArray:
-    """Return the same of lines with a deviation left out. Raises ReadError for the first that has no number."""
+    """Return the rows of lines, some without a deviation. Raises ReadError for the first that has no number."""
     return np.array([_row(line, layout, number) for line, number in zip(lines, numbers, strict=True)])
 
 

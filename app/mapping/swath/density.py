@@ -75,7 +75,7 @@ class DensityGrid:
         return np.asarray(inside)
 
     def copy(self) -> "DensityGrid":
-        """Return the same soundings, to which others may be added."""
+        """Return a copy, to which other soundings may be added."""
         other = DensityGrid.__new__(DensityGrid)
         other.grid, other.mask = self.grid, self.mask
         other.count = self.count.copy()

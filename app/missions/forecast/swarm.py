@@ -96,7 +96,7 @@ class Flown:
     """Where swath sonars ensonify an area: all of it, whatever the budget."""
 
     def with_whole(self, whole: WholeSurvey) -> "Flown":
-        """Return the same with what the whole survey takes."""
+        """Return the outcome together with what the whole survey takes."""
         return replace(self, whole=whole)
 
 

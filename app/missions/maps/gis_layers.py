@@ -193,5 +193,5 @@ def painted(snapshot: MapSnapshot, layer: WebLayer, range_: Range) -> Painted:
 
 
 def halved(finer: Painted) -> Painted:
-    """Return the same of half as many cells along each side."""
+    """Return a painted layer with half as many cells along each side."""
     return Painted(coarser_grid(finer.grid), coarser(finer.pixels))

@@ -166,7 +166,7 @@ class PingStore:
         return await made_of(range(beams // BEAMS_PER_ITEM), self.judge_here, reports)
 
     def judge_here(self, reports: Sequence[PingReport]) -> JudgedBatch:
-        """Do the same in the caller's thread."""
+        """Return in the caller's thread what :meth:`judge` returns."""
         verdicts: list[ItemVerdict] = []
         fresh: dict[tuple[str, str], list[tuple[int, PingReport, str]]] = {}
         seen: set[tuple[str, float]] = set()

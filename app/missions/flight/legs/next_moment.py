@@ -165,7 +165,7 @@ def is_out(member: Member) -> bool:
 
 
 def moved(imminent: Imminent, source: LocalFrame, frame: LocalFrame) -> Imminent:
-    """Return the same in another frame."""
+    """Return a vehicle's next moment in another frame."""
     place_m = imminent.motion.place_m
     east, north = frame.to_local(*source.to_geographic(place_m[:, 0], place_m[:, 1]))
     motion = Timeline(imminent.motion.time_s, np.column_stack([east, north, place_m[:, 2]]))
